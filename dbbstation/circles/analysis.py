@@ -34,11 +34,7 @@ EDITION = "ISO 230-4:2005"
 
 @dataclass(frozen=True)
 class Deviations:
-    """Greatest and least radial deviation from the nominal radius.
-
-    Attributes:
-        largest_um: Fmax, outwards positive.
-    """
+    """Greatest and least radial deviation from the nominal radius, outwards positive."""
 
     largest_um: float
     least_um: float
@@ -49,12 +45,10 @@ class CircleAnalysis:
     """One circle in one direction.
 
     Attributes:
-        chosen: of G, F and H.
         centre_mm: least-squares less commanded, X and Y.
         radius_error_um: least-squares less nominal radius.
         mean_radial_error_um: mean reading less nominal bar length [CAL Table III].
         steps: at visible reversals of X and Y.
-        harmonics: 2 to 10 undulations per revolution.
         closure: end less begin of the turn; None for too few samples.
         passes: None without overlap.
         feed_mm_min: by the overlap, with standard uncertainty; or None.
@@ -82,7 +76,7 @@ class CircleAnalysis:
 
     @cached_property
     def g_um(self) -> float:
-        """Circular deviation G, minimum zone [µm]; only figures need it, no finding does."""
+        """Return the circular deviation G, minimum zone [µm]; only figures need it, no finding does."""
         return 1e3 * self.path.zone().width_mm
 
 
@@ -146,7 +140,6 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
 
 
 def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return deviations without drift, whose step would raise the whole spectrum."""
     apart = closure_of(raw, residual_um, 0.0)
     return residual_um if apart is None else residual_um - apart.height_um * raw.phi_deg / FULL_TURN_DEG
 

@@ -48,7 +48,6 @@ class SetUpKnowledge:
 
     Attributes:
         u_temperature_um: standard uncertainty of corrected growth.
-        not_absolute: why figures of bar length have no uncertainty; may be empty.
         u_ball_um: standard uncertainty in X and Y, coordinate and mounting.
         u_form_um: standard uncertainty of a reading by the form of both balls.
     """
@@ -141,7 +140,6 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
 
 
 def _why_not(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> str:
-    """Return why a figure has no uncertainty, or an empty text."""
     reasons = []
     if quantity in ABSOLUTE:
         reasons.append(known.not_absolute)
@@ -155,7 +153,6 @@ def _why_not(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledg
 
 
 def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
-    """Return the budget of an extreme, or of a difference of two."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     terms = _of_extremes(one, 1 if quantity in ABSOLUTE else 2)
     missing = NOT_STATED
@@ -173,7 +170,6 @@ def _range(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge)
 
 
 def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[BudgetTerm, float]:
-    """Return terms of extremes beside noise."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
     root = float(np.sqrt(extremes))
     return {
@@ -206,7 +202,7 @@ def budgets(
 def _with_form(budget: Budget, known: SetUpKnowledge) -> Budget:
     """Return a budget with the form of both balls, if stated.
 
-    A range of readings is off by as much as either ball at most; hysteresis compares the same places of both.
+    A range of readings is off by at most either ball's form; hysteresis compares the same places of both.
     """
     if known.u_form_um is None:
         return budget
@@ -219,11 +215,7 @@ def _with_form(budget: Budget, known: SetUpKnowledge) -> Budget:
 
 @with_one_thread
 def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[BudgetQuantity, Budget]:
-    """Return the budgets of G(b), D and H of a circle in both directions on one mounting.
-
-    Args:
-        known: same bar and ball in both directions.
-    """
+    """Return the budgets of G(b), D and H of a circle in both directions on one mounting."""
     radius = [budget_of(one, BudgetQuantity.RADIUS, known) for one in (pair.one, pair.other)]
     noise = float(np.hypot(radius[0].terms_um[BudgetTerm.NOISE], radius[1].terms_um[BudgetTerm.NOISE])) / 2.0
     shared: dict[BudgetTerm, float] = {
@@ -293,7 +285,6 @@ def _closure_um(one: CircleAnalysis) -> float:
 
 
 def _slope_um_per_deg(pair: PairAnalysis) -> float:
-    """Return the paths' rms slope along the turn [µm/deg]."""
     squares = [
         (1e3 * float(np.hypot(*one.centre_mm))) ** 2 + sum((h.undulations * h.amplitude_um) ** 2 for h in one.harmonics)
         for one in (pair.one, pair.other)

@@ -1,8 +1,8 @@
-"""Noise of one turn at low undulations, continued from above by possible memories.
+"""Noise of one turn at low undulations, extrapolated from above by possible memories.
 
-Noise that remembers more than six degrees has the same slope above 30 undulations. Lines below limit it: noise has at
-most their power, and many lines at the expected power are noise. Each line is noise, or form of any size [spike and slab;
-Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
+Noise with a memory of more than six degrees has the same slope above 30 undulations. Lines below bound it: noise has at
+most their power, and many lines at the expected power are noise. Each line is noise, or form of any size [spike and
+slab; Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class ContinuedNoise:
 
 
 def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], freedom: float = 2.0) -> ContinuedNoise:
-    """Continue the noise of one turn.
+    """Extrapolate the noise of one turn.
 
     Args:
         below: power at lines 0, 1, ... low, with form, shape (low + 1,) [µm²].
@@ -102,7 +102,7 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
 def _processes(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the power of memories and power laws, shape (corners + exponents, h).
 
-    At lines 0 and 1 a power law is seen through the window of one turn.
+    At lines 0 and 1 a power law is filtered by the window of one turn.
     """
     laws = np.maximum(harmonic, 1.0) ** -EXPONENTS[:, None]
     for line, power in enumerate(_THROUGH_A_TURN):

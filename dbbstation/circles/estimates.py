@@ -70,7 +70,7 @@ def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
     """Return the white noise per sample of equal effect on a figure [µm].
 
     Args:
-        one: with too few samples only rounding counts.
+        one: a circle; with too few samples only rounding counts.
         undulations: 0 for radius and mean, 1 for a centre.
     """
     if not one.noise.known:
@@ -79,7 +79,6 @@ def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
 
 
 def _apart(one: CircleAnalysis) -> FormAndNoise:
-    """Return form and noise of unfiltered deviations, cached."""
     if one not in _APART:
         _APART[one] = _taken_apart(one)
     return _APART[one]
@@ -102,7 +101,7 @@ OF_A_CIRCLE = 2
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Form by samples, shape (n,) [µm], and drawn noise of a circle: about its own least-squares circle, and about that of both directions."""
+    """Form by samples, shape (n,) [µm], and noise draws about its own and the common least-squares circle."""
 
     form_um: NDArray[np.float64]
     alone: DrawnPath
@@ -110,7 +109,7 @@ class _Drawn:
 
 
 def _drawn(one: CircleAnalysis) -> _Drawn:
-    """Draw noise of a circle: each direction has draws of its own, as both stand beside each other in a pair."""
+    """Draw noise of a circle, independently for each direction of a pair."""
     if one not in _DRAWN:
         apart = _apart(one)
         form_um = _filtered(apart.form_um, one.chosen)

@@ -54,7 +54,7 @@ SEED = 4
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure without what noise adds to it.
+    """A figure without the noise's contribution.
 
     Attributes:
         u_um: standard uncertainty by noise: the longer half of the 95 % interval over 1.96.
@@ -100,13 +100,13 @@ def drawn_paths(
     seed: int,
     taken: Sequence[int] = (0,),
 ) -> tuple[DrawnPath, ...]:
-    """Draw noise of a path: the same draws less their first lines, for each of several numbers of these.
+    """Draw noise of a path, for each of several numbers of removed lines.
 
     Args:
         apart: form and noise of its deviations, in time order; the form filtered already.
         theta_deg: angles of its samples, shape (n,) [deg].
         passed: share of the noise's amplitude that the figure's filter lets pass, by line, shape (n // 2 + 1,).
-        taken: lines of the noise, from 0, that are taken out of the deviations.
+        taken: lines of the noise, from 0, that the fit removes.
     """
     count = len(theta_deg)
     order, starts, middle_deg = _sectors(theta_deg, passed)
@@ -141,7 +141,6 @@ def drawn_paths(
 def _sectors(
     theta_deg: NDArray[np.float64], passed: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Return samples by angle, where each sector begins among them, and its middle; arguments as of `drawn_paths`."""
     count = len(theta_deg)
     # Undulations up to which the filter passes a hundredth of the noise's power.
     points = POINTS_PER_UNDULATION * int(np.flatnonzero(passed > PASSED).max(initial=1))
@@ -158,7 +157,6 @@ def _sectors(
 
 
 def _waves(lines: int, at: NDArray[np.int64], count: int) -> NDArray[np.float64]:
-    """Return what parts of the first lines of a spectrum, real and imaginary by turns, add to some of n samples, shape (2 lines, samples)."""
     undulations = np.arange(lines)[:, None]
     angles = undulations * at * (2.0 * np.pi / count)
     share = np.where(undulations > 0, 2.0, 1.0) / count
@@ -175,7 +173,6 @@ def _extremes(
     highest: NDArray[np.float64],
     lowest: NDArray[np.float64],
 ) -> None:
-    """Write the greatest and least noise in each sector, shape (draws, s) each, less the first waves at their sizes, (draws, 2 lines)."""
     left = np.empty(len(order))
     for draw in range(len(noise)):
         for k in range(len(order)):
@@ -191,7 +188,6 @@ def _extremes(
 
 
 def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return sector means, shape (s,)."""
     return np.asarray(np.add.reduceat(values[order], starts) / np.diff(np.append(starts, len(order))))
 
 
@@ -247,8 +243,6 @@ lines is lower by a twentieth."""
 
 @dataclass(frozen=True)
 class _Interval:
-    """Estimate, 95 % interval, and least standard uncertainty [µm]."""
-
     value: float
     low: float
     high: float
@@ -298,7 +292,6 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
 def _at(
     angles: NDArray[np.float64], theta_deg: NDArray[np.float64], values: NDArray[np.float64], elsewhere: float
 ) -> NDArray[np.float64]:
-    """Return a path's values at all paths' angles, shape (draws, angles)."""
     if len(angles) == len(theta_deg):
         return values
     spread = np.full((len(values), len(angles)), elsewhere)

@@ -26,13 +26,12 @@ NEIGHBOURS = 15
 
 @dataclass(frozen=True, eq=False)
 class FormAndNoise:
-    """One series of deviations round a turn, taken apart.
+    """A series of deviations round a turn, separated.
 
     Attributes:
         form_um: without noise as far as separable, shape (n,).
         power_um2: of noise by line 0, 1, ... n // 2, as variance of white noise of equal power.
         continued: the first of these lines, under form, by memory.
-        pushes: how what pushes the noise from sample to sample is distributed.
     """
 
     form_um: NDArray[np.float64]
@@ -44,8 +43,8 @@ class FormAndNoise:
 def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
     """Separate a series of deviations.
 
-    Noise is read above 30 undulations per revolution and continued below (`dbbstation.inference.harmonics`), where a
-    line's form share is 1 - S / P, power P over noise S. Above, outstanding lines are form.
+    Noise is measured above 30 undulations per revolution and extrapolated below (`dbbstation.inference.harmonics`),
+    where a line's form share is 1 - S / P, power P over noise S. Outstanding lines above are form.
 
     Args:
         deviation_um: about equally spaced over a turn, shape (n,).
@@ -121,7 +120,6 @@ _ROUNDS = 20
 
 
 def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a running mean over known lines, else the mean of all."""
     known = np.isfinite(power)
     window = np.ones(min(2 * NEIGHBOURS + 1, len(power)))
     total = np.convolve(np.where(known, power, 0.0), window, mode="same")
@@ -133,10 +131,10 @@ def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
 def drawn_lines(
     apart: FormAndNoise, passed: NDArray[np.float64], draws: int, rng: np.random.Generator
 ) -> NDArray[np.complex128]:
-    """Draw spectra of noise that the readings may have, as of `numpy.fft.rfft`, shape (draws, n // 2 + 1) [µm].
+    """Return drawn noise spectra, as of `numpy.fft.rfft`, shape (draws, n // 2 + 1) [µm].
 
     Args:
-        passed: share of the amplitude that a filter lets pass, by line, shape (n // 2 + 1,).
+        passed: filter's amplitude by line, shape (n // 2 + 1,).
     """
     lines = np.fft.rfft(apart.pushes.drawn(rng, draws, len(apart.form_um)), axis=1)
     below = apart.continued.drawn(rng, draws)

@@ -61,8 +61,8 @@ def noise_of(
 ) -> CircleNoise:
     """Return a circle's noise.
 
-    Floor and first-order process above 30 undulations per revolution are continued below
-    (`dbbstation.inference.harmonics`): correlated readings make slow figures noisier.
+    Floor and first-order process above 30 undulations per revolution are extrapolated below
+    (`dbbstation.inference.harmonics`), because correlated readings make slow figures noisier.
 
     Args:
         deviation_um: in time order, without drift, shape (n,).
@@ -88,7 +88,6 @@ def noise_of(
 
 
 def _step_mm(reading_mm: NDArray[np.float64]) -> float:
-    """Return the reading step if values are few enough [mm]."""
     values = np.unique(np.round(reading_mm / _FINEST_MM).astype(np.int64))
     if len(values) < 2 or len(values) > len(reading_mm) / _VISITS:  # noqa: PLR2004 - one value has no step
         return 0.0

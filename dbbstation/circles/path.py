@@ -72,7 +72,6 @@ class CirclePath:
     Attributes:
         radius_mm: nominal, R cos e.
         theta_deg: about the ball, from +X towards +Y, shape (n,).
-        about_ball_mm: from the ball's vertical, shape (n,).
     """
 
     radius_mm: float

@@ -76,12 +76,7 @@ NO_TAILS = Pushes(_NORMAL_ALONE)
 
 
 def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
-    """Return the innovations' distribution by noise lines.
-
-    Args:
-        white: standardised lines, zero under form, shape (count // 2 + 1,).
-        count: samples.
-    """
+    """Return the innovations' distribution by noise lines."""
     pushes = np.fft.irfft(white, count)
     square = float(np.mean(pushes**2))
     if not square > 0.0:

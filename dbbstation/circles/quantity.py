@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class BudgetQuantity(StrEnum):
-    """What a budget is for."""
+    """Figures with a budget."""
 
     G = "G"
     G_LS = "G(LS)"

@@ -67,10 +67,8 @@ class Symptom:
     Attributes:
         place: end or axis; empty for both.
         value: None if undetermined.
-        u: standard uncertainty, or None.
         below: 95 % bound if not seen, else None.
         seen: exceeds four times its uncertainty.
-        text: such as the period of a cyclic error.
     """
 
     signature: Signature
@@ -223,7 +221,6 @@ def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[NDArray[np
 
 
 def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
-    """Return each turn's radius and centre, and the common form."""
     waves = [basis(np.radians(turn.theta_deg), FREE) for turn in turns]
     circle = [0, 1, FREE + 1]
     form = [k for k in range(2 * FREE + 1) if k not in {*circle, 2, FREE + 2}]
@@ -276,7 +273,6 @@ class _Wave:
 
 
 def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
-    """Search an axis's cyclic period beside other signatures."""
     diameter_mm = 2.0 * turns[0].one.raw.circle.radius_mm
 
     def trial(periods: float) -> _Trial:
@@ -315,8 +311,6 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A wave of one period: explained squares, sine, cosine."""
-
     gained: float
     period_mm: float
     size: NDArray[np.float64]

@@ -59,14 +59,10 @@ class Harmonic:
 def step_at(
     raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float, sigma_um: float
 ) -> ReversalStep | None:
-    """Return the step at a place by lines on both sides.
+    """Return the step at a place by lines on both sides; None for few samples or at the turn's ends, where it is closure.
 
     Args:
         deviation_um: shape (n,).
-
-    Returns:
-        None where the turn begins and ends there, or where too few samples lie beside it: what differs between a
-        turn's beginning and its end is closure, not a step.
     """
     place = float(raw.circle.phi_deg(np.array([theta_deg]))[0])
     if not FAR_DEG <= place <= FULL_TURN_DEG - FAR_DEG:
@@ -94,7 +90,6 @@ def _line_at(
     sigma: float,
     near_deg: float = NEAR_DEG,
 ) -> tuple[float, float] | None:
-    """Return a line's height at the place by one side's samples, with noise."""
     beside = side * away_deg
     inside = (beside >= near_deg) & (beside <= FAR_DEG)
     if np.count_nonzero(inside) < FEWEST:

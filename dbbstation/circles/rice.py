@@ -20,10 +20,6 @@ def without_noise(length: float, u: float) -> tuple[float, float]:
     With uncertainty u per axis the length has Rice's distribution [Rice, Bell System Technical Journal 24 (1945) 46, sec.
     3.10]. Percentiles 2.5 and 97.5 invert to the 95 % interval [confidence interval by inversion of a test, Casella and
     Berger, Statistical Inference, 9.2.1]; its longer side over 1.96, at least u, is the uncertainty.
-
-    Args:
-        length: not negative.
-        u: standard, of either coordinate.
     """
     if not u > 0.0 or length > LONG * u:
         return float(np.sqrt(length**2 - u**2)), u

@@ -23,7 +23,6 @@ class FormSpectrum:
     """Unfiltered amplitudes about the least-squares circle.
 
     Attributes:
-        undulations: per revolution, from 2, shape (h,).
         amplitude_um: half of peak to valley, shape (h,).
         noise_um: rms amplitude of noise; NaN if unknown.
     """
@@ -37,9 +36,6 @@ def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
     """Return a circle's undulations.
 
     White noise s has two coefficients of size s each: amplitude 2 s / sqrt(n), rms.
-
-    Args:
-        one: few samples separate fewer undulations, six or less none.
     """
     count = len(one.raw)
     highest = min(HIGHEST, count // SAMPLES_PER_HARMONIC)

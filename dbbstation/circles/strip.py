@@ -48,7 +48,6 @@ def _exchange(
     points: NDArray[np.int64],
     width: NDArray[np.float64],
 ) -> None:
-    """Exchange points of each draw, shape (draws, 4), until both bounds agree; its width, shape (draws,), is written."""
     above, below = np.empty(len(cosine)), np.empty(len(cosine))
     rows = np.empty((4, 5))
     for draw in range(len(outer)):
@@ -72,7 +71,7 @@ def _exchange(
 
 @inlined
 def _solve(rows: NDArray[np.float64]) -> None:
-    """Solve four linear equations with four unknowns, whose right side is the last column: the solution takes its place."""
+    """Solve four linear equations; the solution replaces the right side, the last column."""
     for column in range(4):
         best = column
         for row in range(column + 1, 4):
@@ -91,7 +90,7 @@ def _solve(rows: NDArray[np.float64]) -> None:
 
 @inlined
 def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
-    """Put a new point in the place of the one of its kind, 0 outside, 1 inside, with which no point of the other kind lies between."""
+    """Put a new point in place of the adjacent one of its kind, 0 outside, 1 inside."""
     first, second = four[1 - kind], four[3 - kind]
     most = new
     for k in range(4):
@@ -107,7 +106,6 @@ def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
 def _first_points(
     outer: NDArray[np.float64], inner: NDArray[np.float64], theta_deg: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Return each quarter's highest or lowest point by turns, shape (draws, 4)."""
     edges = np.searchsorted(theta_deg, [0.0, 90.0, 180.0, 270.0, 360.0])
     return np.column_stack(
         [

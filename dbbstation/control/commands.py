@@ -1,4 +1,4 @@
-"""Commands under a control that corrects: what they would be under a nominal one."""
+"""Commands under a correcting control, as for a nominal one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def correction_of(
     kind: str, digest: str, date: str, taken_out: Iterable[Fitted], machine: Machine
 ) -> ControlCorrection:
-    """Return what a control corrects, as a machine file holds it."""
+    """Return a control's correction, as a machine file has it."""
     sources = {
         fitted.source.name: {
             parameter.name: float(value)
@@ -52,10 +52,6 @@ def nominal_commands(
     machine: Machine, poses: NDArray[np.float64], known: Mapping[str, ErrorSource]
 ) -> NDArray[np.float64]:
     """Return the poses at which a nominal control drives the struts as this one does, shape (n, 6) [mm, deg].
-
-    Args:
-        poses: commanded, shape (n, 6).
-        known: error sources by name.
 
     Raises:
         ModelError: an unknown source, or one that follows more than the pose.

@@ -58,11 +58,9 @@ class Component:
     """A kinematics component.
 
     Attributes:
-        text: of the `.comp` file.
-        mathematics: the part of it that needs no LinuxCNC, which a compiler takes alone.
+        mathematics: its part without LinuxCNC, for a compiler alone.
         parts: sources inside, by name.
         left_out: sources left out, by name.
-        thermometers: columns whose pins must be connected.
     """
 
     name: str
@@ -108,10 +106,8 @@ def component(
     """Return the component of a model.
 
     Args:
-        kernel: text of `kernel.c`.
-        name: of the component.
         digest: SHA-256 of the model file; its first 32 bits are a pin.
-        left_out: sources that the control shall not correct.
+        left_out: sources that the control must not correct.
         thermometers: columns without unit that the control has.
 
     Raises:
@@ -306,9 +302,9 @@ static int thermometer(int k, double degc, double zero, double patience)
 
 
 def settings(made: Component, model: MachineModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return lines of the INI file and of the HAL file for a component.
+    """Return lines of the INI and HAL files for a component.
 
-    Soft limits of joints are the machine's; a play that is left out goes into `BACKLASH`.
+    Joint limits are the machine's; an omitted play goes into `BACKLASH`.
     """
     travel, name = model.machine.travel, made.name
     play = next(

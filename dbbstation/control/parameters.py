@@ -1,7 +1,7 @@
-"""Parameters of LinuxCNC's genhexkins, and tables of its joints, refitted over a volume to a model.
+"""Parameters of LinuxCNC's genhexkins, and tables of its joints, fitted over a volume to a model.
 
-genhexkins drives joint i to |T + R a_i - b_i|, with joints a of the platform and b of the base; a table adds to a joint's
-position. Other errors can only be imitated, by joints that are wrong: refitted values are numbers for a control, never the machine.
+genhexkins drives joint i to |T + R a_i - b_i|, with joints a of the platform and b of the base; a table adds to a
+joint's position. It imitates other errors by wrong joints, so fitted values describe a control, never the machine.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ ROUNDS = 4
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """What genhexkins is given.
+    """Parameters of genhexkins.
 
     Attributes:
         base_mm: base joints less nominal, shape (6, 3).
@@ -80,7 +80,7 @@ class Values:
         return joint - self.longer_mm + np.column_stack(added)
 
     def sources(self) -> tuple[Fitted, ...]:
-        """Return the correction by joints and lengths as sources; tables correct sources of their own."""
+        """Return the correction as sources, with separate ones for tables."""
         return (
             Fitted(StrutReferenceLength(), self.longer_mm),
             Fitted(BaseJoints(), self.base_mm.reshape(-1)),
@@ -114,13 +114,7 @@ class SourceLeft:
 
 @dataclass(frozen=True, eq=False)
 class Refitted:
-    """Parameters of a model over a volume.
-
-    Attributes:
-        values: of both ends' joints, with tables.
-        left: by how the control is set up, in order.
-        sources: one each that depends on the pose alone.
-    """
+    """Parameters of a model over a volume."""
 
     values: Values
     left: dict[str, LeftOfModel]
@@ -136,7 +130,6 @@ def refitted(model: MachineModel, poses: NDArray[np.float64], others: NDArray[np
     """Refit genhexkins to a model's sources that depend on the pose alone.
 
     Args:
-        poses: to fit, shape (n, 6) [mm, deg].
         others: at which the remaining errors are measured, shape (m, 6).
 
     Raises:
@@ -214,7 +207,7 @@ class _AtLengths(Motion):
 
 
 def _by_length(fitted: Fitted, machine: Machine, length_mm: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Return a source's strut errors at lengths, shape (n, 6) [mm]; None if it is no curve of strut length."""
+    """Return a source's strut errors at lengths, shape (n, 6) [mm]; None if it is not a curve of strut length."""
     form = fitted.source.c_form(machine, fitted.values)
     if form is None or form.by_pose:
         return None
@@ -224,13 +217,13 @@ def _by_length(fitted: Fitted, machine: Machine, length_mm: NDArray[np.float64])
 
 
 def _in_table(fitted: Fitted, machine: Machine, points: NDArray[np.float64]) -> bool:
-    """Return whether a table holds a source: one that follows strut length, in waves that are long enough."""
+    """Return whether a table corrects a source: it follows strut length, in waves long enough."""
     fine = fitted.source.shortest_period_mm(machine, fitted.values) < PER_WAVE * float(points[1] - points[0])
     return not fine and _by_length(fitted, machine, np.full((2, STRUTS), points[0])) is not None
 
 
 def _with_tables(values: Values, in_table: Sequence[Fitted], machine: Machine) -> Values:
-    """Return values with tables that take sources of strut length out, right to the square of what they add."""
+    """Return values with tables for sources of strut length, exact to second order."""
     table = np.zeros((STRUTS, POINTS))
     for _ in range(2):
         at = (values.points_mm + (machine.reference_length_error_mm - values.longer_mm)[:, None] + table).T
@@ -316,16 +309,12 @@ def hal_lines(values: Values, machine: Machine) -> tuple[str, ...]:
 
 
 def home_mm(values: Values, machine: Machine) -> NDArray[np.float64]:
-    """Return what is added to HOME and HOME_OFFSET of each joint, shape (6,) [mm]."""
+    """Return the addition to HOME and HOME_OFFSET of each joint, shape (6,) [mm]."""
     return values.longer_mm - machine.reference_length_error_mm
 
 
 def tables(values: Values, play_mm: NDArray[np.float64]) -> tuple[str, ...]:
-    """Return each joint's `COMP_FILE` of `COMP_FILE_TYPE` 1: position, trim upwards and trim downwards [mm]; none if all are zero.
-
-    Args:
-        play_mm: whole width, shape (6,): half of it is added upwards and taken off downwards.
-    """
+    """Return each joint's `COMP_FILE` of `COMP_FILE_TYPE` 1: position, trim upwards and trim downwards [mm]; none if all are zero."""
     if not values.table_mm.any() and not play_mm.any():
         return ()
     return tuple(

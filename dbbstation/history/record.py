@@ -12,7 +12,6 @@ class Figure:
     """One figure of one run.
 
     Attributes:
-        name: such as `G` or `X`.
         u_um: standard uncertainty; None if not known.
     """
 
@@ -22,7 +21,7 @@ class Figure:
 
     @property
     def stated_u_um(self) -> float:
-        """Return the standard uncertainty [µm]; nan if not known."""
+        """Return the standard uncertainty [µm]; nan if unknown."""
         return nan if self.u_um is None else self.u_um
 
 
@@ -48,9 +47,7 @@ class SessionFigures:
     Attributes:
         name: folder relative to the history's.
         machine: serial number, or the name in its file.
-        started: first accepted run; None if not noted.
         runs: accepted, with a circle.
-        bar: serial number; empty if not noted.
         programs: hash over NC programs run instead of the plan's circles, or empty.
         anchor: link of the log's last event, else end of the chain of runs; empty without a seal.
     """
@@ -68,11 +65,7 @@ class SessionFigures:
 
 @dataclass(frozen=True)
 class ModelParameter:
-    """One parameter of the machine in a model.
-
-    Attributes:
-        u: standard uncertainty; None if held or not known.
-    """
+    """One parameter of the machine in a model."""
 
     source: str
     name: str
@@ -86,7 +79,6 @@ class ModelFigures:
     """One identified model.
 
     Attributes:
-        file: relative to the history's folder.
         sessions: SHA-256 of its session files, by name.
         warnings: shown wherever its numbers are.
     """
@@ -99,5 +91,5 @@ class ModelFigures:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """Return its error sources: parameters are comparable between models with the same ones."""
+        """Return its error sources; only models with equal sources are comparable."""
         return tuple(dict.fromkeys(parameter.source for parameter in self.parameters))

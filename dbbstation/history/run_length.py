@@ -1,9 +1,9 @@
-"""How long a control chart runs until it signals: a CUSUM together with a limit for single values.
+"""Run length of a control chart: a CUSUM together with a limit for single values.
 
-The chart takes standardised values z, independent and normal with variance one where nothing changes. Upwards it adds
-S = max(0, S + z - k) and signals where S > h [Page 1954, Biometrika 41, 100], or where one z > c [Lucas 1982, J. Quality
-Technology 14, 51]; downwards it does the same with -z. Run lengths come from the Markov chain of [Brook and Evans 1972,
-Biometrika 59, 539], which takes any number of places after the point: no approximation of h is needed.
+The chart takes standardised values z, independent and standard normal without change. Upwards it adds S = max(0, S + z
+- k) and signals at S > h [Page 1954, Biometrika 41, 100], or at z > c [Lucas 1982, J. Quality Technology 14, 51];
+downwards it does the same with -z. Run lengths come from the Markov chain of [Brook and Evans 1972, Biometrika 59,
+539], with any number of decimals and no approximation of h.
 """
 
 from __future__ import annotations
@@ -72,11 +72,7 @@ def _one_sided(chart: Chart, mean: float) -> float:
 
 
 def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64]:
-    """Return the probability that the upward chart has signalled by each value, shape (n,).
-
-    Args:
-        means: of each value, in standard deviations, in order.
-    """
+    """Return the probability that the upward chart has signalled by each value, shape (n,)."""
     state = np.zeros(STATES)
     state[0] = 1.0
     within = []

@@ -42,7 +42,7 @@ class ScatterRatio:
 
     @property
     def size(self) -> float:
-        """Return the standard deviation; NaN if not known."""
+        """Return the standard deviation; NaN if unknown."""
         return sqrt(self.square / self.freedom) if self.freedom else nan
 
     @property
@@ -57,13 +57,11 @@ class ScatterRatio:
 
 @dataclass(frozen=True, eq=False)
 class Standardised:
-    """Values held against those before them; arrays have shape (n,).
+    """Values compared with those before them; arrays have shape (n,).
 
     Attributes:
         z: standard normal without change; NaN for the first.
         by_stated: whether z rests on stated uncertainties alone.
-        residual: from the level before, in stated uncertainties; NaN for the first.
-        level: weighted mean of the values before; NaN for the first.
         u_level: its standard uncertainty by the stated ones alone; NaN for the first.
         scatter: standard deviation of the values before, in stated uncertainties; NaN if not known.
     """
@@ -89,7 +87,6 @@ def standardised(
     length.
 
     Args:
-        values: in time order, shape (n,).
         u: standard uncertainty of each, positive, in the same unit, shape (n,).
         baseline: number of values from which scatter replaces stated uncertainty, at least 3.
         before: scatter about earlier levels.

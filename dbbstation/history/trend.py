@@ -74,11 +74,8 @@ class Trend:
 
     Attributes:
         label: unique words within the machine.
-        values: mean over the runs of each session.
         u: standard uncertainty; NaN if not known.
-        limit: greatest size by the shop's tolerances, or None.
-        watched: None if not watched.
-        why_not: empty if watched.
+        limit: greatest size by the shop's tolerances.
     """
 
     subject: Subject
@@ -92,7 +89,7 @@ class Trend:
 
     @property
     def verdict(self) -> TrendVerdict:
-        """What its history says."""
+        """Return the verdict of its history."""
         return TrendVerdict.CANNOT_TELL if self.watched is None else self.watched.verdict
 
 
@@ -103,8 +100,7 @@ class MachineHistory:
     Attributes:
         machine: serial number or name.
         sessions: in time order.
-        trends: circles by test, then parameters.
-        chart: limits that each quantity is watched with; None where none is.
+        chart: limits for each quantity; None without any.
         expected: false alarms expected over this history.
     """
 
@@ -128,7 +124,6 @@ class TrendOptions:
 
     Attributes:
         false_alarms: per session, over all quantities of a machine.
-        tests: empty for all.
     """
 
     coverage_factor: float
@@ -138,7 +133,7 @@ class TrendOptions:
     exclude: Sequence[str] = ()
 
     def takes(self, test: str) -> bool:
-        """Whether a test is among those that were asked for."""
+        """Return whether a test is selected."""
         return (not self.tests or test in self.tests) and test not in self.exclude
 
 
@@ -180,7 +175,6 @@ def _history(
 
 
 def _why_not(subject: Subject, u: NDArray[np.float64]) -> str:
-    """Return why a quantity cannot be watched, or an empty text."""
     if subject.figure in NOT_WATCHED and not subject.is_parameter:
         return "watched by X and Y"
     if not np.all(u > 0.0):
@@ -238,7 +232,6 @@ def _apart(subject: Subject) -> str:
 
 
 def _limit(subject: Subject, tolerances: Sequence[Tolerance]) -> float | None:
-    """Return the smallest applicable limit of the shop's tolerances."""
     figure = None if subject.is_parameter else LIMITED.get(subject.figure)
     held = [t.largest_um for t in tolerances if t.figure is figure and t.holds_for(subject.test, subject.direction)]
     return min(held, default=None)

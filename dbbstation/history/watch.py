@@ -56,7 +56,6 @@ class Watched:
         events: in time order.
         z: standard normal without change; NaN if not compared.
         high: CUSUM upwards, NaN as above.
-        low: CUSUM downwards, not negative.
         level: from a change to the next, by each stretch's latest value.
         u_level: standard uncertainty by the larger of stated and scatter.
         scatter: of the last stretch, in stated uncertainties; NaN for too few values.
@@ -76,12 +75,12 @@ class Watched:
 
     @property
     def watched(self) -> int:
-        """Return how many values were compared."""
+        """Return the number of compared values."""
         return int(np.isfinite(self.z).sum())
 
     @property
     def verdict(self) -> TrendVerdict:
-        """What all of it says."""
+        """Return the verdict on all of it."""
         if not self.watched:
             return TrendVerdict.CANNOT_TELL
         found = {event.verdict for event in self.events}
@@ -103,10 +102,6 @@ def watch(
 
     The chart's scale is the stated uncertainty until a baseline gives the scatter. If values scatter more than stated,
     beyond chance, early ones are compared with that scatter too.
-
-    Args:
-        values: in time order, shape (n,).
-        u: standard uncertainty of each, positive, shape (n,).
     """
     looked, scatter = _look(values, u, chart, coverage_factor, baseline, None)
     if not any(event.by_stated for event in looked.events):
@@ -131,7 +126,6 @@ def _look(
     baseline: int,
     hindsight: ScatterRatio | None,
 ) -> tuple[Watched, ScatterRatio]:
-    """Look once, with early values scaled by hindsight or stated uncertainty."""
     count = len(values)
     z, high, low, level, u_level = (np.full(count, np.nan) for _ in range(5))
     by_stated = np.zeros(count, dtype=bool)
@@ -182,16 +176,15 @@ def _look(
 
 
 def _settled(event: TrendEvent, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> TrendEvent:
-    """Return a change with the difference of levels: the signalling values were selected for being large."""
     before = event.since - 1
     difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
     return replace(event, difference=difference, u_difference=u)
 
 
 def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[TrendEvent]:
-    """Return outstanding values that belong to a change that follows on the same side.
+    """Return outstanding values that belong to a following change on the same side.
 
-    Before a value that stands out itself, only the adjacent one counts.
+    Before a value that is outstanding itself, only the adjacent one counts.
     """
     first = found.since - 1
     return [
@@ -215,7 +208,6 @@ def _change(
 
 
 def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
-    """Return the standard deviation in stated uncertainties; NaN for fewer than two values."""
     if len(values) < 2:  # noqa: PLR2004 - one value does not scatter
         return np.nan
     mean = np.average(values, weights=1.0 / u**2)
@@ -235,7 +227,7 @@ class _Stretch:
 
     @property
     def sums(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """CUSUM upwards and downwards; NaN for the first value."""
+        """Return CUSUM upwards and downwards; NaN for the first value."""
         return tuple(self._sum(side) for side in (1.0, -1.0))  # type: ignore[return-value]  # two of them
 
     def _sum(self, side: float) -> NDArray[np.float64]:
@@ -261,10 +253,7 @@ class _Stretch:
         return None
 
     def _since(self, k: int, side: float) -> int:
-        """Return the most probable first value of the change that value k showed.
-
-        Its sum up to k over the root of their number is largest [Hinkley 1970, Biometrika 57, 1].
-        """
+        """Return the most probable first value of the change shown by value k: the largest sum over the root of its length [Hinkley 1970, Biometrika 57, 1]."""
         sums = np.nan_to_num(self._sum(side))
         first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # that of the first value is zero
         behind = np.cumsum(side * self.of.z[first : k + 1][::-1])[::-1]

@@ -54,8 +54,6 @@ def inlined(part: Kernel) -> Kernel:
 
 
 class _Kernel:
-    """A loop compiled on call, since importing the compiler takes long."""
-
     def __init__(self, function: Callable[..., Any], **options: bool) -> None:
         self._function = function
         self._options = options
@@ -128,7 +126,6 @@ def _pool() -> ThreadPoolExecutor:
 
 
 def _is_worker() -> bool:
-    """Return whether this is a pool thread, which must not wait for others."""
     return threading.current_thread().name.startswith(_WORKER)
 
 

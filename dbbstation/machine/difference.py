@@ -1,4 +1,4 @@
-"""Differences of two machine files, in their words."""
+"""Differences of two machine files, in their terms."""
 
 from __future__ import annotations
 
@@ -32,12 +32,7 @@ ROUNDED_MM = 1e-6
 
 @dataclass(frozen=True)
 class Difference:
-    """One differing value.
-
-    Attributes:
-        key: such as `masses.platform_kg`, with the strut if per strut.
-        one: in the first file, with every digit, or `not given`.
-    """
+    """One differing value."""
 
     key: str
     one: str
@@ -45,12 +40,12 @@ class Difference:
 
     @property
     def text(self) -> str:
-        """Key and both values."""
+        """Return key and both values."""
         return f"{self.key} {self.one} and {self.other}"
 
     @property
     def first_key(self) -> str:
-        """Key at the top of the machine file."""
+        """Return the top-level key of the machine file."""
         return self.key.partition(".")[0].partition(" ")[0]
 
 

@@ -126,12 +126,10 @@ class JointAxes:
 
 @dataclass(frozen=True)
 class ControlCorrection:
-    """What a control corrects of its machine by itself.
+    """The control's own correction of its machine.
 
     Attributes:
         correction: `kinematics`, or `parameters` of a kinematics with tables.
-        model_sha256: of the model file that it was made from.
-        date: of that, ISO 8601.
         sources: values of the error sources that it takes out, by name and parameter.
     """
 
@@ -142,26 +140,20 @@ class ControlCorrection:
 
     @property
     def said(self) -> str:
-        """Return what corrects, in words."""
+        """Return the correction, in words."""
         return f"{self.correction} of the model {self.model_sha256[:12]} since {self.date}"
 
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The nominal machine: what its controller believes.
+    """The nominal machine, as its controller assumes.
 
     Attributes:
         reference_length_error_mm: corrected by the controller, which drives strut i to F_i(T) minus this, shape (6,).
-        screw_lead_mm: travel per turn; None if unknown.
-        masses: None if unknown.
         joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly; None if unknown.
-        compliance: by design; None if unknown.
-        strut_masses: by design; None if unknown.
-        joint_axes: None if unknown, or for ball joints.
-        greatest_feed_mm_min: None if unknown.
         greatest_turn_deg_min: at a resting tool tip; None if unknown.
         acceleration_mm_s2: planned by the control; None if unknown.
-        control: what the control corrects by itself; None for nothing. Everything else here is nominal all the same.
+        control: the control's own correction; None for none. Everything else here is nominal.
     """
 
     name: str

@@ -1,11 +1,12 @@
 """Compiled loops over poses: forward kinematics and bar sensitivities.
 
-Arrays only; `kinematics.py` is the interface. Kernels work on poses `start` to `stop`. Joints have shape (m, 6, 3), balls
-(m, 3), m = 1 or n. Poses are processed in groups of `LANES`, the last axis of work arrays and innermost loop. Lanes do
-not branch, so results do not depend on grouping; a last group repeats its last pose.
+Arrays only; `kinematics.py` is the interface. Kernels work on poses `start` to `stop`. Joints have shape (m, 6, 3),
+balls (m, 3), m = 1 or n. Poses are processed in groups of `LANES`, the last axis of work arrays and innermost loop.
+Lanes do not branch, so results do not depend on grouping; a last group repeats its last pose.
 
-t (3, LANES) and r (3, 3, LANES) are platform positions and rotations, q and p joints of base and platform (6, 3, LANES);
-a Jacobian (6, 6, LANES) has rows [u, (R P) x u]. All stands in one file because the compiler's cache looks at one file.
+t (3, LANES) and r (3, 3, LANES) are platform positions and rotations, q and p joints of base and platform (6, 3,
+LANES); a Jacobian (6, 6, LANES) has rows [u, (R P) x u]. All are in one file because the compiler's cache checks one
+file.
 """
 
 from __future__ import annotations
@@ -141,9 +142,8 @@ def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], s
     """Orthogonalise columns of a matrix, shape (6, 6, LANES), in place by modified Gram-Schmidt.
 
     With the right-hand side as a further column (`_substitute`) this is as stable as pivoted elimination without
-    exchanges: Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal. Appl.
-    13 (1992) 176-190] Args: `triangle` gets parts along each column and, on its diagonal, 1/|c|², shape (6, 6, LANES);
-    `sound` is 1.0 for full rank, else 0.0, shape (LANES,).
+    exchanges: Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal.
+    Appl. 13 (1992) 176-190]
     """
     for k in range(6):
         for lane in range(LANES):

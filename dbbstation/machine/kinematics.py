@@ -31,7 +31,6 @@ class Struts:
     """Struts at given poses.
 
     Attributes:
-        length_mm: shape (n, 6).
         unit: from base to platform joint, machine frame, shape (n, 6, 3) [1].
         arm_mm: R P, tool tip to platform joint in machine axes, shape (n, 6, 3).
     """
@@ -62,14 +61,10 @@ def strut_lengths(hexapod: Hexapod, frames: Frames) -> NDArray[np.float64]:
 
 
 def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> Frames:
-    """Return the poses of these strut lengths [CAL eq 2].
+    """Return the poses of these strut lengths within 1e-11 mm [CAL eq 2].
 
     Args:
-        length_mm: shape (n, 6).
         near: start of Newton-Raphson, usually commanded.
-
-    Returns:
-        Frames that reproduce `length_mm` within 1e-11 mm.
 
     Raises:
         KinematicsError: no pose; names the first.
@@ -127,12 +122,12 @@ class Response:
 
     @property
     def per_strut(self) -> NDArray[np.float64]:
-        """Per strut length, shape (n, 6) [unit/mm]."""
+        """Return the sensitivity per strut length, shape (n, 6) [unit/mm]."""
         return self.per_parameter[:, :STRUTS]
 
     @property
     def per_base_joint(self) -> NDArray[np.float64]:
-        """Per base joint, machine axes, shape (n, 6, 3) [unit/mm]."""
+        """Return the sensitivity per base joint, machine axes, shape (n, 6, 3) [unit/mm]."""
         return self.per_parameter[:, STRUTS:].reshape(-1, STRUTS, 3)
 
     @property
@@ -176,7 +171,6 @@ def bar_sensitivity(
 
     Args:
         hexapod: actual.
-        fixed_ball_mm: machine frame, shape (3,) or (n, 3).
         tool_ball_mm: platform frame, shape (3,) or (n, 3); default: the tool tip.
 
     Raises:

@@ -43,7 +43,6 @@ def check_joints(machine: Machine) -> None:
 
 
 def _which(joints: NDArray[np.float64], regular: tuple[int, ...], other: tuple[int, ...]) -> str:
-    """Return the joint that does not fit its three, else all three."""
     centre = joints[list(regular)].mean(axis=0)
     first, second = joints[regular[1]] - joints[regular[0]], joints[regular[2]] - joints[regular[0]]
     axis = np.cross(first, second)

@@ -82,9 +82,6 @@ def transverse_load(struts: Struts, pull_n: NDArray[np.float64]) -> Load:
     """Return the struts' transverse load: [sum f, sum (R P) x f].
 
     [GRAV eq 3 and 6] have the moment; [GRAV eq 1] omits the force.
-
-    Args:
-        pull_n: on the platform's joints, shape (n, 6, 3).
     """
     return Load(pull_n.sum(axis=1), np.cross(struts.arm_mm, pull_n).sum(axis=1))
 
@@ -93,9 +90,6 @@ def strut_tensions(struts: Struts, load: Load) -> NDArray[np.float64]:
     """Return axial forces at platform joints, tension positive, shape (n, 6) [N].
 
     Solves J^T T = [F, M]: [GRAV eq 1 and 6], signed, where eq 7 prints the magnitude.
-
-    Args:
-        load: one row per pose.
 
     Raises:
         KinematicsError: a pose where the struts cannot hold the platform.
@@ -125,13 +119,6 @@ def compliance_mm_per_n(
 
     [GRAV eq 7] K (alpha L + C_B) as c at 1000 mm with growing share s: c (1 - s) and c s L / 1000 mm. (alpha, printed
     S/E, means 1/(S E).) Both have shape (n, 6) [mm/N] for lengths between joints, shape (n, 6) [mm].
-
-    Args:
-        length_mm: between the joints, shape (n, 6) [mm].
-        compliance: at 1000 mm, and how it divides.
-
-    Returns:
-        Fixed part and growing part, each of shape (n, 6) [mm/N]; their sum is the strut's compliance.
     """
     at_1000mm, share = compliance.at_1000mm_mm_per_n, compliance.growing_share
     return np.full(length_mm.shape, at_1000mm * (1.0 - share)), at_1000mm * share * length_mm / 1000.0
@@ -145,10 +132,6 @@ def stretch_mm(
     The strut's own axial weight, omitted in [GRAV eq 7], stretches sections above it. The constant part sees
     `motor_loads`; along the growing part an even rod counts half, and a screw of length l, L of it below the joint, L /
     (2 l) of its weight. The motor stretches nothing.
-
-    Args:
-        tension_n: at platform joints, shape (n, 6).
-        masses: None for weightless struts.
     """
     fixed, growing = compliance_mm_per_n(struts.length_mm, compliance)
     stretch = (fixed + growing) * tension_n
@@ -165,10 +148,6 @@ def motor_loads(
     """Return the motors' axial forces, positive if the platform pulls, shape (n, 6) [N].
 
     Tension plus the axial weight of the moving part, by virtual work.
-
-    Args:
-        tension_n: at platform joints, shape (n, 6).
-        masses: None for weightless struts.
     """
     if masses is None:
         return tension_n
@@ -176,19 +155,13 @@ def motor_loads(
 
 
 def _moving_kg(masses: StrutMasses) -> float:
-    """Return the mass moved along a strut: the screw, and half of an even telescope."""
     return masses.screw_kg + masses.strut_kg / 2.0
 
 
 def base_loads(
     struts: Struts, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
 ) -> NDArray[np.float64]:
-    """Return strut forces on the base joints, machine axes, shape (n, 6, 3) [N]: T u - f and own weight.
-
-    Args:
-        tension_n: at platform joints, shape (n, 6).
-        masses: None for weightless struts.
-    """
+    """Return strut forces on the base joints, machine axes, shape (n, 6, 3) [N]: T u - f and own weight."""
     load = tension_n[:, :, None] * struts.unit
     if masses is None:
         return load

@@ -78,7 +78,6 @@ def _limited_quantities(
 
 
 def _hold(machine: Machine, struts: Struts) -> NDArray[np.float64]:
-    """Return the Jacobian determinant over that of the middle, shape (n,); zero for a loose platform."""
     there = inverse(machine.hexapod, middle(machine))
     with np.errstate(invalid="ignore"):  # a pose that is no number has no hold, and is refused for it
         return np.asarray(np.linalg.det(strut_jacobian(struts)) / np.linalg.det(strut_jacobian(there)))

@@ -68,9 +68,6 @@ def compensated(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
         model: only the machine's sources are inverted.
         wanted: motion between commanded poses is straight: predict it as `straight`.
 
-    Returns:
-        Poses, shape (n, 6) [mm, deg], for all rows of `wanted`.
-
     Raises:
         KinematicsError: a pose that the machine cannot take.
         ModelError: a source needs missing data or looks ahead; or no command leads to a pose.
@@ -103,19 +100,12 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
 
 
 def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
-    """Return commands along one stretch, and the memory behind it.
+    """Return commands along one stretch, shape (n, 6) [mm, deg], and the memory behind it.
 
-    The command is the pose at which nominal lengths equal F(T wanted; actual) less the sources' errors. Weights act at
-    wanted poses, other sources on commands. Sources without history settle in a few rounds; accumulating ones state what
-    reaches the wanted lengths, without the jumps of others. Other histories are tried for rows together; the first missed
-    row is bisected strut by strut [as at a reversal, where play makes the command jump].
-
-    Args:
-        passed: from `begun` or the previous stretch; not modified.
-        wanted: in time order.
-
-    Returns:
-        Poses, shape (n, 6) [mm, deg], and what is remembered behind the last row.
+    The command is the pose at which nominal lengths equal F(T wanted; actual) minus the sources' errors. Weights act at
+    wanted poses, other sources on commands. Sources without history converge in a few rounds; accumulating ones state
+    what reaches the wanted lengths, without the jumps of others. Other histories are tried for rows together; the first
+    missed row is bisected strut by strut [as at a reversal, where play makes the command jump].
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
@@ -130,7 +120,7 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64],
 def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
     """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
 
-    Kept for comparison: first order, and the orientation stays wrong.
+    Kept for comparison: it is first order, with wrong orientation.
     """
     error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
     poses = wanted.poses.copy()
@@ -188,11 +178,7 @@ class _Stretch:
         return Passed(self._own, (*self._built_up, *self._states), self._held_back)
 
     def _without_search(self) -> tuple[NDArray[np.float64], Effect]:
-        """Apply what needs no search.
-
-        Returns:
-            Lengths to drive to, shape (n, 6) [mm], and the part of the effect that does not change with a jump of the command.
-        """
+        """Return driven lengths without search, shape (n, 6) [mm], and the effect's part that does not jump with the command."""
         motion, last, bent = self._wanted, np.full((len(self._wanted), 6), np.inf), Effect()
         built_up = [np.zeros((len(self._wanted), 6)) for _ in self._building_up]
         there: Actual | None = None
@@ -253,11 +239,7 @@ class _Stretch:
             self._held_back = driven[row - 1] - self._smooth[row - 1]
 
     def _tried(self, rows: slice) -> tuple[NDArray[np.float64], int, tuple[State, ...]]:
-        """Try rows together.
-
-        Returns:
-            Lengths to drive to, shape (k, 6) [mm], how many rows from the first on are met, and the states behind all of them.
-        """
+        """Try rows together; return driven lengths, shape (k, 6) [mm], the number of met rows, and the states behind all."""
         smooth = self._smooth[rows]
         driven = smooth + self._held_back
         slope = _Slope()
@@ -278,10 +260,7 @@ class _Stretch:
         return driven, met, states
 
     def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
-        """Search one row.
-
-        Returns:
-            Lengths to drive to, shape (1, 6) [mm], and the states behind the row.
+        """Search one row; return driven lengths, shape (1, 6) [mm], and the states behind it.
 
         Raises:
             ModelError: there is no solution.
@@ -301,7 +280,7 @@ class _Stretch:
         return search.at[None], self._lacking(rows, search.at[None])[1]
 
     def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[State, ...]]:
-        """Return what driven lengths lack for wanted poses, shape (k, 6) [mm], and the states."""
+        """Return the shortfall of driven lengths for wanted poses, shape (k, 6) [mm], and the states."""
         target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
         motion = self._driven_to(driven, rows, target)
         effect, states = self._known.rows(rows) + self._own.together(self._others, motion), []
@@ -321,7 +300,6 @@ class _Stretch:
         return replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
 
     def _needed(self, effect: Effect, platform: Frames) -> NDArray[np.float64]:
-        """Return driven lengths for a platform pose, shape (n, 6) [mm]."""
         strut = 0.0 if effect.strut_mm is None else effect.strut_mm
         needed = strut_lengths(actual_hexapod(self._nominal, effect), platform)
         lengths: NDArray[np.float64] = needed - strut + self._own.machine.reference_length_error_mm

@@ -20,14 +20,13 @@ Row = tuple[str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedModel:
-    """What a calibration or diagnosis found.
+    """The outcome of a calibration or diagnosis.
 
     Attributes:
         model: nominal machine, its own sources, and the measurement's by owner.
         covariance_rows: (source, set, parameter) of every row.
         covariance: in products of units, shape (k, k), formula errors included; zero along held directions.
         directions_lost: undetermined by the recordings, in words.
-        report: printed numbers by name.
         sessions: SHA-256 of its session files, by folder.
         null_space: undetermined combinations of rows at plausible sizes, shape (h, k); None in old files.
         formula_variance: each row's variance by its formula, equal in all sessions, shape (k,); None for none.
@@ -85,11 +84,7 @@ class IdentifiedModel:
 
 
 def known_u(variance: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return standard uncertainties; NaN if mostly guessed.
-
-    Args:
-        along: variance along undetermined combinations at plausible size; included only if it is the smaller part.
-    """
+    """Return standard uncertainties; NaN if mostly guessed."""
     return np.sqrt(np.where(along > variance, np.nan, variance + along))
 
 

@@ -141,7 +141,7 @@ class MachineModel:
     def bar(self, motion: Motion) -> BarReading:
         """Return a bar's reading about the motion's fixed ball and its sensitivities, kept rows.
 
-        A ball under the spindle stands at the actual tip of then. Micrometer readings and the bar's calibration are
+        A ball under the spindle has the tip's actual place at set-up. Micrometer readings and the bar's calibration are
         included.
         """
         setup = motion.setup
@@ -173,12 +173,7 @@ class MachineModel:
 
 @dataclass(frozen=True, eq=False)
 class Actual:
-    """The actual machine along a motion.
-
-    Attributes:
-        model: whose sources are at work.
-        effect: of all sources.
-    """
+    """The actual machine along a motion."""
 
     model: MachineModel
     motion: Motion
@@ -197,7 +192,7 @@ class Actual:
         return replace(self.model.as_found, hexapod=self.hexapod)
 
     def seen_by(self, source: ErrorSource, machine: Machine) -> tuple[Motion, Machine]:
-        """Return motion and machine of a source: weights at actual poses, others as commanded."""
+        """Return motion and machine for a source: weights at actual poses, others as commanded."""
         return (self.placed, replace(machine, hexapod=self.hexapod)) if source.weighs else (self.motion, machine)
 
     def by(self, fitted: Fitted) -> Effect:
@@ -299,7 +294,6 @@ def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArra
 
 
 def _rows(array: NDArray[np.float64], axes: int, kept: slice) -> NDArray[np.float64]:
-    """Return kept rows of a derivative with sample axis; others whole."""
     return array if array.ndim == axes + 1 else array[kept]
 
 

@@ -22,7 +22,6 @@ class MotorCurrents:
     """Predicted currents of one run.
 
     Attributes:
-        driven: commanded, with motor loads.
         there: actual machine.
         current_a: kept rows, shape (n, 6).
     """
@@ -81,5 +80,5 @@ def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
 
 
 def drives(model: MachineModel) -> tuple[Fitted, ...]:
-    """Sources of motor currents."""
+    """Return sources of motor currents."""
     return tuple(f for f in model.sources if f.source.of_currents)

@@ -29,7 +29,6 @@ class Observation:
     """One accepted run.
 
     Attributes:
-        raw: full turn.
         started_s: after the session's start; None if unknown.
         commanded: poses at lead-in and raw samples; None for the plan's circle.
         stood: pose while a ball was put up under the spindle, shape (6,); None for the ball's place.

@@ -26,8 +26,6 @@ class SimulatedCircle:
     """One turn, shapes (n,).
 
     Attributes:
-        t_s: since the first sample.
-        theta_deg: from +X towards +Y.
         commanded: lead-in and turn, shape (m + n, 6) [mm, deg].
     """
 
@@ -48,8 +46,6 @@ def simulate_circle(
     """Predict the reading along one turn with lead-in.
 
     Args:
-        model: of machine and measurement.
-        samples: equally spaced.
         started_s: after the session's start; None if not needed.
         command: from wanted motion to commands, shape (n, 6); None: the same.
 

@@ -55,9 +55,6 @@ def position_uncertainty_mm(
 def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int) -> float | None:
     """Return the standard uncertainty of the range along one axis [mm], to first order by its two poses; None if unknown.
 
-    Args:
-        axis: 0, 1 or 2 for X, Y or Z.
-
     Raises:
         KinematicsError: names the first impossible pose.
         ModelError: a source needs missing data.
@@ -108,13 +105,10 @@ def predicted_poses(
     poses: ArrayLike,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return actual poses for independent commanded ones, with uncertainties.
+    """Return actual poses for independent commanded ones, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm], NaN if unknown.
 
     Args:
         poses: shape (n, 6) [mm, deg], any numeric type.
-
-    Returns:
-        Actual poses, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm], NaN where not known.
 
     Raises:
         KinematicsError: names an impossible pose.
@@ -139,7 +133,7 @@ def predicted_poses(
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Position errors of predicted poses, and how well they are known.
+    """Position errors of predicted poses, with their uncertainty.
 
     Attributes:
         greatest_error_um: from the commanded position.
@@ -163,11 +157,6 @@ def pose_errors(
     """Return position errors of predicted poses.
 
     A part-set zero removes the common shift, so both are given.
-
-    Args:
-        commanded: shape (n, 6) [mm, deg].
-        actual: shape (n, 6) [mm, deg].
-        uncertainty_mm: of X, Y and Z, shape (n, 3); NaN if unknown.
     """
     off_um = 1e3 * (actual[:, :3] - commanded[:, :3])
     shift_um = off_um.mean(axis=0)

@@ -35,7 +35,6 @@ class Bar:
         calibrated_length_mm: between ball centres.
         expansion_um_m_k: [µm/(m K)]; None if not noted.
         stroke_mm: of its gauge, either way; None if not noted.
-        reading_mm: on its calibrator; None if not noted.
         temp_uncertainty_k: standard, of a bar temperature; None if not noted.
     """
 
@@ -54,13 +53,10 @@ class Bar:
     ball_form_um: float | None = None
 
     def reads_long_mm(self, temp_c: float | None) -> tuple[float, float]:
-        """Return the expected reading less true distance, with standard uncertainty [mm].
+        """Return the expected reading minus true distance, with standard uncertainty [mm].
 
-        Calibrator excess less growth a L (T - T_calibration). Known effects are corrected [GUM 3.2.4]; an unstated
+        Calibrator excess minus growth a L (T - T_calibration). Known effects are corrected [GUM 3.2.4]; an unstated
         temperature uncertainty is the usual one. A difference has sqrt(2) times each one's.
-
-        Args:
-            temp_c: while measuring; None if unknown.
         """
         long_mm = 0.0 if self.reading_mm is None else self.reading_mm - self.calibrated_length_mm
         if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
@@ -69,11 +65,7 @@ class Bar:
         return long_mm - grown_mm, math.hypot(self.calibrator_uncertainty_mm, self.grown_uncertainty_mm(temp_c) or 0.0)
 
     def grown_uncertainty_mm(self, temp_c: float | None) -> float | None:
-        """Return the standard uncertainty of growth since calibration [mm]; None if unknown.
-
-        Args:
-            temp_c: while measuring; None if unknown.
-        """
+        """Return the standard uncertainty of growth since calibration [mm]; None if unknown."""
         if self.expansion_um_m_k == 0.0:
             return 0.0
         if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
@@ -84,11 +76,7 @@ class Bar:
         return mm_per_k * math.hypot(math.sqrt(2.0) * usual, of_coefficient)
 
     def lacks(self, temp_c: float | None) -> tuple[str, ...]:
-        """Return unknown facts that an absolute length needs.
-
-        Args:
-            temp_c: while measuring; None if unknown.
-        """
+        """Return unknown facts that an absolute length needs."""
         if self.expansion_um_m_k == 0.0:
             return ()
         stated = (

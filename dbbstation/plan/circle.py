@@ -65,7 +65,7 @@ class Circle:
 
     @property
     def turning_deg_s(self) -> float:
-        """Angular speed, always positive [deg/s]."""
+        """Return the angular speed, always positive [deg/s]."""
         return float(np.degrees(self.feed_mm_min / 60.0 / self.radius_mm))
 
     @property
@@ -82,10 +82,9 @@ class Circle:
         return np.mod(self.direction.sign * (theta_deg - self.start_deg), FULL_TURN_DEG)
 
     def poses(self, theta_deg: NDArray[np.float64], outside_mm: float = 0.0) -> NDArray[np.float64]:
-        """Commanded poses at angles, shape (n, 6) [mm, deg].
+        """Return commanded poses at angles, shape (n, 6) [mm, deg].
 
         Args:
-            theta_deg: from +X towards +Y, shape (n,).
             outside_mm: along the bar.
         """
         theta, elevation = np.radians(theta_deg), np.radians(self.elevation_deg)

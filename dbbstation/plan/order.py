@@ -59,14 +59,10 @@ def against_drift(plan: Plan) -> tuple[str, ...]:
 
 
 def height_and_drift(heights_mm: Sequence[float], degree: int = 2) -> float:
-    """Return the multiple correlation of heights with a drift in equal time steps.
+    """Return the multiple correlation of heights with a drift in equal time steps; 1: inseparable, 0: none or equal heights.
 
     Args:
-        heights_mm: in order, shape (n,).
         degree: 1: steady; 2: also bent.
-
-    Returns:
-        0: a drift cannot be taken for an effect of height; 1: nothing tells them apart. 0 where all heights are the same.
     """
     return float(_correlations(np.array([heights_mm], dtype=np.float64), degree)[0])
 
@@ -80,7 +76,6 @@ def mountings(plan: Plan, names: Sequence[str]) -> int:
 def _improved(
     order: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return the order that no exchange or move improves."""
     at = _costs(order[None, :], heights, balls, holders)[0]
     while True:
         near = _neighbours(order)
@@ -92,7 +87,6 @@ def _improved(
 
 
 def _neighbours(order: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the order and all its exchanges and moves, shape (m, n)."""
     n = len(order)
     near = [order]
     for i in range(n):
@@ -108,7 +102,6 @@ def _neighbours(order: NDArray[np.intp]) -> NDArray[np.intp]:
 def _costs(
     orders: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
 ) -> NDArray[np.float64]:
-    """Return costs by priority, shape (m, 4)."""
     in_order = heights[orders]
     leaks = [np.maximum(_correlations(in_order, degree) - LARGEST_LEAK, 0.0) for degree in (1, 2)]
     changes = [np.count_nonzero(np.diff(each[orders], axis=1), axis=1) for each in (balls, holders)]

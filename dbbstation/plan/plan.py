@@ -28,7 +28,6 @@ class Plate:
     """The jig plate that balls stand on.
 
     Attributes:
-        origin_mm: of its frame, machine frame (x, y, z).
         expansion_um_m_k: [µm/(m K)]; None if not noted.
     """
 
@@ -41,7 +40,6 @@ class Ball:
     """A ball, known by CMM or put up under the spindle.
 
     Attributes:
-        name: key in the plan.
         bore: None for none.
         centre_mm: machine frame (x, y, z).
         repeatability_mm: of the holder, one standard deviation per axis.
@@ -63,11 +61,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class PlannedTest:
-    """One test: a ball and the circle about it, run in one or both directions.
-
-    Attributes:
-        directions: in order.
-    """
+    """One test: a ball and the circle about it, run in one or both directions."""
 
     name: str
     ball: Ball

@@ -51,8 +51,6 @@ class HolderResult:
 
     Attributes:
         repeatability_um: standard deviation per axis, as in a jig file.
-        together: of all coordinates.
-        axes: x, y and, if measured, z.
         level: probability of the intervals.
         rms_distance_um: from the mean place; estimates sigma sqrt(number of axes).
         mean_distance_um: corrected for the estimated mean place.
@@ -78,7 +76,6 @@ def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0,
     Args:
         places_um: centres over one place's mountings, shape (n, 2) or (n, 3) each.
         cmm_um: standard deviation for an untouched ball, subtracted in variance.
-        level: of the intervals.
 
     Raises:
         ValueError: no place has two mountings.
@@ -108,12 +105,7 @@ def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0,
 
 
 def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> HolderScatter:
-    """Return the standard deviation of a sum of squares, with chi-square interval.
-
-    Args:
-        freedom: f.
-        cmm_um: subtracted in variance, also from the interval.
-    """
+    """Return the standard deviation of a sum of squares, with chi-square interval."""
     tail = (1.0 - level) / 2.0
     variances = (
         squares_um2 / freedom,

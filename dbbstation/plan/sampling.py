@@ -22,12 +22,7 @@ SMALLEST_POINTS = 36
 
 @dataclass(frozen=True)
 class Sampling:
-    """Readings on one turn.
-
-    Attributes:
-        points_per_turn: readings per turn.
-        highest_undulation: per revolution; higher ones alias.
-    """
+    """Readings on one turn."""
 
     points_per_turn: float
     spacing_deg: float

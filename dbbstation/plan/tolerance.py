@@ -62,9 +62,6 @@ class Tolerance:
     """A limit for one figure of some circles.
 
     Attributes:
-        largest_um: greatest size that is within tolerance [µm].
-        tests: empty for all.
-        directions: empty for both.
         upr: filter cut-off in undulations per revolution, for figures in `FILTERED`; 0 for none.
     """
 
@@ -81,11 +78,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Worst:
-    """The circle nearest to or farthest beyond a tolerance.
-
-    Attributes:
-        run: such as a-ccw-1.
-    """
+    """The circle nearest to or farthest beyond a tolerance."""
 
     tolerance: Tolerance
     run: str
@@ -98,11 +91,7 @@ class Worst:
 
 
 def worst(tolerance: Tolerance, runs: Iterable[tuple[str, str, int, Mapping[CircleFigure, float]]]) -> Worst | None:
-    """Return the run with the largest applicable figure, or None.
-
-    Args:
-        runs: test, direction, repeat and figures [µm] of each.
-    """
+    """Return the run with the largest applicable figure, or None."""
     held = [
         Worst(tolerance, f"{test}-{direction}-{repeat}", abs(figures[tolerance.figure]))
         for test, direction, repeat, figures in runs

@@ -89,7 +89,6 @@ def _circles(part: SubFigure, tests: Sequence[CircleTest], rows: int) -> None:
 
 
 def _circle(axes: Axes, test: CircleTest, ring: float) -> None:
-    """Draw deviations about a circle, Cartesian for speed."""
     zero = 4.0 * ring
     for k in range(1, 7):
         style: Any = {"color": "black", "linewidth": 0.7} if k == 4 else {"color": "#cccccc", "linewidth": 0.4}  # noqa: PLR2004
@@ -183,6 +182,5 @@ def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
 
 
 def _round(value: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten up to a value."""
     decade = 10.0 ** np.floor(np.log10(value))
     return float(max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)) * decade)

@@ -102,6 +102,5 @@ def _drawn(one: CuredCircle) -> Polar:
 
 
 def _path(one: CuredCircle, length_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return angles [deg] and deviations [µm] up to 30 undulations per revolution."""
     path = path_about_ball(one.raw.theta_deg, horizontal_radius_mm(one.raw, smooth_lengths_mm(one.raw, length_mm)))
     return path.theta_deg, 1e3 * path.deviation_mm

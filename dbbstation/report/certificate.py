@@ -19,11 +19,7 @@ MOST_NAMED = 3
 
 @dataclass(frozen=True)
 class Certified:
-    """What a report is.
-
-    Attributes:
-        lacking: missing parts; empty for a certificate.
-    """
+    """What a report is."""
 
     lacking: tuple[str, ...]
     place: str
@@ -39,12 +35,7 @@ class Certified:
 
 
 def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> Certified:
-    """Return what a report needs to be a certificate.
-
-    Args:
-        job: typed; empty: the sessions'.
-        tolerances: whether there are any.
-    """
+    """Return what a report needs to be a certificate."""
     lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))
     if not place.strip():
         lacking["place unknown"] = None

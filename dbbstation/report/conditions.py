@@ -20,12 +20,7 @@ _NOT_NOTED = "not noted"
 
 
 def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: str) -> tuple[tuple[str, str], ...]:
-    """Return name and value of each condition, or "not noted".
-
-    Args:
-        circles: shown runs.
-        job: typed; empty: the session's.
-    """
+    """Return name and value of each condition, or "not noted"."""
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
     accepted = len(session.in_state(RunState.ACCEPTED))
     return (

@@ -50,11 +50,7 @@ REASONS_SHOWN = 3
 
 @dataclass(frozen=True, eq=False)
 class Modelled:
-    """A model beside the circles.
-
-    Attributes:
-        evaluation: None if impossible.
-    """
+    """A model beside the circles."""
 
     identified: IdentifiedModel
     evaluation: EvaluationResult | None
@@ -63,15 +59,7 @@ class Modelled:
 
 @dataclass(frozen=True, eq=False)
 class Reported:
-    """Parts of a report.
-
-    Attributes:
-        found: with findings.
-        settings: with tolerances.
-        before: None if not given.
-        modelled: None if not given.
-        ranked: None without a model.
-    """
+    """Parts of a report."""
 
     found: Circled
     chosen: Filter

@@ -1,4 +1,4 @@
-"""What is drawn of a result: bytes by file extension, a figure, or one panel in given Axes."""
+"""Drawings of a result: bytes by file extension, a figure, or one panel in given Axes."""
 
 from __future__ import annotations
 
@@ -30,11 +30,7 @@ class FigureFormat(StrEnum):
 
 @dataclass(frozen=True)
 class Stamped:
-    """A format with provenance.
-
-    Attributes:
-        provenance: for the metadata.
-    """
+    """A format with provenance."""
 
     format: FigureFormat
     provenance: Provenance
@@ -50,11 +46,7 @@ def figure_format(wanted: object) -> Wanted:
 
 
 def in_format(figure: Figure, wanted: Wanted) -> Any:  # noqa: ANN401 - bytes or the figure
-    """Return the figure's bytes, reproducible and without date; the figure itself without a format.
-
-    Args:
-        wanted: format, with provenance for its metadata.
-    """
+    """Return the figure's bytes, reproducible and without date; the figure itself without a format."""
     if wanted is None or isinstance(wanted, OnePanel):
         return figure
     kind = wanted.format if isinstance(wanted, Stamped) else wanted

@@ -27,12 +27,9 @@ class MachineRow:
     """A machine on the page.
 
     Attributes:
-        name: serial number or name.
         session: shown one: the last done, or a failed one.
-        others: number of further sessions.
         marks: places of like scores.
         marked: places of unlike scores.
-        words: the strip in words.
     """
 
     name: str
@@ -80,7 +77,6 @@ def headline_of(result: FleetResult) -> str:
 
 
 def _digits(one: Scored) -> tuple[str, ...]:
-    """Return value, u, usual value, scatter and smallest departure, with decimals by u or scatter."""
     sure = one.uncertainty or one.scatter
     numbers = (one.value, one.uncertainty, one.usual, one.scatter, one.smallest_seen)
     form = f".{decimals_of(sure)}f" if sure else ".4g"

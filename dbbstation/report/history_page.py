@@ -40,7 +40,6 @@ class TrendMark:
 
     Attributes:
         at: along its axis, in drawing units.
-        kind: verdict of an event; empty for a tick.
     """
 
     at: float
@@ -56,7 +55,6 @@ class Drawing:
     Attributes:
         points: short round strokes.
         limits: heights within the field.
-        words: the drawing in words.
     """
 
     name: str
@@ -137,7 +135,6 @@ def _scale(low: float, high: float, start: float, end: float) -> Callable[[float
 
 
 def _reach(values: Sequence[HistoryValue], k: float, limit: float | None) -> tuple[float, float]:
-    """Return a field's range: all values with U, and a near limit."""
     low = min(value.value - k * (value.u or 0.0) for value in values)
     high = max(value.value + k * (value.u or 0.0) for value in values)
     span = (high - low) or abs(high) or 1.0

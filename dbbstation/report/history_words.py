@@ -22,11 +22,7 @@ DASH = "–"
 
 
 def rounded(value: float | None, u: float | None, coverage_factor: float) -> str:
-    """Return a number with decimals by its uncertainty.
-
-    Args:
-        u: standard; None if unknown.
-    """
+    """Return a number with decimals by its uncertainty."""
     if value is None:
         return DASH
     if not u:

@@ -52,7 +52,6 @@ def _css(text: str) -> str:
 
 
 def _um(value: float | None, decimals: int = 1) -> str:
-    """Return a length with decimals, zero unsigned; a dash for None."""
     if value is None:
         return DASH
     return f"{round(value, decimals) + 0.0:.{decimals}f}"

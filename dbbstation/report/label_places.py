@@ -50,16 +50,7 @@ def place_labels(
     within: Box,
     keep_off: Sequence[Box] = (),
 ) -> list[Box | None]:
-    """Return each label's place, as near as possible.
-
-    Args:
-        anchors: [inch].
-        sizes: width and height [inch].
-        within: bounds.
-
-    Returns:
-        A box for each; None where no room is left for it.
-    """
+    """Return each label's box [inch], as near to its anchor as possible; None without room."""
     taken = list(keep_off)
     placed: list[Box | None] = []
     for anchor, size in zip(anchors, sizes, strict=True):
@@ -71,7 +62,6 @@ def place_labels(
 
 
 def _tried(anchor: tuple[float, float], size: tuple[float, float], within: Box) -> list[Box]:
-    """Return boxes round a place within bounds, the nearest first."""
     width, height = size
     steps = int(np.hypot(within.width, within.height) / STEP_IN) + 1
     boxes = (

@@ -21,12 +21,7 @@ _SAME_MM = 1.0
 
 @dataclass(frozen=True)
 class MapPlace:
-    """Balls at one place.
-
-    Attributes:
-        label: bore, else X and Y.
-        marked: needs attention.
-    """
+    """Balls at one place."""
 
     x: float
     y: float
@@ -36,11 +31,7 @@ class MapPlace:
 
 
 def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[MapPlace, ...]:
-    """Return places of tests; +X is right, +Y up.
-
-    Args:
-        marked: names needing attention.
-    """
+    """Return places of tests; +X is right, +Y up."""
     at: dict[tuple[int, int], list[PlannedTest]] = {}
     for test in tests.values():
         x, y, _ = test.ball.centre_mm

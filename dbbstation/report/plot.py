@@ -60,11 +60,7 @@ TITLES = {
 
 @dataclass(frozen=True, eq=False)
 class PlotPanel:
-    """Runs of one picture: both directions of a test in a session.
-
-    Attributes:
-        drawn: in order, each with whether it is thin.
-    """
+    """Runs of one picture: both directions of a test in a session."""
 
     session: str
     test: str
@@ -74,11 +70,7 @@ class PlotPanel:
 
 @dataclass(frozen=True, eq=False)
 class Plotted:
-    """Content of a sheet.
-
-    Attributes:
-        program: name and version.
-    """
+    """Content of a sheet."""
 
     kind: PlotKind
     found: Circled
@@ -230,7 +222,6 @@ def _sheet(plotted: Plotted, width_in: float, room_in: float, panels: Sequence[P
 
 
 def _keys(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[Key]:
-    """Return the legend of directions and repeats."""
     if plotted.kind is PlotKind.MAP:
         return [
             Key("ball", {"color": "#555555", "marker": "o", "markersize": 4.0, "linewidth": 0.0}),

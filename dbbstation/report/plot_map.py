@@ -34,12 +34,7 @@ _FAR_IN = 0.25
 def draw_map(
     sheet: Sheet, box: Box, name: str, tests: Mapping[str, PlannedTest], circles: Sequence[MeasuredCircle]
 ) -> None:
-    """Draw balls and mean circle centres; +X is right, +Y up.
-
-    Args:
-        name: of the panel; may be empty.
-        circles: of one session, with figures.
-    """
+    """Draw balls and mean circle centres; +X is right, +Y up."""
     centres_um = _centres_um(circles)
     balls_mm = np.array([tests[test].ball.centre_mm[:2] for test in centres_um])
     shift_um = np.array(list(centres_um.values()))
@@ -96,7 +91,6 @@ def _arrow(axes: Axes, tail: np.ndarray, along: np.ndarray, colour: str) -> None
 
 
 def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
-    """Return each test's mean centre less ball, shape (2,) [µm]."""
     by_test: dict[str, list[tuple[float, float]]] = {}
     for one in circles:
         if one.analysis is not None:
@@ -105,7 +99,6 @@ def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
 
 
 def _places(area: Box, balls_mm: np.ndarray) -> np.ndarray:
-    """Return balls on the sheet, shape (n, 2) [inch]."""
     middle_mm = 0.5 * (balls_mm.min(axis=0) + balls_mm.max(axis=0))
     spread_mm = max(float(np.ptp(balls_mm, axis=0).max()), 1.0)
     scale = (min(area.width, area.height) - 2.0 * _ROOM_IN) / spread_mm

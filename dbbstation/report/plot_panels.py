@@ -41,7 +41,6 @@ def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_
     """Draw traces about least-squares circles; rings are a division apart.
 
     Args:
-        drawn: with figures.
         reach_um: largest drawn deviation; None: the greatest.
     """
     found = [(one.analysis, thin) for one, thin in drawn if one.analysis is not None]
@@ -183,12 +182,10 @@ def _style(analysis: CircleAnalysis, *, thin: bool) -> dict[str, Any]:
 
 
 def _colours(count: int) -> list[str]:
-    """Return colours other than the directions', repeated if needed."""
     free = [colour for colour in SET if colour not in {AFTER, BEFORE}]
     return [free[k % len(free)] for k in range(count)]
 
 
 def _written(axes: Axes, x: float, y: float, text: str, ha: str) -> None:
-    """Write small text readable over lines."""
     box: Any = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}
     axes.text(x, y, text, fontsize=6.0, ha=ha, va="center", bbox=box, parse_math=False)

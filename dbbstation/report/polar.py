@@ -39,15 +39,7 @@ _STEPS = (1.0, 2.0, 5.0)
 
 @dataclass(frozen=True)
 class PolarTrace:
-    """One drawn run.
-
-    Attributes:
-        points: SVG path.
-        direction: `ccw` or `cw`.
-        thin: a repeat.
-        name: short.
-        title: shown under the pointer.
-    """
+    """One drawn run."""
 
     points: str
     direction: str
@@ -64,10 +56,6 @@ class Drawn:
     Attributes:
         theta_deg: shape (n,).
         deviation_um: from the least-squares circle, shape (n,).
-        direction: `ccw` or `cw`.
-        name: short.
-        title: shown under the pointer.
-        thin: a repeat.
     """
 
     theta_deg: NDArray[np.float64]
@@ -94,13 +82,7 @@ class Ring:
 
 @dataclass(frozen=True)
 class Polar:
-    """The circles of one test.
-
-    Attributes:
-        traces: in order.
-        rings: nominal circle and one division either way.
-        scale: units per µm.
-    """
+    """The circles of one test."""
 
     test: str
     what: str
@@ -112,11 +94,7 @@ class Polar:
 
 
 def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
-    """Return a test's circles about their centres, before and now to one scale.
-
-    Args:
-        now: with figures, in order; at least one.
-    """
+    """Return a test's circles about their centres, before and now to one scale."""
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
     paths = [
@@ -135,11 +113,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
 
 
 def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int = 0) -> Polar:
-    """Return paths of one circle to one scale.
-
-    Args:
-        paths: in order; at least one.
-    """
+    """Return paths of one circle to one scale."""
     most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
     traces = tuple(
@@ -174,11 +148,7 @@ def step_of(most_um: float) -> float:
 
 
 def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple[MeasuredCircle, bool]]:
-    """Return drawn runs; all but a direction's last are thin.
-
-    Args:
-        runs: of one test, in order.
-    """
+    """Return drawn runs; all but a direction's last are thin."""
     drawn: list[tuple[MeasuredCircle, bool]] = []
     for direction in dict.fromkeys(one.entry.direction for one in runs):
         of = [one for one in runs if one.entry.direction is direction][-most:]
@@ -198,12 +168,7 @@ def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], s
 def thinned(
     theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return each stretch's extremes, in order of angle.
-
-    Args:
-        theta_deg: shape (n,).
-        deviation_um: shape (n,).
-    """
+    """Return each stretch's extremes, in order of angle."""
     order = np.argsort(theta_deg, kind="stable")
     theta, deviation = theta_deg[order], deviation_um[order]
     kept = np.arange(len(theta)) if len(theta) <= 2 * BINS else _extremes(np.radians(theta), deviation)
@@ -211,7 +176,6 @@ def thinned(
 
 
 def _extremes(theta: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return places of each stretch's extremes in order."""
     stretch = np.minimum((theta / (2.0 * np.pi) * BINS).astype(np.intp), BINS - 1)
     by_size = np.lexsort((deviation, stretch))
     first = np.flatnonzero(np.diff(stretch[by_size], prepend=-1))

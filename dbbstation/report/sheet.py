@@ -36,11 +36,7 @@ _GAP_IN = 0.25
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell of a title block.
-
-    Attributes:
-        share: of the width within its row.
-    """
+    """One cell of a title block."""
 
     name: str
     value: str
@@ -49,11 +45,7 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Key:
-    """One entry of a legend.
-
-    Attributes:
-        style: of the line, for Matplotlib.
-    """
+    """One entry of a legend."""
 
     text: str
     style: dict[str, Any]
@@ -132,11 +124,7 @@ def width_of_in(text: str, size_pt: float) -> float:
 
 
 def wrapped(text: str, size_pt: float, width_in: float, most: int) -> list[str]:
-    """Return a text in lines, cut with an ellipsis.
-
-    Args:
-        text: one paragraph.
-    """
+    """Return a text in lines, cut with an ellipsis."""
     rest, lines = " ".join(text.split()), list[str]()
     while rest and len(lines) < most:
         end = _fitting(rest, size_pt, width_in)
@@ -173,7 +161,6 @@ def _rows(keys: Sequence[Key], width_in: float) -> list[list[tuple[float, Key]]]
 
 
 def _cells(row: Sequence[Cell], width_in: float) -> tuple[float, list[tuple[float, float, str, list[str]]]]:
-    """Return a row's height, and place, width, name and lines of its cells."""
     whole = sum(cell.share for cell in row)
     x, cells = 0.0, list[tuple[float, float, str, list[str]]]()
     for cell in row:

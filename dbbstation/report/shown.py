@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ShownSession:
-    """A session as the page shows it.
-
-    Attributes:
-        identity: machine, bar and others, by name.
-        known: whether ball places are known.
-    """
+    """A session as the page shows it."""
 
     name: str
     measured: str
@@ -34,13 +29,7 @@ class ShownSession:
 
 @dataclass(frozen=True, eq=False)
 class ShownCauses:
-    """Causes as the page shows them.
-
-    Attributes:
-        session: of the circles.
-        polars: without the first cause.
-        said: the diagnosis in two sentences; may be empty.
-    """
+    """Causes as the page shows them."""
 
     session: str
     why_not: str
@@ -51,13 +40,7 @@ class ShownCauses:
 
 @dataclass(frozen=True)
 class ShownFindings:
-    """Findings as the page shows them.
-
-    Attributes:
-        wrong: session, run and finding.
-        undecided: name, text and runs.
-        good: number.
-    """
+    """Findings as the page shows them."""
 
     wrong: Sequence[tuple[str, str, Finding]]
     undecided: Sequence[tuple[str, str, Sequence[str]]]
@@ -66,12 +49,7 @@ class ShownFindings:
 
 @dataclass(frozen=True, eq=False)
 class ShownModel:
-    """A model as the page shows it.
-
-    Attributes:
-        failed: whether physics is missing.
-        parameters: rows.
-    """
+    """A model as the page shows it."""
 
     problem: str
     failed: bool
@@ -88,7 +66,6 @@ class ReportContent:
         number: of the report, by program, command and inputs.
         virtual: names of virtual sessions.
         reasons_shown: on the first page.
-        ranking: None without a model.
         before_name: earlier session; may be empty.
         files: name and SHA-256 of every underlying file.
     """

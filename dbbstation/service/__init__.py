@@ -1,1 +1,1 @@
-"""What a screen needs: sessions, choices, ports, a running sequence and later work, without a screen."""
+"""Services for a screen: sessions, choices, ports, a running sequence and later work."""

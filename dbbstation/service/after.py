@@ -34,10 +34,7 @@ class Result:
     """State of a step.
 
     Attributes:
-        progress: None: not begun.
-        passed_s: from begin to end.
         answer: JSON of its result; empty until done.
-        failure: error message.
         path: its output; None until done.
     """
 
@@ -54,8 +51,7 @@ class After:
 
     Args:
         model: of an earlier calibration, for comparison until a new one exists; None: none.
-        settings: named file of the shop's settings; None: search.
-        start: begins a job in a process.
+        settings: named file of the shop's settings; None: searched for.
 
     Attributes:
         former: session compared by an acceptance, or None.
@@ -212,7 +208,6 @@ class After:
         return session.plan_path.absolute(), session.machine_path.absolute()
 
     def _done(self) -> dict[str, DoneStep]:
-        """Return finished steps without comparison, whose session is chosen anew."""
         return {
             step.value: DoneStep(path=one.path.name, passed_s=one.passed_s, answer=one.answer)
             for step, one in self.results.items()

@@ -33,12 +33,7 @@ class PlanCheckAnswer:
 
 @dataclass(frozen=True)
 class CalibrationAnswer:
-    """Shown facts of a calibration; lengths in µm.
-
-    Attributes:
-        misfit: beyond noise and mountings.
-        gaps: what the plan cannot see.
-    """
+    """Shown facts of a calibration; lengths in µm."""
 
     parameters_identified: int
     nominal_rms_um: float
@@ -62,13 +57,7 @@ class CauseAnswer:
 
 @dataclass(frozen=True)
 class DiagnosisAnswer:
-    """Shown facts of a diagnosis; lengths in µm.
-
-    Attributes:
-        mismatch: whether the residual exceeds noise and mountings.
-        next_test: None for nothing.
-        said: whether anything differs, and what it follows.
-    """
+    """Shown facts of a diagnosis; lengths in µm."""
 
     mismatch: bool
     misfit_rms_um: float

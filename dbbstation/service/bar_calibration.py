@@ -26,13 +26,7 @@ _TICK_S = 0.05
 
 @dataclass(frozen=True)
 class Stated:
-    """Stated facts of bar and calibrator.
-
-    Attributes:
-        calibrator: serial number.
-        calibrator_mm: length at 20 degC.
-        certified: YYYY-MM-DD.
-    """
+    """Stated facts of bar and calibrator."""
 
     serial_number: str
     calibrator: str
@@ -60,13 +54,8 @@ class Calibrated:
 class BarCalibration:
     """Borrows the instrument while the bar is on its calibrator; close it in any case.
 
-    Args:
-        count: good readings to average.
-
     Attributes:
         latest: None before a reading.
-        failure: that ended the reading, or None.
-        found: last calibration; None before.
         done: readings averaged so far.
     """
 
@@ -88,11 +77,7 @@ class BarCalibration:
         return self._wanted is not None and self._thread.is_alive()
 
     def begin(self, stated: Stated, path: Path) -> None:
-        """Average readings and write the file, unless busy.
-
-        Args:
-            path: an existing file is not overwritten.
-        """
+        """Average readings and write the file, unless busy."""
         if not self.busy:
             self.failure, self.found, self.done = None, None, 0
             self._wanted = stated, path

@@ -32,7 +32,7 @@ def read_on_calibrator(
     """Return the mean of good readings, without impossible ones of a resting bar.
 
     Args:
-        resolution_um: display step; None: by the readings.
+        resolution_um: display step; None: estimated from the readings.
 
     Raises:
         InstrumentError: the line failed, or too many readings are no length.
@@ -60,7 +60,6 @@ def bar_file(
 
     Args:
         of_bar: serial number, temperature with uncertainty, expansion, as in `BarFile`.
-        now: with its zone.
 
     Raises:
         pydantic.ValidationError: a value that no such file may have.

@@ -28,13 +28,7 @@ _DAYS_PER_YEAR = 365.25
 def fault_of(
     name: str, text: str, reads_mm: float | None = None, stroke_mm: float | None = None, today: date | None = None
 ) -> str:
-    """Return the fault of a typed text, or an empty text.
-
-    Args:
-        reads_mm: reading on the calibrator; None: none, or only relative.
-        stroke_mm: travel of the gauge either way; None: unknown.
-        today: None: this computer's date.
-    """
+    """Return the fault of a typed text, or an empty text."""
     if name == "certified":
         return _fault_of_day(text, today or datetime.now().astimezone().date())
     if name not in _RANGES:

@@ -29,7 +29,7 @@ _MESSAGES = 50
 
 
 class Mark(StrEnum):
-    """State of a planned run; its text stands beside the sign."""
+    """State of a planned run; its text is beside the sign."""
 
     OPEN = "open"
     NEXT = "next"
@@ -50,13 +50,7 @@ class RunDecision(StrEnum):
 
 @dataclass(frozen=True)
 class SequenceOpened:
-    """Instrument and session are ready; the runner's first event.
-
-    Attributes:
-        tasks: planned runs in order.
-        open: those without accepted run.
-        known: results of judged runs, in recording order.
-    """
+    """Instrument and session are ready; the runner's first event."""
 
     tasks: tuple[Task, ...]
     open: tuple[Task, ...]
@@ -82,9 +76,6 @@ class Board:
     """The state that is drawn.
 
     Attributes:
-        state: None before the begin.
-        allowed: commands.
-        announced: next or current run.
         lost: samples lost in the latest run.
         doubtful: possibly damaged samples of that run.
         swept_deg: since the feed-in.
@@ -92,13 +83,10 @@ class Board:
         last: its circles in the session before, by direction; may be empty.
         difference: of the directions; None before both are complete.
         running: direction on its circle, or None.
-        results: last completed runs.
-        runs: recorded runs of all sittings, by name.
         reasons: of rejections, by name.
         completed: run awaiting its verdict, or the last one.
         doubted: accepted runs that contradict the others, by name.
         temperature_due: whether a run began since the last temperature.
-        messages: newest last.
     """
 
     state: State | None = None
@@ -265,7 +253,6 @@ class Board:
         self.running = self.announced.run.direction if self.announced and event.state is State.TURNING else None
 
     def _leave(self, before: State | None) -> None:
-        """Leave a run; the next announcement shows whether it is repeated."""
         if before is not None and before in _RUN_MARKS and self._announced_mark is not Mark.ACCEPTED:
             self._mark(Mark.PASSED)
 
@@ -304,7 +291,6 @@ class Board:
             self.difference = None if ccw is None or cw is None else difference(ccw, cw)
 
     def _judge(self, run: events.RunId, verdict: RunDecision, reason: str = "") -> None:
-        """Note a verdict on the announced or an earlier run."""
         self.verdicts[run.label], self.reasons[run.label] = verdict, reason
         if verdict is RunDecision.REJECTED:
             self.doubted.pop(run.label, None)

@@ -37,11 +37,7 @@ _SHIPPED = {
 
 
 def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
-    """Return files of a format, those under a folder first, without session copies.
-
-    Args:
-        shipped: include those of the package.
-    """
+    """Return files of a format, those under a folder first, without session copies."""
     own = [path for path in _files(under, DEPTH) if _is(kind, path)]
     if not shipped or kind not in _SHIPPED:
         return tuple(own)

@@ -1,4 +1,4 @@
-"""What somebody chose to measure, what is missing, and the checked job."""
+"""A chosen measurement, its missing parts, and the checked job."""
 
 from __future__ import annotations
 
@@ -78,15 +78,10 @@ class Choice:
     """A session to make or continue.
 
     Attributes:
-        folder: None: not chosen.
         machine: nominal; None: not chosen, or the session's own.
-        plan: likewise.
-        bar: calibration file; None: none.
-        bar_waiver: why none; may be empty.
+        bar_waiver: reason for no bar file; may be empty.
         programs: folder; None: plain nominal circles.
-        job: job or order number.
         ambient_temp_c: now; None: not read. An existing session gets a note.
-        order: of a new session's tests.
         gate: repeated at the end.
     """
 
@@ -128,9 +123,7 @@ class Prepared:
 
     Attributes:
         runs: left to measure.
-        circles_s: their time at planned feeds.
         mountings: set-ups of balls for them.
-        first: None if nothing is left.
         height_and_drift: correlation of test height with a steady drift, 0 to 1.
     """
 
@@ -211,11 +204,6 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
 
 
 def _recorded(folder: Path, instrument: ReadBy | None) -> tuple[RunEntry, ...]:
-    """Return the runs of a continued session.
-
-    Raises:
-        InputError: faults of the session; virtual and real circles would be mixed.
-    """
     session = read_session(folder)
     check_not_mixed(folder, session, instrument)
     return session.runs

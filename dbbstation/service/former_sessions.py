@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InForce:
-    """What commanded a session's accepted circles.
+    """The programs of a session's accepted circles.
 
     Attributes:
         compensated: number of compensated runs.
@@ -53,10 +53,9 @@ class Former:
 
 @dataclass(frozen=True)
 class BeforeAndNow:
-    """What an acceptance can compare.
+    """Sessions that an acceptance can compare.
 
     Attributes:
-        now: of this session.
         formers: the last first.
     """
 
@@ -78,11 +77,7 @@ def before_and_now(folder: Path) -> BeforeAndNow:
 
 
 def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
-    """Return what commanded a session's accepted circles.
-
-    Args:
-        models: files by SHA-256.
-    """
+    """Return what commanded a session's accepted circles."""
     runs = session.in_state(RunState.ACCEPTED)
     programs = [run.program for run in runs if run.program is not None]
     used = sorted({program.model_sha256 for program in programs if program.model_sha256})

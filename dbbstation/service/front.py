@@ -60,8 +60,6 @@ class Front:
     """Finds, checks and opens one job at a time.
 
     Attributes:
-        under: working folder.
-        observers: of the sequence.
         model: for judging circles; None: the nominal machine.
         given: by command line or settings; overrides the memory.
         settings: named file of the shop's settings.
@@ -135,7 +133,7 @@ class Front:
         return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
 
     def probe(self, line: Line) -> ProbeOutcome:
-        """Return what answers at a port; takes seconds."""
+        """Return the answer at a port; takes seconds."""
         if line.virtual:
             return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
@@ -165,10 +163,6 @@ class Front:
 
     def write_programs(self, choice: Choice, model: Path | None = None) -> tuple[int, Path]:
         """Write NC programs into a new folder beside the session; return number and folder.
-
-        Args:
-            choice: with plan, machine and session.
-            model: None: nominal programs.
 
         Raises:
             StationError: what the task says.
@@ -218,9 +212,6 @@ class Front:
 
     def stated_bar(self, values: Mapping[str, str]) -> Stated:
         """Return the stated facts of bar and calibrator.
-
-        Args:
-            values: texts by the names of `Stated`.
 
         Raises:
             NoNumberError: a text is no number.

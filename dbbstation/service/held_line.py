@@ -37,14 +37,7 @@ _JOIN_S = 10.0
 class HeldLine:
     """Owns an instrument until it is closed.
 
-    Readings are only shown while it is not lent, and not passed to a borrower. A failed instrument is reopened.
-
-    Args:
-        port: name or URL.
-        baud: if not the usual rate.
-        clock: of the readings [s].
-        time_scale: speed of that time.
-        log: of all bytes; the caller closes it.
+    Readings are shown only while it is not lent, and not passed to a borrower. A failed instrument is reopened.
 
     Attributes:
         latest: None before a reading and during failure.
@@ -127,7 +120,6 @@ class HeldLine:
             self._seen.extend(samples)
 
     def _ready(self) -> None:
-        """Open the instrument, again after failure."""
         if not self._instrument.reading:
             with suppress(StationError):
                 self._instrument.close()

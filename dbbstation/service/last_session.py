@@ -1,4 +1,4 @@
-"""Circles of the last session of the same machine and plan, drawn beneath the present ones."""
+"""Circles of the last session of the same machine and plan, drawn under the present ones."""
 
 from __future__ import annotations
 
@@ -22,9 +22,6 @@ def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
     """Return a test's last accepted circles in the session before, by direction; may be empty.
 
     Unreadable circles are left out.
-
-    Args:
-        folder: of the present session; former ones are beside it.
 
     Raises:
         InputError: the present session cannot be read.

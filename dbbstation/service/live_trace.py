@@ -114,7 +114,6 @@ class LiveTrace:
             self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
 
     def _take(self, step: int, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
-        """Add points to one step of the travel."""
         if step == self._step:
             kept = self._data[:, self._step_from : self._count]
             theta_deg = np.concatenate([kept[0], theta_deg])
@@ -162,7 +161,7 @@ class Derived:
 
     @property
     def circle(self) -> Circle:
-        """As commanded."""
+        """Return the commanded circle."""
         return self.measured.circle
 
     @property
@@ -172,13 +171,10 @@ class Derived:
 
 
 def difference(ccw: Derived, cw: Derived) -> Derived | None:
-    """Return counter-clockwise less clockwise at equal angles, or None without common ones.
+    """Return counter-clockwise minus clockwise at equal angles, or None without common ones.
 
     Both are centred: live angles err by a degree or two, opposite in both directions, and a centre off by 200 µm would
     give 7 µm per degree. The clockwise trace is interpolated linearly.
-
-    Args:
-        ccw: complete and centred.
     """
     placed = np.isfinite(cw.theta_deg)
     if not placed.any():

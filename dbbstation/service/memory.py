@@ -24,7 +24,7 @@ MOST = 20
 
 
 class Line(BaseModel):
-    """Which instrument is where."""
+    """Port of an instrument."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -41,7 +41,7 @@ class Line(BaseModel):
 
     @property
     def virtual(self) -> bool:
-        """Whether machine and instrument are virtual."""
+        """Return whether machine and instrument are virtual."""
         return time_scale_of(self.port) is not None
 
     @property
@@ -69,13 +69,7 @@ class _File(BaseModel):
 
 @dataclass(frozen=True)
 class Remembered:
-    """Last choices.
-
-    Attributes:
-        machine: file; None: none yet.
-        plan: file; None: none yet.
-        sessions: folders, the last first, with their lines.
-    """
+    """Last choices."""
 
     machine: Path | None = None
     plan: Path | None = None
@@ -97,18 +91,14 @@ class Remembered:
 
 
 class Memory:
-    """The file of last choices.
-
-    Args:
-        path: None: the user's.
-    """
+    """The file of last choices."""
 
     def __init__(self, path: Path | None = None) -> None:
         self._path = path
 
     @property
     def path(self) -> Path:
-        """Where it is."""
+        """Return its path."""
         if self._path is None:
             import platformdirs  # noqa: PLC0415 - only who remembers looks for the user's folders
 

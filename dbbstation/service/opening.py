@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 
 def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> Opener:
-    """Return a function that borrows the instrument and opens the session anew.
-
-    Args:
-        observers: after storage, before the screen.
-    """
+    """Return a function that borrows the instrument and opens the session anew."""
 
     @contextmanager
     def opened() -> Iterator[OpenStation]:

@@ -40,11 +40,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Operated:
-    """A job and its file.
-
-    Attributes:
-        path: its other files are relative to it.
-    """
+    """A job and its file."""
 
     path: Path
     job: JobFile
@@ -71,10 +67,7 @@ class Operated:
         )
 
     def tolerances_file(self, session: Path) -> tuple[Path, bool]:
-        """Write the job's tolerances as settings beside a session.
-
-        Returns:
-            The file, and whether it had other limits before; the session's notes then have these.
+        """Write the job's tolerances as settings beside a session; return the file and whether its limits changed.
 
         Raises:
             OutputError: it cannot be written.
@@ -127,7 +120,6 @@ class Answered:
     """The answer on a session.
 
     Attributes:
-        to_do: in order.
         report: None if none was made.
     """
 
@@ -142,7 +134,6 @@ class JobAnswer:
 
     Args:
         missing: planned runs without accepted recording, in words.
-        start: begins a job in a process.
     """
 
     def __init__(
@@ -177,10 +168,7 @@ class JobAnswer:
 def answer_of(answer: ReportAnswer, missing: Sequence[str], report: Path | None, trouble: str = "") -> Answered:
     """Return the answer of a report, which is complete only with every planned run.
 
-    A limit is exceeded whatever is missing. Commands, which the operator cannot reach, are left to the report.
-
-    Args:
-        trouble: what the shop says if the machine is not within.
+    A limit is exceeded even if runs are missing. Commands, which the operator cannot run, are left to the report.
     """
     verdict = answer.verdict
     kinds = {str(one): one for one in Conformity}

@@ -35,11 +35,7 @@ class Gate(StrEnum):
 
 
 def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePlan:
-    """Return the plan with ordered tests.
-
-    Args:
-        gate: repeated at the end; a plan's own repeats stay.
-    """
+    """Return the plan with ordered tests."""
     domain = plan.to_domain()
     choose = {Order.PLAN: lambda one: tuple(one.tests), Order.HOLDER: by_holder, Order.DRIFT: against_drift}
     names = choose[order](domain)

@@ -27,11 +27,7 @@ class DriverPatience(TypedDict):
 
 
 def driver_patience(time_scale: float, *, waits: bool = False) -> DriverPatience:
-    """Return arguments of `Instrument` on a clock `time_scale` times faster than real.
-
-    Args:
-        waits: the machine is silent between runs.
-    """
+    """Return arguments of `Instrument` on a clock `time_scale` times faster than real."""
     if waits:
         return {"memory_s": _MEMORY_S, "timeout_s": _WAITING_TIMEOUT_S}
     if time_scale == 1.0:

@@ -24,7 +24,6 @@ class ProbeOutcome:
     """What came from a port.
 
     Attributes:
-        port: name or URL.
         answers: whether the protocol understood readings.
         text: reading, status, or fault with remedy.
     """
@@ -40,12 +39,7 @@ def ports() -> list[tuple[str, str]]:
 
 
 def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: float = PATIENCE_S) -> ProbeOutcome:
-    """Ask a port for a reading of an instrument.
-
-    Args:
-        port: name or URL.
-        baud: if not the usual rate.
-    """
+    """Ask a port for a reading of an instrument."""
     try:
         with Instrument(protocol, port, baud=baud, timeout_s=patience_s) as source:
             end_s = time.monotonic() + patience_s

@@ -29,11 +29,7 @@ _JOIN_S = 10.0
 
 @dataclass(frozen=True)
 class OpenStation:
-    """A station ready to run, with storage.
-
-    Attributes:
-        known: results of judged runs.
-    """
+    """A station ready to run, with storage."""
 
     station: Station
     schedule: Schedule
@@ -51,7 +47,6 @@ class Runner:
 
     Args:
         opener: called in the runner's thread.
-        line: shows readings between sequences; None: none.
 
     Attributes:
         crash: programming error that ended the thread.
@@ -69,7 +64,7 @@ class Runner:
 
     @property
     def alive(self) -> bool:
-        """Whether a sequence is being run."""
+        """Return whether a sequence is running."""
         return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:
@@ -89,7 +84,7 @@ class Runner:
         return True
 
     def mail(self) -> list[Event | SequenceOpened]:
-        """Return what has come since the last call."""
+        """Return events since the last call."""
         over = not self.alive  # asked first: what the sequence sent last comes before what is only seen
         came: list[Event | SequenceOpened] = []
         with suppress(queue.Empty):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BarAtFeedIn:
-    """How the bar stands at the feed-in point.
+    """The bar's position at the feed-in point.
 
     Attributes:
         long_mm: reading less the feed-in point's.
@@ -27,11 +27,7 @@ class BarAtFeedIn:
 
 
 def seat(length_mm: float, circle: Circle) -> BarAtFeedIn:
-    """Return how the bar stands at the feed-in point of a circle.
-
-    Args:
-        circle: the next.
-    """
+    """Return the bar's position at the feed-in point of the next circle."""
     long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)
     margin_mm = (0.5 - HYSTERESIS) * circle.feed_in_mm
     return BarAtFeedIn(long_mm, abs(long_mm) < margin_mm, abs(long_mm + 2.0 * circle.feed_in_mm) < margin_mm)

@@ -17,10 +17,6 @@ def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
     """Return instrument and port for an existing session.
 
     A virtual session continues on a virtual machine; a real one never does.
-
-    Args:
-        remembered: of this computer.
-        given: by command line and settings.
     """
     try:
         session = read_session(folder)

@@ -29,7 +29,6 @@ class SessionLine:
         accepted: planned runs with accepted recording.
         unjudged: runs without verdict.
         left_s: time of the remaining circles.
-        problem: why it cannot continue; may be empty.
     """
 
     folder: Path
@@ -50,12 +49,7 @@ class SessionLine:
 
 
 def list_sessions(under: Path, remembered: Iterable[Path] = ()) -> tuple[SessionLine, ...]:
-    """Return sessions, last written first.
-
-    Args:
-        under: searched with subfolders.
-        remembered: further folders; missing ones are ignored.
-    """
+    """Return sessions, last written first."""
     return tuple(_line(folder, datetime.fromtimestamp(at, UTC)) for at, folder in dated_folders(under, remembered))
 
 

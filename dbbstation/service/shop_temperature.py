@@ -48,11 +48,7 @@ def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
 
 
 def changed_since(session: SessionFolder, operator: str) -> tuple[str, ...]:
-    """Return what is noted of a session that is gone on with: another operator, another shift, a clock that went back.
-
-    Args:
-        operator: now; empty: not known.
-    """
+    """Return the changes since a session was noted: another operator, another shift, a clock that went back."""
     by = [note.text.removeprefix(_OPERATOR) for note in session.notes if note.text.startswith(_OPERATOR)]
     before = (by or [session.operator])[-1]
     runs = [run.started for run in session.runs if run.started is not None]

@@ -41,7 +41,7 @@ class Helper:
         self._announced: events.RunAnnounced | None = None
 
     def __call__(self, event: events.Event) -> None:
-        """Do what the event asks for.
+        """Do the event's request.
 
         Raises:
             MachineError: the machine refuses.
@@ -62,13 +62,7 @@ class Helper:
 
 @dataclass(frozen=True)
 class VirtualPlace:
-    """The virtual parts.
-
-    Attributes:
-        clock: their time [s].
-        helper: subscribe it to the station.
-        wire: the instrument, for simulated faults.
-    """
+    """The virtual parts."""
 
     port: str
     clock: ScaledClock
@@ -90,7 +84,6 @@ def virtual_place(
 
     Args:
         time_scale: speed relative to real time.
-        programs: NC programs by test and direction.
 
     Raises:
         TravelError: a circle leaves the travel.

@@ -128,7 +128,6 @@ class BackgroundWork:
         self._answer.close()
 
     def _tell(self) -> None:
-        """Send the process its job."""
         if self._process.stdin is None:
             return
         with suppress(OSError):

@@ -58,11 +58,7 @@ class StepsBefore:
 
 
 def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
-    """Keep finished steps beside their results, if possible; another screen's steps of the same session stay.
-
-    Args:
-        key: from `counted`.
-    """
+    """Keep finished steps beside their results, if possible; another screen's steps of the session are kept."""
     with suppress(OSError, OutputError):
         before = _kept(folder / FILE)
         if before is not None and before.key == key:
@@ -94,7 +90,7 @@ def steps_before(session: Path) -> StepsBefore | None:
 
 
 def _kept(file: Path) -> _File | None:
-    """Return what a file keeps; None if it is missing or no such file."""
+    """Return a file's steps; None if missing or invalid."""
     try:
         return _File.model_validate_json(content_of(file, LARGEST_BYTES))
     except (OSError, ValidationError):
@@ -102,7 +98,7 @@ def _kept(file: Path) -> _File | None:
 
 
 def _is_result(folder: Path, name: str, step: DoneStep) -> bool:
-    """Return whether a step is one that is known, and its file is in the folder of results."""
+    """Return whether a step is known and its file is in the results folder."""
     path = folder / step.path
     return name in set(SessionTask) and path.exists() and real_path(path).is_relative_to(real_path(folder))
 

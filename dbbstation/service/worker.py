@@ -38,8 +38,6 @@ _LOG = logging.getLogger(__name__)
 
 
 class _Marked(logging.Formatter):
-    """Marks every line of a log record."""
-
     def format(self, record: logging.LogRecord) -> str:
         """Return a record's lines."""
         return "\n".join(LOG_MARK + line for line in super().format(record).splitlines())
@@ -168,7 +166,6 @@ def _needed(path: Path | None, what: str) -> Path:
 
 
 def _provenance(*words: str | Path) -> Provenance:
-    """Return the provenance: equivalent command, files without folders, inputs so far."""
     command = shlex.join(["dbbstation", *(name_of(word) if isinstance(word, Path) else word for word in words)])
     return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
 

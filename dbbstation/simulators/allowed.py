@@ -50,13 +50,12 @@ def _installed() -> dict[str, Path]:
 def require_allowed(path: Path, settings: Collection[str], *, allow: bool) -> str:
     """Refuse a simulator that the user has not allowed; shipped ones are allowed.
 
+    Returns the reason if the permission could not be stored, or an empty text.
+
     Args:
         path: of `model.yaml`; nothing of it is run here.
         settings: hashes that the user's settings allow.
         allow: allow it from now on.
-
-    Returns:
-        Why it could not be noted, or an empty text.
 
     Raises:
         StationError: it is not allowed.

@@ -67,7 +67,7 @@ def missing_code(answer: SimulatorComparison) -> str:
 
 
 def _told(text: str) -> str:
-    """A text as it may stand in a docstring: somebody's name for a model must not become code."""
+    """Return a text safe for a docstring, because a model's name must not become code."""
     return " ".join(text.split()).replace("\\", "/").replace('"', "'")
 
 
@@ -77,7 +77,7 @@ def _values(finding: object) -> list[str]:
 
 
 def function_name(term: Term) -> str:
-    """Name of a term's function."""
+    """Return the name of a term's function."""
     words = "_".join([term.port, *term.name.split(" at ")[0].replace("-", " ").split()]).lower()
     return re.sub(r"\W", "_", words)
 

@@ -1,7 +1,7 @@
 """Simulators that take port inputs and return port signals.
 
-Terms of the simulated state are found by iteration [waveform relaxation; Lelarasmee, Ruehli and Sangiovanni-Vincentelli,
-IEEE Trans. CAD 1 (1982) 131].
+Terms of the simulated state are found by iteration [waveform relaxation; Lelarasmee, Ruehli and
+Sangiovanni-Vincentelli, IEEE Trans. CAD 1 (1982) 131].
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RUNS_AWAY = 1e12
 
 
 class ExchangedSimulator(Simulator):
-    """A simulator that takes what acts at its ports as inputs.
+    """A simulator whose inputs are the terms at its ports.
 
     Args:
         ports: signal names by port.

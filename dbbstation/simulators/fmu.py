@@ -29,7 +29,7 @@ _DESCRIPTION = "modelDescription.xml"
 
 
 def fault_of_fmu(path: Path) -> str:
-    """Return why a file is no FMU that can be unpacked; empty if it can. Nothing is unpacked for that."""
+    """Return why a file is not a valid FMU; empty if it is. Nothing is unpacked."""
     try:
         with opened(path) as _, zipfile.ZipFile(path) as archive:
             sizes = {one.filename: one.file_size / 1e6 for one in archive.infolist()}
@@ -67,7 +67,7 @@ class FmuSimulator(ExchangedSimulator):
 
     @property
     def said(self) -> str:
-        """Its path."""
+        """Return its path."""
         return str(self._path)
 
     def simulate_once(

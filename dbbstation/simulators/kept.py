@@ -35,9 +35,6 @@ _PATIENCE_S = 5.0
 class KeptSimulations:
     """Kept simulations of one simulator and its recordings. A context.
 
-    Args:
-        content: hash of the simulator's files.
-
     Attributes:
         problem: why nothing can be kept; may be empty.
     """
@@ -58,11 +55,7 @@ class KeptSimulations:
     def known(
         self, asks: Iterable[SimulationRequest], shape: Mapping[int, tuple[int, int]]
     ) -> dict[SimulationRequest, SimulationOutcome]:
-        """Return kept simulations.
-
-        Args:
-            shape: of each run's outputs, by number.
-        """
+        """Return kept simulations."""
         found: dict[SimulationRequest, SimulationOutcome] = {}
         if self._base is None:
             return found
@@ -124,7 +117,6 @@ def simulations_folder() -> Path:
 
 
 def _make_room(used: Path) -> None:
-    """Forget the longest unused until the rest is small enough."""
     with contextlib.suppress(OSError):
         room = MOST_BYTES
         for one in sorted(used.parent.glob("*.sqlite"), key=lambda file: (file != used, -file.stat().st_mtime)):
@@ -138,7 +130,6 @@ def _kept_at_all(ask: SimulationRequest) -> bool:
 
 
 def _of_all(content: str, model: Model) -> str:
-    """Return the hash of what all simulations share."""
     digest = hashlib.sha256(content.encode())
     digest.update(repr([(o.name, o.filter_s) for o in model.outputs]).encode())
     digest.update(repr([(port.name, sorted(port.signals)) for port in model.ports]).encode())

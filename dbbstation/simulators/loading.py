@@ -45,7 +45,6 @@ class LoadedSimulator:
     """A simulator with its recordings.
 
     Attributes:
-        path: of `model.yaml`.
         source: Python file, or runner of a program or FMU.
         own: own physics at ports.
     """

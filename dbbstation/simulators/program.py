@@ -39,7 +39,6 @@ class ProgramSimulator(ExchangedSimulator):
 
     Args:
         command: with whole paths of files beside the model file.
-        ports: signal names by port.
         limit_s: per simulation.
     """
 
@@ -51,7 +50,7 @@ class ProgramSimulator(ExchangedSimulator):
 
     @property
     def said(self) -> str:
-        """Its command."""
+        """Return its command."""
         return " ".join(self._command)
 
     def simulate_once(

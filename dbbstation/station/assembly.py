@@ -47,13 +47,9 @@ class Job:
         folder: made, or continued.
         details: for a new session; an existing one keeps its own.
         programs: by test and direction; empty: plain nominal circles.
-        patience: how long to wait for the machine.
-        clock: machine time of the readings [s].
         time_scale: speed of that time; other than 1 only for a virtual machine.
-        rate_hz: readings per second; None: not known.
         range_mm: lowest and highest length that it reads; None: not known.
-        model: decides where circles are expected; None: the nominal geometry does.
-        instrument: for the session's record; None: not known.
+        model: source of expected circles; None: the nominal geometry.
     """
 
     machine: Machine
@@ -90,11 +86,7 @@ class Job:
             check_range(plan, self.range_mm, file=plan_file)
 
     def _check_room(self, plan: Plan) -> None:
-        """Refuse a disk on which the circles have no room.
-
-        Raises:
-            InputError: too little is free.
-        """
+        """Refuse a disk on which the circles have no room."""
         circles = [test.run(direction) for test in plan.tests.values() for direction in test.directions]
         needed = LEAST_FREE + BYTES_PER_READING * (self.rate_hz or 0.0) * circles_s(circles)
         free = free_bytes(self.folder)
@@ -134,7 +126,6 @@ def assemble(
     """Open the session and build the station; storage is its first observer.
 
     Args:
-        source: started.
         unreadable: rejected bytes so far, by fault.
 
     Raises:

@@ -23,10 +23,10 @@ class Hands(Protocol):
     """What moves the machine."""
 
     def stands_since_s(self) -> float:
-        """Return the machine time since which it stands [s]; minus infinity if it does not wait."""
+        """Return the machine time since which it has stood [s]; minus infinity if it does not wait."""
 
     def standing(self) -> str | None:
-        """Return the name of the ball that stands on the table."""
+        """Return the name of the mounted ball."""
 
     def mount(self, test: str) -> None:
         """Put up the ball of a test."""

@@ -1,4 +1,4 @@
-"""Check that the bar's length is known well enough: places on a plate need an absolute length."""
+"""Check that the bar's length is known well enough, because places on a plate need an absolute length."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: f
     length.
 
     Args:
-        bar: None if nothing is known.
-        now: with its zone.
         largest_age_h: beyond which a calibration is stale.
 
     Raises:

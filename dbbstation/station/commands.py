@@ -28,9 +28,9 @@ class Accept:
     """Accept the complete run and go on.
 
     Attributes:
-        reason: why, despite a finding; empty: the findings are kept.
-        back: the doubted runs no longer count, and are measured next.
-        alone: an earlier run of the same test and direction no longer counts.
+        reason: reason for accepting a finding; empty: the findings are kept.
+        back: the doubted runs are withdrawn and measured next.
+        alone: an earlier run of the same test and direction is withdrawn.
     """
 
     reason: str = ""
@@ -44,7 +44,6 @@ class Repeat:
 
     Attributes:
         reason: empty: the finding, else the operator's wish.
-        back: as of `Accept`.
     """
 
     reason: str = ""
@@ -82,12 +81,7 @@ class GoTo:
 
 @dataclass(frozen=True)
 class Judge:
-    """Change the verdict on a recorded run at any time.
-
-    Attributes:
-        repeat: from 1.
-        reason: of a rejection.
-    """
+    """Change the verdict on a recorded run at any time."""
 
     test: str
     direction: Direction
@@ -98,12 +92,7 @@ class Judge:
 
 @dataclass(frozen=True)
 class AddNote:
-    """Add a remark or the shop's temperature to the session at any time.
-
-    Attributes:
-        text: empty for a temperature alone.
-        ambient_temp_c: None if not read.
-    """
+    """Add a remark or the shop's temperature to the session at any time."""
 
     text: str = ""
     ambient_temp_c: float | None = None
@@ -111,12 +100,12 @@ class AddNote:
 
 @dataclass(frozen=True)
 class Pause:
-    """Wait for nothing."""
+    """Pause."""
 
 
 @dataclass(frozen=True)
 class Resume:
-    """Go on after a pause."""
+    """Continue after a pause."""
 
 
 Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit | GoTo | Judge | AddNote | Pause | Resume

@@ -52,11 +52,7 @@ SETTLED_S = 2.0
 
 
 class CircleWatch:
-    """Detects the machine on an unrecorded circle, from readings in time order.
-
-    Args:
-        waits_for_feed_in: whether a bar at the circle's length must have come from outside.
-    """
+    """Detects the machine on an unrecorded circle, from readings in time order."""
 
     def __init__(self, circle: Circle, *, waits_for_feed_in: bool) -> None:
         self._edges = EdgeDetector(circle)
@@ -89,11 +85,7 @@ class CircleWatch:
 
 
 class EdgeDetector:
-    """Detects on which side of the feed-in's middle the bar is, from readings in time order.
-
-    Args:
-        circle: its feed-in must not be 0.
-    """
+    """Detects on which side of the feed-in's middle the bar is, from readings in time order."""
 
     def __init__(self, circle: Circle) -> None:
         middle = circle.bar_mm + circle.feed_in_mm / 2.0
@@ -115,10 +107,7 @@ class EdgeDetector:
 
 
 def live_phi_deg(circle: Circle, since_feed_in_s: float) -> float:
-    """Return the progress after the feed-in edge, within a degree or two [deg].
-
-    The recording is cut better, between both edges.
-    """
+    """Return the progress after the feed-in edge, within a degree or two [deg]."""
     feed_in_rest_s = circle.feed_in_mm / 2.0 / (circle.feed_mm_min / 60.0)
     on_arc_s = max(since_feed_in_s - feed_in_rest_s - CORNER_DWELL_S, 0.0)
     return min(on_arc_s * circle.turning_deg_s, circle.swept_deg) - circle.overshoot_deg

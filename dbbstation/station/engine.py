@@ -48,7 +48,7 @@ class Station:
 
     @property
     def state(self) -> State:
-        """Where the sequence stands."""
+        """Return the state of the sequence."""
         return self._sequencer.state
 
     def subscribe(self, observer: Observer) -> None:
@@ -100,7 +100,7 @@ class Station:
                 observer(event)
 
     def _tell_of(self, error: StationError) -> None:
-        """Tell all observers of a failure, even if one of them caused it."""
+        """Report a failure to all observers, even if one of them caused it."""
         for event in self._sequencer.fail(error):
             for observer in self._observers:
                 try:

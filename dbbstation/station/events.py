@@ -48,9 +48,7 @@ class Sample:
 
     Attributes:
         t_s: machine time; since the first sample while recording, else of the driver's clock.
-        length_mm: distance between the ball centres; None without a number.
         status: `ok`, `doubtful`, `overrange` or `fault`.
-        said: the instrument's words, or the reason for doubt; if not `ok`.
         phi_deg: live progress: 0 to 360 on the full turn, negative before, above 360 behind; None off the circle.
         t_uncertainty_s: standard uncertainty of `t_s`; None if the instrument sends by itself.
     """
@@ -66,11 +64,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class StateChanged:
-    """The sequencer is in another state.
-
-    Attributes:
-        commands: accepted in this state.
-    """
+    """The sequencer is in another state."""
 
     state: State
     commands: frozenset[type[Command]]
@@ -81,11 +75,7 @@ class RunAnnounced:
     """The next run and its set-up.
 
     Attributes:
-        ball: with bore (None: in none) and holder, or under the spindle.
         put_up: whether the ball must be put up; otherwise it stays untouched.
-        program: empty: the plain nominal circle.
-        number: in the sequence, from 1.
-        instructions: one step per entry.
         sampling: what the instrument sees at this feed; None if its rate is not known.
     """
 
@@ -109,11 +99,7 @@ class ReadingsSeen:
 
 @dataclass(frozen=True)
 class RunStarted:
-    """The bar is outside the circle; from now on every sample belongs to the run.
-
-    Attributes:
-        program: empty: the plain nominal circle.
-    """
+    """The bar is outside the circle; from now on every sample belongs to the run."""
 
     run: RunId
     program: str
@@ -129,11 +115,7 @@ class SamplesRecorded:
 
 @dataclass(frozen=True)
 class FeedInSeen:
-    """The bar came onto the circle.
-
-    Attributes:
-        t_s: since the run's first sample.
-    """
+    """The bar came onto the circle."""
 
     run: RunId
     t_s: float
@@ -141,12 +123,7 @@ class FeedInSeen:
 
 @dataclass(frozen=True)
 class RunProgress:
-    """Progress of the run, at most once per degree.
-
-    Attributes:
-        swept_deg: since the feed-in.
-        of_deg: from feed-in to feed-out, with both overshoots.
-    """
+    """Progress of the run, at most once per degree."""
 
     run: RunId
     swept_deg: float
@@ -160,10 +137,9 @@ class RunCompleted:
     Attributes:
         lost: samples lost by the line.
         problem: why it is unusable; empty if usable.
-        findings: of its circle; empty without one.
         doubtful: possibly damaged samples, kept but unused.
         to_come: circles of the plan that are still to be measured.
-        counts_beside: accepted run of the same test and direction that the plan does not ask for beside this one; or None.
+        counts_beside: accepted run of the same test and direction, counted besides the plan; or None.
     """
 
     run: RunId
@@ -197,11 +173,7 @@ class RunDoubted:
 
 @dataclass(frozen=True)
 class RunRestored:
-    """An older run still awaits its verdict.
-
-    Attributes:
-        samples: of its turn, in time order, thinned; may be empty.
-    """
+    """An older run still awaits its verdict."""
 
     run: RunId
     samples: tuple[Sample, ...]
@@ -217,12 +189,7 @@ class FeedInMissed:
 
 @dataclass(frozen=True)
 class Noted:
-    """Somebody noted something.
-
-    Attributes:
-        text: empty for a temperature alone.
-        ambient_temp_c: None if not read.
-    """
+    """A note or a temperature was added."""
 
     text: str
     ambient_temp_c: float | None
@@ -230,11 +197,7 @@ class Noted:
 
 @dataclass(frozen=True)
 class RunAccepted:
-    """The run counts.
-
-    Attributes:
-        reason: despite a finding; empty without one.
-    """
+    """The run counts."""
 
     run: RunId
     reason: str = ""
@@ -250,11 +213,7 @@ class RunRejected:
 
 @dataclass(frozen=True)
 class RunLate:
-    """The machine did not come; the run is announced again.
-
-    Attributes:
-        problem: what was waited for, and how long.
-    """
+    """The machine did not come; the run is announced again."""
 
     run: RunId
     problem: str
@@ -262,11 +221,7 @@ class RunLate:
 
 @dataclass(frozen=True)
 class CommandRefused:
-    """A command that the state does not take; nothing happened.
-
-    Attributes:
-        why: with an alternative.
-    """
+    """A command that the state does not take; nothing happened."""
 
     command: Command
     state: State
@@ -275,12 +230,7 @@ class CommandRefused:
 
 @dataclass(frozen=True)
 class SessionFinished:
-    """The sequence is through.
-
-    Attributes:
-        accepted: in the whole session.
-        missing: test and direction without an accepted run.
-    """
+    """The sequence is through."""
 
     accepted: int
     missing: tuple[str, ...]
@@ -288,10 +238,9 @@ class SessionFinished:
 
 @dataclass(frozen=True)
 class SessionStopped:
-    """Somebody quit.
+    """The user ended the sequence.
 
     Attributes:
-        accepted: in the whole session.
         left_to_do: planned runs without an accepted one.
         interrupted: kept as far as recorded; None if none.
     """
@@ -303,11 +252,7 @@ class SessionStopped:
 
 @dataclass(frozen=True)
 class Fault:
-    """Instrument or storage failed and the sequence ends; recordings are kept.
-
-    Attributes:
-        interrupted: kept as far as recorded; None if none.
-    """
+    """Instrument or storage failed and the sequence ends; recordings are kept."""
 
     error: StationError
     interrupted: RunId | None

@@ -1,4 +1,4 @@
-"""What a person has to do for a run, in words."""
+"""Instructions to the operator for a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def instructions(
     ball: Ball, circle: Circle, *, put_up: bool, program: str, sampling: Sampling | None = None
 ) -> tuple[str, ...]:
-    """Return the steps in order, and what the instrument is too slow for."""
+    """Return the steps in order, with a note if the instrument is too slow."""
     raised = f", raised by {circle.elevation_deg:g}°" if circle.elevation_deg else ", level"
     what = f"NC program {program}" if program else f"{circle.direction} circle"
     return (
@@ -25,7 +25,7 @@ def instructions(
 
 
 def too_slow(sampling: Sampling) -> str:
-    """Return what is not seen with so few points."""
+    """Return the figures that so few points do not resolve."""
     points = f"The instrument brings {sampling.points_per_turn:.0f} points per turn"
     if not sampling.is_circle:
         return f"{points}, which is no circle: take a lower feed"

@@ -36,12 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class JudgedRun:
-    """A run's content and verdict.
-
-    Attributes:
-        completed: figures and findings.
-        reason: of a rejection; may be empty.
-    """
+    """A run's content and verdict."""
 
     completed: events.RunCompleted
     accepted: bool
@@ -52,8 +47,6 @@ class RunJudge:
     """Judges runs beside counted ones; an observer of the station.
 
     Args:
-        writer: its judged runs are read now.
-        programs: by test and direction.
         model: gives expected circles; None: the nominal machine.
         former: the last session of machine and plan; None: none.
     """
@@ -113,11 +106,7 @@ class RunJudge:
         return tuple(found)
 
     def judge(self, run: events.RunId, recording: Recording) -> tuple[Finding, ...]:
-        """Return a new run's findings.
-
-        Args:
-            run: storage may not know it yet.
-        """
+        """Return a new run's findings."""
         entry = RunEntry(
             test=run.test,
             direction=run.direction,
@@ -149,7 +138,7 @@ class RunJudge:
         return self._doubted
 
     def _assigned(self, runs: list[Seen]) -> Assigned | None:
-        """Return all runs of the sitting together; None if the plan's circles are not known."""
+        """Return all runs of the session together; None if the plan's circles are unknown."""
         known = {(one.test, one.circle.direction) for one in self._circles}
         if any((one.run.test, one.run.circle.direction) not in known for one in runs):
             return None
@@ -176,7 +165,6 @@ class RunJudge:
         return FormerSitting(former.folder.name, max(dates), read)
 
     def _read(self, entry: RunEntry, into: dict[tuple[str, Direction, int], Seen]) -> None:
-        """Take in a recorded run; unreadable ones are reported elsewhere."""
         try:
             recording = self._writer.session.load(entry).recording
         except InputError:
@@ -188,7 +176,7 @@ class RunJudge:
 def _decided(
     findings: tuple[Finding, ...], one: Seen, assigned: Assigned, suspect: Finding | None
 ) -> tuple[Finding, ...]:
-    """Return findings with what all runs together decide."""
+    """Return findings with decisions by all runs together."""
     decided = []
     for finding in findings:
         if suspect is not None and finding.name is suspect.name:

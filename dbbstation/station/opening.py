@@ -99,7 +99,7 @@ def open_session(
 
 
 def last_end(session: SessionFolder) -> datetime | None:
-    """Return when the last run ended at the latest, or None."""
+    """Return the latest possible end of the last run, or None."""
     ends = [
         run.started + timedelta(seconds=2.0 * _turn_s(session, run.test, run.direction))
         for run in session.runs

@@ -31,11 +31,7 @@ _PHI_DEG = np.linspace(0.0, 359.0, 360)
 
 @dataclass(frozen=True)
 class RunProgram:
-    """A program that commands one run.
-
-    Attributes:
-        model_sha256: model of its compensation; empty if none.
-    """
+    """A program that commands one run."""
 
     name: str
     content: bytes

@@ -45,11 +45,7 @@ class RunRecall(Protocol):
 
 
 def recording_of(run: RunId, samples: Sequence[Sample]) -> Recording:
-    """Return samples of a run as a recording.
-
-    Args:
-        samples: in time order, each with a number.
-    """
+    """Return samples of a run as a recording."""
     return Recording(
         name=run.label,
         t_s=np.array([sample.t_s for sample in samples], dtype=np.float64),
@@ -63,13 +59,11 @@ class RunRecord:
     """One run while it is recorded.
 
     Attributes:
-        started_s: first sample on the driver's clock.
         fed_in_s: feed-in edge since the first sample; None before.
-        fed_out_s: likewise.
         lost: anywhere in the run.
         lost_on_turn: from feed-in to feed-out, with doubtful ones.
         doubtful: possibly damaged samples anywhere.
-        held: time that the length has stood still on the turn; knows the noise of earlier runs.
+        held: duration of the standstill on the turn, with noise from earlier runs.
     """
 
     run: RunId
@@ -122,9 +116,9 @@ class RunRecord:
         return live_phi_deg(self.circle, self._last_s - self.fed_in_s) + self.circle.overshoot_deg
 
     def stands(self, sample: Sample) -> bool:
-        """Add a sample on the turn and return whether the gauge does not follow the machine.
+        """Add a sample on the turn and return whether the gauge fails to follow the machine.
 
-        The length then stands still despite noise, or despite a due feed-out.
+        The length is then constant despite noise, or despite a due feed-out.
         """
         if self.fed_in_s is None or sample.phi_deg is None or sample.length_mm is None or sample.status != OK:
             return False
@@ -145,7 +139,7 @@ class RunRecord:
         return f"{stands} while the machine moved; {AFTER_HELD}"
 
     def left(self, t_s: float) -> bool:
-        """Return whether enough lies behind the feed-out at a time since the first sample."""
+        """Return whether enough time has passed since the feed-out."""
         rest_s = self.circle.feed_in_mm / 2.0 / (self.circle.feed_mm_min / 60.0)
         return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S
 
@@ -157,13 +151,7 @@ class RunRecord:
 def circle_figures(
     recording: Recording, circle: Circle, lost: int, lost_on_turn: int, largest_loss_percent: float
 ) -> tuple[CircleFigures | None, str]:
-    """Return the figures of a recorded circle, or None and the reason.
-
-    Args:
-        lost: anywhere in the run; 0 if not counted.
-        lost_on_turn: from feed-in to feed-out.
-        largest_loss_percent: share of samples that may be lost.
-    """
+    """Return the figures of a recorded circle, or None and the reason."""
     shown, kept = shown_lost(recording, circle)
     unusable = unusable_on_turn(recording, circle)
     if problem := too_many_lost(max(lost_on_turn, shown), kept, largest_loss_percent, unusable):

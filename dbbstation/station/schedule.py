@@ -29,7 +29,7 @@ class Task:
 
     @property
     def text(self) -> str:
-        """As people read it."""
+        """Return the task in words."""
         return f"{self.test} {self.direction}" + (" (repeated at the end)" if self.occurrence > 1 else "")
 
 
@@ -47,12 +47,7 @@ class NextRun:
 
 
 class Schedule:
-    """Counts runs and mountings.
-
-    Args:
-        next_repeat: the free repeat of a test and direction.
-        recorded: earlier runs of the session in starting order, of every state.
-    """
+    """Counts runs and mountings."""
 
     def __init__(
         self, plan: Plan, next_repeat: Callable[[str, Direction], int], recorded: Sequence[RunEntry] = ()
@@ -77,7 +72,7 @@ class Schedule:
 
     @property
     def accepted(self) -> int:
-        """Tasks that have an accepted recording."""
+        """Return tasks with an accepted recording."""
         return len(self.tasks) - len(self.open)
 
     @property
@@ -87,7 +82,7 @@ class Schedule:
         return tuple(task for task in self.tasks if task.occurrence > runs.count((task.test, task.direction)))
 
     def to_come(self, run: RunId) -> int:
-        """Return how many tasks without an accepted run are left beside a run's own."""
+        """Return the number of other tasks without an accepted run."""
         mine = self.tasks[self._place_of(run.test, run.direction)]
         return sum(task != mine for task in self.open)
 
@@ -118,11 +113,7 @@ class Schedule:
         return NextRun(run, put_up=not stands, number=self.tasks.index(task) + 1)
 
     def mounted(self, run: RunId, *, remounted: bool) -> RunId:
-        """Note that a run's ball stands; `remounted` makes a new mounting.
-
-        Returns:
-            The run with its mounting.
-        """
+        """Note that a run's ball is mounted, and return the run with its mounting; `remounted` makes a new one."""
         if remounted and run.mounting <= self._mountings:
             run = RunId(run.test, run.direction, run.repeat, self._mountings + 1)
         self._mountings = max(self._mountings, run.mounting)
@@ -176,7 +167,6 @@ class Schedule:
         return self.tasks[following[0]] if following else None
 
     def _place_of(self, test: str, direction: Direction) -> int:
-        """Return the place of the first open task of a test and direction, else of a skipped or done one."""
         mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (test, direction)]
         still = [k for k in mine if self.tasks[k] in self.open]
         return next((k for k in still if self.tasks[k] not in self._passed), (still or mine)[-1])

@@ -59,11 +59,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Waiting:
-    """A recorded run without verdict.
-
-    Attributes:
-        samples: of its turn, in time order, thinned; may be empty.
-    """
+    """A recorded run without verdict."""
 
     completed: events.RunCompleted
     samples: tuple[Sample, ...]
@@ -84,12 +80,8 @@ class Sequencer:
 
     Args:
         recorded: returns the complete current run.
-        programs: by test and direction; absent: the nominal circle.
-        patience: how long to wait for the machine.
         waiting: recorded runs without verdict, oldest first; judged before measuring.
-        judge: judges a run with a circle; None: no judging.
         doubted: accepted runs that the run just judged puts in doubt.
-        rate_hz: readings per second; None: not known.
     """
 
     def __init__(
@@ -267,7 +259,7 @@ class Sequencer:
         self._to_next(COMMAND_CAUSES[type(command)])
 
     def _take_back(self, command: Accept | Repeat) -> None:
-        """Take the doubted runs back; the first of them comes next."""
+        """Withdraw the doubted runs; the first of them comes next."""
         doubted = self._doubted if command.back else {}
         for run, finding in doubted.items():
             self.schedule.judge(run.test, run.direction, run.repeat, accepted=False)
@@ -417,7 +409,6 @@ class Sequencer:
             self._move(Trigger.LATE)
 
     def _complete(self, problem: str = "") -> bool:
-        """End the recording, for a given problem or its circle; return whether it holds one."""
         self._flush()
         record = self._record
         if record is None:
@@ -468,7 +459,6 @@ class Sequencer:
         self._out.append(events.StateChanged(self.state, commands_allowed(self.state)))
 
     def _flush(self) -> None:
-        """Report the samples so far."""
         if not self._samples:
             return
         samples, self._samples = tuple(self._samples), []

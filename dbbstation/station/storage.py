@@ -35,11 +35,7 @@ class Storage:
     """Writes a session as it happens; an observer of the station.
 
     Args:
-        now: with its zone.
-        programs: kept in the session, by test and direction.
-        unreadable: rejected bytes so far, by fault.
         asked: whether each reading is requested, so that its time has an own uncertainty.
-        instrument: None: not known.
     """
 
     def __init__(
@@ -94,9 +90,6 @@ class Storage:
     def recorded(self, run: events.RunId, behind: Sequence[events.Sample]) -> Recording:
         """Return the current run from its journal.
 
-        Args:
-            behind: last samples, not yet in the journal.
-
         Raises:
             InputError: the journal cannot be read, or was altered.
         """
@@ -122,7 +115,7 @@ class Storage:
             self._journal.sync_if_due()
 
     def close(self) -> None:
-        """Sync a current run as far as it came; its file stays a `.part`."""
+        """Sync the current run as it is; its file remains a `.part`."""
         if self._journal is None:
             return
         journal, self._journal = self._journal, None
@@ -176,10 +169,6 @@ def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Cal
     """Return a time of day that runs as fast as a scaled `clock`.
 
     It begins early enough to stay behind the computer's time.
-
-    Args:
-        clock: faster than real time [s].
-        last: start of a continued session's last run, a lower bound.
     """
     begun_s = clock()
     begun = datetime.now(UTC) - FASTER_BEGINS_BEFORE

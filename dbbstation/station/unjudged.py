@@ -1,4 +1,4 @@
-"""Runs that were recorded whole but not judged, because of a crash or a quit."""
+"""Complete runs without verdict, after a crash or a quit."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What operating systems do differently: files, locks, processes, signals, terminals. Nothing else in the program asks them.
+"""All that differs between operating systems: files, locks, processes, signals, terminals.
 
-Each module has one function for every system. A function of one system alone is looked for by its name, so that a process without
-these names runs as on the other system. docs/windows.md lists what has run on which.
+Each module has one function for every system. A system's own function is looked up by name, so that a process without
+that name behaves as on the other system. docs/windows.md lists what has run on which.
 """

@@ -1,4 +1,4 @@
-"""Processes that the program starts: apart from the folder they work in, bounded, and ended with all that they started."""
+"""Child processes: separate from their working folder, bounded, and ended with all their children."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _PATIENCE_S = 5.0
 
 @dataclass(frozen=True)
 class ProgramBounds:
-    """What a program and all that it starts may use.
+    """Bounds of a program and its children.
 
     Attributes:
         time_s: longest time [s].
@@ -50,24 +50,14 @@ class ProgramBounds:
 
 @dataclass(frozen=True)
 class ProgramEnd:
-    """How a program ended.
-
-    Attributes:
-        code: exit code.
-        said: end of its standard error.
-    """
+    """How a program ended."""
 
     code: int
     said: str
 
 
 class BoundExceededError(Exception):
-    """A program has used more than it may, and was ended.
-
-    Args:
-        what: it did, such as `takes longer than 2 s`.
-        of_time: the bound is the time's.
-    """
+    """A program has used more than it may, and was ended."""
 
     def __init__(self, what: str, *, of_time: bool = False) -> None:
         super().__init__(what)
@@ -83,9 +73,7 @@ def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> 
     """Run a program to its end.
 
     Args:
-        command: program and arguments.
-        folder: that it works in.
-        bounds: that it is ended at, with all processes that it started.
+        bounds: beyond these it is ended with all its children.
 
     Raises:
         BoundExceededError: it exceeds a bound.
@@ -111,11 +99,6 @@ def run_bounded(command: Sequence[str], folder: Path, bounds: ProgramBounds) -> 
 
 
 def _watch(process: subprocess.Popen[bytes], folder: Path, bounds: ProgramBounds, outputs: Sequence[_Output]) -> None:
-    """Wait for the end.
-
-    Raises:
-        BoundExceededError: a bound is exceeded first.
-    """
     until_s = time.monotonic() + bounds.time_s
     running = True
     while running:
@@ -132,7 +115,7 @@ def _watch(process: subprocess.Popen[bytes], folder: Path, bounds: ProgramBounds
 
 
 class _Output:
-    """Reads what a program writes, so that it never waits, and keeps the end."""
+    """Reads a program's output, so that it never waits, and keeps the end."""
 
     def __init__(self, stream: IO[bytes], most_mb: float) -> None:
         self.tail = b""
@@ -150,19 +133,19 @@ class _Output:
                     self.full.set()
 
     def close(self) -> None:
-        """Read the rest. If a process has left the group and holds the pipe open, the reader is given up."""
+        """Read the rest, but not if a process outside the group still holds the pipe."""
         self._reader.join(_PATIENCE_S)
         if not self._reader.is_alive():
             self._stream.close()
 
 
 def is_root() -> bool:
-    """Whether this program runs as the user who may do everything; Windows has none."""
+    """Return whether this user may do everything; False on Windows."""
     return hasattr(os, "geteuid") and os.geteuid() == 0
 
 
 def end_tree(process: subprocess.Popen[Any]) -> None:
-    """End a process that was started here and all that it started; does nothing if they have ended."""
+    """End a child process and all its children; does nothing if they have ended."""
     # The number of a process that has ended may belong to somebody else's by now.
     tree = list(_tree(process.pid)) if process.poll() is None else []
     if hasattr(os, "killpg"):
@@ -179,7 +162,7 @@ def end_tree(process: subprocess.Popen[Any]) -> None:
 
 
 def _tree(pid: int) -> Iterator[psutil.Process]:
-    """Yield a process and all that it started; none if it has ended."""
+    """Yield a process and all its children; none if it has ended."""
     with suppress(psutil.Error):
         root = psutil.Process(pid)
         yield from (*root.children(recursive=True), root)

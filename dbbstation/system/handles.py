@@ -1,4 +1,4 @@
-"""Files that are read and changed in place, through a number of the system."""
+"""Files read and changed in place, through a file descriptor."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
 
 def _flags(*names: str) -> int:
-    """Flags that this system has. Windows changes line ends without O_BINARY and has none of the others."""
     return sum(getattr(os, name, 0) for name in ("O_BINARY", "O_CLOEXEC", *names))
 
 
@@ -30,12 +29,12 @@ def open_to_read(path: Path) -> int:
 
 
 def may_write(folder: Path) -> bool:
-    """Whether the system lets this user make files in a folder, as far as it says beforehand."""
+    """Return whether the system seems to let this user make files in a folder."""
     return os.access(folder, os.W_OK)
 
 
 def open_private(path: str, flags: int) -> int:
-    """Open a file as `open` asks for it; if it is made, only its owner may read it."""
+    """Open a file as `open` does; a new one is readable by its owner only."""
     return os.open(path, flags | _flags(), 0o600)
 
 
@@ -43,8 +42,6 @@ def open_to_change(path: Path, *, create: bool = False, private: bool = False) -
     """Return the number of a file that is open for reading and writing; a link is refused.
 
     Args:
-        path: of the file.
-        create: make the file if it is missing.
         private: only its owner may read a file that is made.
 
     Raises:
@@ -78,5 +75,5 @@ def write_at(handle: int, data: bytes, at: int) -> None:
 
 
 def open_nothing() -> int:
-    """Return the number of the null device, open for both; it takes the lowest number that is free."""
+    """Return a descriptor of the null device, open for both; it takes the lowest free number."""
     return os.open(os.devnull, os.O_RDWR)

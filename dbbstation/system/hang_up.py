@@ -1,4 +1,4 @@
-"""A terminal that vanishes: the window was closed, the line to a remote computer broke, its server was killed."""
+"""A terminal that vanishes: a closed window, a broken connection, a killed server."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _FAILED = 1
 
 @contextmanager
 def ended_when_hung_up(last: Callable[[], None]) -> Iterator[None]:
-    """Watch the terminal, and leave the program when it has gone; does nothing if input is no terminal, or on Windows.
+    """Watch the terminal, and leave the program when it has gone; does nothing without a terminal, or on Windows.
 
-    The screen's own output stops at the first write that fails and then makes the program wait for ever, and the kernel's
-    signal may go to a shell that keeps it. Windows ends the programs of a console that closes.
+    The screen's own output stops at the first failing write and then blocks, and the kernel's signal may go to a shell
+    that keeps it. Windows ends the programs of a closing console.
 
     Args:
-        last: ends the work, in a thread of its own, if the screen does not end by itself.
+        last: ends the work, in its own thread, if the screen does not end by itself.
     """
     if not hasattr(select, "poll") or not sys.stdin.isatty():
         yield

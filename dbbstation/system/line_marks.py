@@ -1,4 +1,4 @@
-"""A serial driver marks damaged characters and reports errors of its own, on systems that have termios."""
+"""Marks of damaged characters by a serial driver, on systems with termios."""
 
 from __future__ import annotations
 
@@ -20,9 +20,6 @@ def mark_damaged(descriptor: int) -> bool:
     """Let the driver mark characters with a wrong parity or stop bit; return whether it does.
 
     INPCK and PARMRK, IEEE Std 1003.1-2017, 11.2.2 Input Modes. Windows marks nothing.
-
-    Args:
-        descriptor: of an open port, behind its last change of settings.
     """
     if not HAS_TERMIOS:
         return False

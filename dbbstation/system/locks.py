@@ -21,10 +21,8 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.
 def lock(handle: int) -> bool:
     """Lock an open file; return False if its file system has no locks.
 
-    POSIX: flock(2). Windows: `_locking` with LK_NBLCK, Microsoft C Runtime Reference, "_locking"; it may lock bytes behind the end.
-
-    Args:
-        handle: number of the file, open for writing.
+    POSIX: flock(2). Windows: `_locking` with LK_NBLCK, Microsoft C Runtime Reference, "_locking"; it may lock bytes
+    behind the end.
 
     Raises:
         BlockingIOError: another process has locked it.

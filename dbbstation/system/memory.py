@@ -19,7 +19,6 @@ def forget_largest_memory() -> None:
 
 
 def _give_back_what_is_free() -> None:
-    """Give freed pages back to the system (malloc_trim(3))."""
     if sys.platform != "linux":
         return
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)

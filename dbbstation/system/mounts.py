@@ -10,7 +10,7 @@ _MOUNTS = Path("/proc/self/mounts")
 
 
 def free_bytes(path: Path) -> int | None:
-    """Return the free room where a file or folder is or would be made; None if the system does not say."""
+    """Return the free space for a file or folder; None if unknown."""
     for folder in (path, *path.absolute().parents):
         with suppress(OSError):
             return shutil.disk_usage(folder).free
@@ -18,11 +18,7 @@ def free_bytes(path: Path) -> int | None:
 
 
 def file_system(path: Path) -> str:
-    """Return the kind of file system that a path lies on, such as `nfs4`; empty if the system does not say.
-
-    Args:
-        path: absolute, links followed.
-    """
+    """Return the kind of file system of an absolute path, such as `nfs4`; empty if unknown."""
     if str(path).startswith("\\\\"):  # Windows: a folder of another computer
         return "cifs"
     try:

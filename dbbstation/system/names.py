@@ -1,4 +1,4 @@
-"""Names of files that every system takes."""
+"""File names that every system accepts."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("co
 
 
 def is_device(name: str) -> bool:
-    """Whether Windows takes a name for a device."""
+    """Return whether Windows takes a name for a device."""
     return name.partition(".")[0].lower() in DEVICES

@@ -1,4 +1,4 @@
-"""Which program has a port open, where the system tells."""
+"""Programs that have a port open, if the system tells."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ def holders(port: str, proc: Path = _PROC) -> list[str]:
     """Return name and number of every other process that has a port open, as `minicom (process 4711)`.
 
     Linux tells of processes of the same user, and to root of all; elsewhere the list is empty.
-
-    Args:
-        proc: folder of the system's processes.
     """
     target = os.path.realpath(port)
     others = [one for one in _entries(proc) if one.name.isdecimal() and int(one.name) != os.getpid()]

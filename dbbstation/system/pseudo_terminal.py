@@ -17,12 +17,7 @@ else:
 
 
 class PtyEnd:
-    """A pseudo-terminal; this side is the master, the program opens the slave by name.
-
-    Attributes:
-        port: name of the slave.
-        connected: whether a program has the slave open, as of the last `wait` or `read`.
-    """
+    """A pseudo-terminal; this side is the master, the program opens the slave by name."""
 
     def __init__(self) -> None:
         self._master, slave = os.openpty()
@@ -34,7 +29,7 @@ class PtyEnd:
         self.connected = False
 
     def wait(self, real_s: float) -> bool:
-        """Wait at most so long for bytes; return whether there is something to read."""
+        """Wait at most this long for bytes; return whether there are any."""
         poller = select.poll()
         poller.register(self._master, select.POLLIN)
         # Without a program at the other end poll returns at once, so it is asked first and slept apart.
@@ -60,14 +55,14 @@ class PtyEnd:
             return b""
 
     def write(self, raw: bytes) -> int:
-        """Send what the line takes at once; return how many bytes that was."""
+        """Send as much as the line takes at once; return the number of bytes."""
         try:
             return os.write(self._master, raw)
         except BlockingIOError:
             return 0
 
     def host_baud(self) -> int | None:
-        """Return the rate that the other side is set to."""
+        """Return the rate set by the other side."""
         return _RATES.get(termios.tcgetattr(self._master)[5])
 
     def close(self) -> None:

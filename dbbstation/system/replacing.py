@@ -1,4 +1,4 @@
-"""Files that take another file's place, and files that go; on Windows another program may hold them for a moment."""
+"""Replace and remove files; on Windows another program may hold them for a moment."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HELD = {5, 32, 33}
 def replace(path: Path, target: Path) -> None:
     """Give a file the name of another one, which it replaces.
 
-    Windows replaces no file that may only be read, and none that a program has open.
+    Windows replaces no read-only file, and none that a program has open.
 
     Raises:
         OSError: the system refuses; both files are as before.
@@ -70,7 +70,7 @@ def remove(path: Path) -> None:
 
 
 def remove_tree(folder: Path) -> None:
-    """Remove a folder and all that it holds, as far as the system allows."""
+    """Remove a folder and its content, as far as the system allows."""
     for path in folder.rglob("*"):
         with contextlib.suppress(OSError):
             if path.is_file() and not path.is_symlink() and not path.stat().st_mode & stat.S_IWUSR:
@@ -89,7 +89,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _made_writable(path: Path, error: OSError) -> bool:
-    """Let a file that may only be read be replaced; only Windows asks for that."""
+    """Make a read-only file replaceable, as Windows requires."""
     if getattr(error, "winerror", None) not in _HELD or not path.is_file():
         return False
     if path.stat().st_mode & stat.S_IWUSR:

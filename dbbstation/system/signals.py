@@ -1,4 +1,4 @@
-"""Signals that end a program: Ctrl-C, a polite kill, a terminal that is closed."""
+"""Signals that end a program: Ctrl-C, a polite kill, a closed terminal."""
 
 from __future__ import annotations
 
@@ -23,12 +23,7 @@ CLOSED = tuple(getattr(signal, name) for name in ("SIGHUP", "SIGBREAK") if hasat
 
 @contextmanager
 def answered(numbers: Sequence[signal.Signals], answer: Callable[[signal.Signals], object]) -> Iterator[None]:
-    """Answer signals with a function while the context lasts.
-
-    Args:
-        numbers: of the signals.
-        answer: called with the signal, between two instructions of the main thread.
-    """
+    """Answer signals with a function while the context lasts."""
     before = {number: signal.signal(number, lambda got, _frame: answer(signal.Signals(got))) for number in numbers}
     try:
         yield
@@ -38,16 +33,16 @@ def answered(numbers: Sequence[signal.Signals], answer: Callable[[signal.Signals
 
 
 def interrupt_on(*numbers: signal.Signals) -> None:
-    """Let signals raise KeyboardInterrupt from now on, also if a shell made the program deaf to them."""
+    """Let signals raise KeyboardInterrupt from now on, even if a shell made the program ignore them."""
     for number in numbers:
         signal.signal(number, signal.default_int_handler)
 
 
 @contextmanager
 def politely_ended() -> Iterator[None]:
-    """Turn a polite kill and a closed terminal into KeyboardInterrupt: half-written files go, processes end, the log says so.
+    """Turn a polite kill and a closed terminal into KeyboardInterrupt, so that half-written files go, processes end, and the log is written.
 
-    What `nohup` made the program deaf to stays so.
+    Signals ignored by `nohup` stay ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -63,10 +58,10 @@ def politely_ended() -> Iterator[None]:
 
 @contextmanager
 def starting() -> Iterator[None]:
-    """Processes that start now ignore Ctrl-C as long as they live, and load no module of the working folder.
+    """Make child processes ignore Ctrl-C for life, and load no module of the working folder.
 
-    This process alone answers Ctrl-C. A folder that somebody handed over may hold a `random.py`; PYTHONSAFEPATH keeps
-    it out of the first imports of a process (Python, "Command line and environment").
+    Only this process answers Ctrl-C. A received folder may contain a `random.py`; PYTHONSAFEPATH keeps it out of the
+    first imports of a process (Python, "Command line and environment").
     """
     safe = os.environ.setdefault(_SAFE, _OURS) == _OURS
     ignored = threading.current_thread() is threading.main_thread()
@@ -81,7 +76,7 @@ def starting() -> Iterator[None]:
 
 
 def started() -> None:
-    """Let programs that a process of ours starts find modules as users expect; to be called first in such a process."""
+    """Let user programs in a child process find modules as usual; call it first in such a process."""
     if os.environ.get(_SAFE) == _OURS:
         del os.environ[_SAFE]
 

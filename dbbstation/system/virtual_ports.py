@@ -1,4 +1,4 @@
-"""Ports at which a virtual instrument of this computer answers, marked by files with its process's number."""
+"""Ports of virtual instruments on this computer, marked by files with the process's number."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def marked_virtual(port: str) -> Iterator[None]:
 def is_virtual(port: str) -> bool:
     """Return whether a running program of this computer has marked the port.
 
-    Through a bridge or a replay it cannot be known.
+    Bridges and replays are not detected.
     """
     try:
         process = int(_mark(port).read_text(encoding="ascii"))

@@ -27,7 +27,6 @@ class CircleFigures:
 
     Attributes:
         centre_mm: least-squares centre from the fixed ball, X and Y.
-        mean_radial_error_um: mean less nominal bar length, about the commanded centre.
         circularity_um: range of radial deviation after least-squares centring.
     """
 
@@ -37,22 +36,19 @@ class CircleFigures:
 
     @property
     def centre_deviation_um(self) -> float:
-        """Length of the centre offset [µm]."""
+        """Return the length of the centre offset [µm]."""
         return 1e3 * float(np.hypot(*self.centre_mm))
 
 
 def best_circle(
     theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64], near_mm: NDArray[np.float64] | None = None
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
-    """Return the least-squares circle through polar points [CAL eq 6], by Gauss-Newton.
+    """Return centre, shape (2,) [mm], radius [mm] and deviations, shape (n,) [mm], of the least-squares circle [CAL eq 6].
+
+    Polar points are fitted by Gauss-Newton.
 
     Args:
-        theta_deg: shape (n,).
-        radius_mm: from the origin, shape (n,).
-        near_mm: approximate centre, shape (2,), to save steps; None: the origin.
-
-    Returns:
-        Centre (x, y), shape (2,) [mm]; radius [mm]; radial deviations of the points, shape (n,) [mm].
+        near_mm: approximate centre, shape (2,), to save steps.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -115,12 +111,8 @@ class BallPath:
 def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64]) -> BallPath:
     """Return a path's least-squares circle, each point at its angle about the fixed ball.
 
-    Commanded angles count about the commanded centre. Seen from a ball at distance c a point turns by c/R. At commanded
-    angles a perfect circle would have the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13 µm at 2 mm.
-
-    Args:
-        theta_deg: commanded, shape (n,).
-        radius_mm: from the fixed ball in the circle's plane, shape (n,).
+    Commanded angles refer to the commanded centre. From a ball at distance c a point turns by c/R. At commanded angles
+    a perfect circle would have the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13 µm at 2 mm.
 
     Raises:
         TraceError: the points do not determine a circle.

@@ -48,14 +48,7 @@ def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.f
 def by_angle(
     raw: RawCircle, curves: Sequence[NDArray[np.float64]], sectors: int
 ) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Return sector means of the turn by rising angle, for drawing.
-
-    Args:
-        curves: shape (n,) each.
-
-    Returns:
-        Angle from +X towards +Y, shape (s,) [deg], and each curve, shape (s,).
-    """
+    """Return rising angles from +X towards +Y [deg] and sector means of curves, shape (s,) each, for drawing."""
     sector = sector_of(raw, sectors)
     theta = np.mod(raw.circle.theta_deg(means(raw.phi_deg, sector)), FULL_TURN_DEG)
     order = np.argsort(theta)

@@ -21,7 +21,6 @@ class RawCircle(WithLogged):
     """One full turn of raw lengths in time order, shapes (n,).
 
     Attributes:
-        name: for messages.
         t_s: since the recording's first sample.
         phi_deg: along the turn, 0 to 360.
         logged: by column.
@@ -41,7 +40,7 @@ class RawCircle(WithLogged):
 
     @property
     def theta_deg(self) -> NDArray[np.float64]:
-        """Angle from +X towards +Y, within 0 to 360 [deg]."""
+        """Return the angle from +X towards +Y, within 0 to 360 [deg]."""
         return np.mod(self.circle.theta_deg(self.phi_deg), 360.0)
 
 

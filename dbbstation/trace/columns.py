@@ -41,10 +41,8 @@ class Column:
     """One numeric column.
 
     Attributes:
-        meaning: one line with the sign.
         decimals: written by the station.
         size: greatest plausible absolute value.
-        of: sensor or motor, as in `strut3`; may be empty.
     """
 
     name: str

@@ -145,11 +145,7 @@ def _turn(recording: Recording, circle: Circle) -> RawCircle:
 
 
 def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float]) -> NDArray[np.float64]:
-    """Return each sample's progress by the programmed feed, 0 at the turn's start, shape (n,) [deg].
-
-    Args:
-        edges: feed-in and feed-out [s].
-    """
+    """Return each sample's progress by the programmed feed, 0 at the turn's start, shape (n,) [deg]."""
     return FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
 
 
@@ -267,9 +263,6 @@ def feed_off(found: tuple[float, float], recording: Recording, circle: Circle, e
     """Return how far a feed that the overlap shows is off, in units of its limit.
 
     A larger circle at the programmed feed takes longer: the angle rises with bar length over mean length.
-
-    Args:
-        found: feed and standard uncertainty [mm/min].
     """
     t, length = recording.good.t_s, recording.good.length_mm
     larger = circle.bar_mm / float(np.median(length[(t > edges[0]) & (t < edges[1])]))
@@ -278,12 +271,9 @@ def feed_off(found: tuple[float, float], recording: Recording, circle: Circle, e
 
 
 def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
-    """Return feed and standard deviation [mm/min] that match both passes of the overlap, cached.
+    """Return feed and standard deviation [mm/min] that match both passes of the overlap, cached; None if undetermined.
 
     The search starts at the programmed feed and at that of the duration.
-
-    Returns:
-        None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
     """
     found = _found_feed(recording, circle, edges)
     return None if found is None else (found[0], found[1])
@@ -292,15 +282,9 @@ def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float
 def overlap_feed_under(
     recording: Recording, circle: Circle, edges: tuple[float, float], noise_mm: float
 ) -> tuple[float, float] | None:
-    """Return the overlap's feed and standard uncertainty [mm/min] under known noise.
+    """Return the overlap's feed and standard uncertainty [mm/min] under known noise; None if undetermined.
 
     Scatter of pieces understates correlated noise; the turn's noise counts if larger.
-
-    Args:
-        noise_mm: white noise per sample of equal effect on slow figures.
-
-    Returns:
-        None where the overlap cannot tell, as of `overlap_feed`.
     """
     found = _found_feed(recording, circle, edges)
     if found is None:
@@ -350,10 +334,6 @@ def _match(
 
     If the second pass comes T later, the difference is offset + slope (T - turn): regression on the common slope,
     repeated.
-
-    Returns:
-        The duration, its standard deviation [s], what is left [mm], and the standard deviation for each millimetre of white noise
-        [s/mm].
     """
     half_s = circle.overshoot_deg / FULL_TURN_DEG * start_s
     t, length = recording.good.t_s - middle, recording.good.length_mm
@@ -387,7 +367,6 @@ def _match(
 
 
 def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Return a function for the mean slope of smooth curves in each piece, at fixed times."""
     middle, half_s = 0.5 * (t_s[0] + t_s[-1]), 0.5 * (t_s[-1] - t_s[0])
     powers = np.polynomial.polynomial.polyvander((t_s - middle) / half_s, SHAPE_ORDER)
     orthogonal, upper = np.linalg.qr(powers)
@@ -401,9 +380,6 @@ def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.f
 
     Of a longer run the first whole turn from the plan's start counts, else the middle one. Slight overlaps at its ends do
     not move across.
-
-    Args:
-        theta_deg: from +X towards +Y, in order of time, with or without steps of a turn, shape (n,).
     """
     travelled = circle.direction.sign * (np.unwrap(theta_deg, period=FULL_TURN_DEG) - circle.start_deg)
     first, last = float(travelled.min()), float(travelled.max())

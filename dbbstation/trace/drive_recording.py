@@ -15,7 +15,6 @@ class DriveRecording:
     """Samples of one drive, in time order.
 
     Attributes:
-        t_s: rising, shape (n,).
         position_mm: along the axis, shape (n,).
         force_n: driving, positive towards greater positions, shape (n,).
     """

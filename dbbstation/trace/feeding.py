@@ -34,7 +34,6 @@ class FeedingWay:
     """A feed-in or a feed-out.
 
     Attributes:
-        phi_deg: of its corner along the turn.
         way_um: length outside less at the corner.
     """
 
@@ -46,12 +45,7 @@ class FeedingWay:
 def feeding_ways(
     recording: Recording, circle: Circle, edges: tuple[float, float]
 ) -> tuple[FeedingWay, FeedingWay] | None:
-    """Return feed-in and feed-out ways by the readings, or None for too few samples.
-
-    Args:
-        recording: whole, without angles.
-        edges: from `trace.cut.edges_of` [s].
-    """
+    """Return feed-in and feed-out ways by the readings, or None for too few samples."""
     good = recording.good
     phi = progress_deg(good, circle, edges)
     begin = _way(good, circle, good.t_s - edges[0], phi + circle.overshoot_deg)

@@ -21,9 +21,6 @@ def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArra
     """Return an undulation's transmitted share, 0.5 at the cut-off.
 
     exp(-π (α k / k_c)²), α = sqrt(ln 2 / π), which is 2^-(k / k_c)² [ISO 16610-21:2011, 5.3].
-
-    Args:
-        undulations: per revolution, shape (k,).
     """
     return np.asarray(np.exp2(-((undulations / cut_off_upr) ** 2)), dtype=np.float64)
 
@@ -34,8 +31,6 @@ def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_of
     Each sample counts by its arc.
 
     Args:
-        theta_deg: of a full turn, shape (n,).
-        values: shape (n,), any unit.
         cut_off_upr: half of whose amplitude passes.
     """
     cells = max(LEAST_CELLS, 1 << int(np.ceil(np.log2(CELLS_PER_SAMPLE * len(theta_deg)))))

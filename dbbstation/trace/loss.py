@@ -17,11 +17,7 @@ _REGULAR = 0.9
 
 
 def lost_samples(t_s: NDArray[np.float64]) -> int:
-    """Return missing samples by times of a fixed rate; 0 without a fixed rate.
-
-    Args:
-        t_s: rising, shape (n,).
-    """
+    """Return missing samples by times of a fixed rate; 0 without a fixed rate."""
     if len(t_s) < _FEWEST:
         return 0
     periods = np.diff(t_s)

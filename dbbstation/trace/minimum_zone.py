@@ -43,7 +43,7 @@ class MinimumZone:
 
     @property
     def width_mm(self) -> float:
-        """Their radial separation [mm]."""
+        """Return their radial separation [mm]."""
         return self.outer_mm - self.inner_mm
 
 
@@ -53,9 +53,6 @@ def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
     Two outer and two inner points determine it, with crossing chords [Rivlin, Approximation by circles, Computing 21
     (1979)]; its centre is where two bisectors meet. All pairs of a few points are tried, and protruding points join them
     until none is left.
-
-    Args:
-        points_mm: round the origin, shape (n, 2).
 
     Raises:
         TraceError: fewer than four different points.
@@ -74,7 +71,6 @@ def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
 
 
 def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return farthest and nearest point of each sector."""
     # Sorting all points takes longer than the search: those of a sound path differ from the first.
     first = points_mm[:FEWEST_POINTS]
     if len(np.unique(first, axis=0)) < FEWEST_POINTS and len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
@@ -116,7 +112,6 @@ def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _widths(centres_mm: NDArray[np.float64], points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the zone's width about each centre, shape (centres,) [mm]."""
     # Points first: ranges are then taken row by row of a thousand centres, not centre by centre of a dozen points.
     across, along = (points_mm[:, k, None] - centres_mm[:, k] for k in (0, 1))
     return np.asarray(np.ptp(np.sqrt(across * across + along * along), axis=0))

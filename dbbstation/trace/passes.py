@@ -26,12 +26,7 @@ FEWEST_SAMPLES = 20
 
 @dataclass(frozen=True, eq=False)
 class Passes:
-    """Second pass less first.
-
-    Attributes:
-        phi_deg: of the first pass, from the turn's start, shape (n,).
-        apart_um: shape (n,).
-    """
+    """Second pass less first."""
 
     phi_deg: NDArray[np.float64]
     apart_um: NDArray[np.float64]

@@ -37,15 +37,13 @@ AGREEING = 3
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """Time [s], length [mm] and time uncertainty [s] of a reading."""
-
     t_s: float
     length_mm: float
     t_uncertainty_s: float
 
 
 class Reachable:
-    """Tells possible lengths from others, in time order.
+    """Separates possible lengths from impossible ones, in time order.
 
     Args:
         circle: None: the bar rests on its calibrator.
@@ -69,11 +67,7 @@ class Reachable:
 
     @classmethod
     def standing(cls, lengths_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which readings of a resting bar are possible, shape (n,).
-
-        Args:
-            lengths_mm: in time order, shape (n,).
-        """
+        """Return which readings of a resting bar are possible, shape (n,)."""
         bar = cls(None)
         bar.note(0.0, float(np.median(lengths_mm)))
         return np.array([not bar.doubt(0.0, float(one), on_turn=False) for one in lengths_mm], dtype=np.bool_)
@@ -106,6 +100,5 @@ class Reachable:
         return abs(one.length_mm - before.length_mm) <= self._limit_mm(before, one, on_turn=on_turn)
 
     def _limit_mm(self, before: _Seen, one: _Seen, *, on_turn: bool) -> float:
-        """Return the allowed change between two readings [mm]."""
         longest_s = one.t_s - before.t_s + HALF_WIDTH * (one.t_uncertainty_s + before.t_uncertainty_s)
         return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(longest_s, 0.0) + SUDDEN_MM

@@ -20,7 +20,6 @@ class Recording(WithLogged):
     """Samples of one run in time order, shapes (n,).
 
     Attributes:
-        name: for messages, its file if any.
         t_s: host time since the first sample, strictly rising.
         length_mm: between ball centres, raw.
         theta_deg: commanded, from +X towards +Y, of a cut recording; None: find the circle in the trace.

@@ -37,7 +37,6 @@ def steady(readings_mm: NDArray[np.float64], resolution_mm: float | None = None)
     resolution adds d / sqrt(12) [GUM F.2.2.1].
 
     Args:
-        readings_mm: in time order, shape (n,), at least twenty.
         resolution_mm: None: the smallest difference.
 
     Raises:

@@ -15,15 +15,10 @@ if TYPE_CHECKING:
 def logged_curve(
     runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return temperature over a session: two points per run, the smoothest curve within the resolution.
+    """Return a session's temperature curve: rising times [s] and temperatures [degC], two points per run, shape (q,) each.
 
-    Of all curves within half a step of each half run's mean, the least bent is taken. Changes within half a run are lost.
-
-    Args:
-        runs: times [s] and temperatures [degC] of each run, shape (n,) each.
-
-    Returns:
-        Rising times [s] and temperatures [degC], shape (q,) each, two for each run.
+    Of all curves within half a step of each half run's mean, the least bent is taken. Changes within half a run are
+    lost.
     """
     halves = [half for run in runs for half in zip(*(np.array_split(one, 2) for one in run), strict=True)]
     means = {float(one.mean()): float(degc.mean()) for one, degc in halves if len(one)}

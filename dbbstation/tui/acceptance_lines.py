@@ -86,7 +86,6 @@ def _circle(worst: WorstCircle) -> str:
 
 
 def _expanded(worst: WorstCircle | None) -> str:
-    """Return U of a circle as text, or `NOT_BEFORE` if it has none."""
     u_um = None if worst is None else worst.expanded_um
     return texts.NOT_BEFORE if u_um is None else f"{u_um:.1f}"
 

@@ -72,7 +72,6 @@ class AcceptanceScreen(RowScreen):
         return super().check_action(action, parameters)
 
     def chosen_another(self) -> None:
-        """Tell of the row that the cursor is on."""
         self._draw()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
@@ -129,7 +128,6 @@ class AcceptanceScreen(RowScreen):
             self.refresh_bindings()
 
     def _sentence(self) -> tuple[str, bool]:
-        """Return the sentence at the top, and whether it reports a fault."""
         result = self._after.results[SessionTask.ACCEPTANCE]
         if self._failure:
             return self._failure, True
@@ -158,7 +156,6 @@ class AcceptanceScreen(RowScreen):
         return Content("" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now)))
 
     def _notes(self, answer: AcceptanceAnswer | None) -> list[Content]:
-        """Return the notes below the list."""
         after = self._after
         told = [] if answer is None else [Content(text) for text in worst_lines(answer)]
         if self._found is not None:

@@ -78,7 +78,7 @@ class Sequence(Protocol):
 
     @property
     def alive(self) -> bool:
-        """Whether a sequence is being run."""
+        """Return whether a sequence is running."""
 
     @property
     def crash(self) -> Exception | None:
@@ -91,7 +91,7 @@ class Sequence(Protocol):
         """Send a command; return whether it was taken."""
 
     def mail(self) -> list[Event | SequenceOpened]:
-        """Return what has come since the last call."""
+        """Return events since the last call."""
 
     def wait(self) -> None:
         """Wait until an ended sequence has released the session."""
@@ -104,9 +104,7 @@ class StationApp(App[None]):
     """Screens on one board.
 
     Args:
-        shown: None: the start screen chooses what is measured.
-        runner: started with the screen; None if `front` opens it.
-        clock: real time, for stale readings [s].
+        shown: None: the start screen chooses the measurement.
         front: finds sessions and opens jobs; None: only `runner`.
         operated: the operator's one job; None: everything.
     """
@@ -170,7 +168,6 @@ class StationApp(App[None]):
         self.set_interval(LOOK_S, self.look)
 
     async def on_event(self, event: ScreenEvent) -> None:
-        """Take keys only while a screen exists: Textual asks the top screen unchecked."""
         if self.screen_stack or not isinstance(event, InputEvent | Paste):
             await super().on_event(event)
 
@@ -212,7 +209,6 @@ class StationApp(App[None]):
             self._end()
 
     def _answer_job(self, operated: Operated) -> None:
-        """Show the answer on a finished job, after asking for the temperature if wanted."""
         self._answering = True
         folder = Path(self.board.session)
         missing = self.board.finished.missing if self.board.finished is not None else ()
@@ -237,7 +233,6 @@ class StationApp(App[None]):
         return None if self._runner is None else self._runner.crash
 
     def _look_up_last(self) -> None:
-        """Read the circles of the session before, once a test."""
         board, folder = self.board, Path(self.board.session)
         if not board.session or not board.test or self._looked_up == (folder, board.test):
             return
@@ -282,7 +277,6 @@ class StationApp(App[None]):
         self.do(begin, self._measure, refused)
 
     def _measure(self, opened: Opened) -> None:
-        """Show the measuring screen and begin."""
         self._opening = False
         plan = opened.prepared.job.plan
         self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests)
@@ -298,7 +292,6 @@ class StationApp(App[None]):
             self.pop_screen()
 
     def _end(self) -> None:
-        """Close the measurement and return to the start screen."""
         self._leaving = False
         start = self.screen_stack[0] if self.screen_stack else None
         if (
@@ -330,7 +323,6 @@ class StationApp(App[None]):
         return next((screen for screen in reversed(self.screen_stack) if isinstance(screen, BoardScreen)), None)
 
     def draw(self) -> None:
-        """Draw the board while a screen exists."""
         drawn = self.drawn
         if drawn is not None and drawn.is_mounted:
             drawn.draw()
@@ -343,7 +335,6 @@ class StationApp(App[None]):
             self._runner.send(command)
 
     def _judge_afterwards(self, command: Judge) -> None:
-        """Note a verdict and restart the sequence, which repeats what no longer counts."""
         runner, folder = self._runner, Path(self.board.session)
         if runner is None:
             return
@@ -374,7 +365,6 @@ class StationApp(App[None]):
 
     @property
     def _measuring(self) -> bool:
-        """Return whether the top screen belongs to the machine."""
         top = self.screen_stack[-1] if self.screen_stack else None  # none while it closes
         return self._runner is not None and not isinstance(top, RowScreen | AnswerScreen)
 
@@ -506,7 +496,7 @@ class StationApp(App[None]):
         self.leave(sure=True)
 
     def give_up(self) -> None:
-        """End the sequence from another thread while the screen is stuck."""
+        """End the sequence from another thread if the screen does not respond."""
         if self._runner is not None:
             self._runner.close()
 

@@ -29,11 +29,7 @@ _NAME = 30
 
 
 class BarScreen(RowScreen):
-    """Owns the instrument until it is left.
-
-    Args:
-        then: receives the file of the calibration.
-    """
+    """Owns the instrument until it is left."""
 
     help_name = "bar"
 
@@ -142,7 +138,6 @@ class BarScreen(RowScreen):
         )
 
     def _reads_mm(self) -> float | None:
-        """Return the bar's reading [mm]; None without a sound one."""
         reading = None if self._calibration is None else self._calibration.latest
         return None if reading is None or reading.status == DOUBTFUL else reading.length_mm
 

@@ -59,24 +59,14 @@ _FONT = {
 
 
 def largest(texts: Sequence[str], width: int, height: int) -> tuple[int, int]:
-    """Return the size of a point [columns, rows] with which all texts fit.
-
-    Args:
-        texts: one line each.
-    """
+    """Return the size of a point [columns, rows] with which all texts fit."""
     points = max(len(_points(text)[0]) for text in texts)
     wide, high = max(width // points, 1), max(height // HIGH, 1)
     return min(wide, _FLATTEST * high), min(high, wide)
 
 
 def block_rows(text: str, wide: int, high: int) -> list[str]:
-    """Return the rows of a text in large letters; unknown characters become question marks.
-
-    Args:
-        text: letters, digits and `.-+?`; small letters become large ones.
-        wide: columns of a point, at least 1.
-        high: rows of a point, at least 1.
-    """
+    """Return the rows of a text in large letters; unknown characters become question marks."""
     rows = []
     for points in _points(text):
         row = "".join(("█" if point == "#" else " ") * wide for point in points)

@@ -65,17 +65,12 @@ class BoardScreen(ExplainedScreen):
             self.refresh_bindings()
 
     def keys(self) -> object:
-        """Return what decides the active keys."""
         board = self.desk.board
         return board.allowed, board.state, board.fault is None
 
 
 class RunScreen(BoardScreen):
-    """A screen at the machine; its keys command the present run.
-
-    Args:
-        clock: real time, for stale readings [s].
-    """
+    """A screen at the machine; its keys command the present run."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
@@ -125,7 +120,6 @@ class RunScreen(BoardScreen):
         return board.completed.answer.word is Advice.CANNOT_TELL
 
     def keys(self) -> object:
-        """Return what decides the active keys, with the word on the run."""
         return super().keys(), self._undecided, bool(self.desk.board.doubted)
 
     def action_next(self) -> None:
@@ -134,7 +128,7 @@ class RunScreen(BoardScreen):
         self.desk.send(Repeat(back=back) if self._faulty else Accept(back=back))
 
     def action_undecided(self) -> None:
-        """Accept a run of which not every fault would show."""
+        """Accept a run in which some faults would be invisible."""
         completed = self.desk.board.completed
         if completed is not None:
             self.desk.send(Accept(f"not to be seen: {', '.join(completed.answer.unseen)}"))
@@ -168,12 +162,7 @@ class RunScreen(BoardScreen):
 
 
 def ask_to_give_up(screen: BoardScreen, act: str, then: Callable[[bool | None], None]) -> None:
-    """Ask whether to give up the recording; one question at a time.
-
-    Args:
-        act: a capitalised verb.
-        then: receives the answer.
-    """
+    """Ask whether to give up the recording; one question at a time."""
     if isinstance(screen.app.screen, GiveUpQuestion):
         return
     announced = screen.desk.board.announced

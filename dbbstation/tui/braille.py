@@ -33,12 +33,7 @@ def empty(columns: int, rows: int) -> Plane:
 
 
 def light(plane: Plane, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-    """Raise dots at points inside the plane.
-
-    Args:
-        x: dots from the left edge, shape (n,).
-        y: dots from the upper edge, shape (n,).
-    """
+    """Raise dots at points inside the plane."""
     with np.errstate(invalid="ignore"):
         inside = (x >= 0.0) & (x < plane.shape[1]) & (y >= 0.0) & (y < plane.shape[0])
     plane[y[inside].astype(np.intp), x[inside].astype(np.intp)] = True
@@ -48,13 +43,6 @@ def connect(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.
     """Return the points with more in between, so that lines have no gaps.
 
     NaN separates lines.
-
-    Args:
-        x: shape (n,) [dots].
-        y: shape (n,) [dots].
-
-    Returns:
-        x and y, the points themselves first; shape (n + m,).
     """
     if len(x) < 2:  # noqa: PLR2004 - a line has two ends
         return x, y
@@ -79,11 +67,7 @@ def patterns(plane: Plane) -> NDArray[np.uint8]:
 
 
 def overlay(planes: Sequence[Plane]) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
-    """Return characters of overlaid planes, and the planes with dots in each cell.
-
-    Returns:
-        Code points, shape (rows, columns); and a bit per plane, the first plane's lowest, shape (rows, columns).
-    """
+    """Return code points of overlaid planes, and a bit per plane with dots in each cell, the first plane's lowest; shape (rows, columns)."""
     codes = np.zeros((planes[0].shape[0] // CELL_HIGH, planes[0].shape[1] // CELL_WIDE), dtype=np.uint32)
     members = np.zeros(codes.shape, dtype=np.uint8)
     for number, plane in enumerate(planes):

@@ -1,4 +1,4 @@
-"""Show control characters in shown texts instead of obeying them."""
+"""Show control characters in texts instead of executing them."""
 
 from __future__ import annotations
 

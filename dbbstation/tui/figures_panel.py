@@ -49,7 +49,6 @@ def _row(completed: RunCompleted, verdict: RunDecision, *, wide: bool) -> Conten
 
 
 def _short(label: str) -> str:
-    """Return a fitting name that keeps direction, repeat and rejection."""
     if len(label) < _NAME:
         return label
     sign = "x " if label.startswith("x ") else ""

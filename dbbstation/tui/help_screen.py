@@ -22,11 +22,7 @@ _KEY = 8
 
 
 class HelpScreen(ModalScreen[None]):
-    """Stands before the screen that it explains.
-
-    Args:
-        without: common keys that do not work here.
-    """
+    """Precedes the screen that it explains."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
 

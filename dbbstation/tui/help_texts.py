@@ -11,12 +11,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Help:
-    """Help on one screen.
-
-    Attributes:
-        shows: a paragraph each.
-        keys: a sentence by Textual's name of the key.
-    """
+    """Help on one screen."""
 
     title: str
     shows: tuple[str, ...] = ()

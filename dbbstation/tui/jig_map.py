@@ -20,11 +20,7 @@ _LETTERS = 3
 
 
 class JigMap(Panel):
-    """Bores by number, X to the right and Y up; the run's bore is in inverted brackets.
-
-    Args:
-        bores: number and x, y on the plate [mm].
-    """
+    """Bores by number, X to the right and Y up; the run's bore is in inverted brackets."""
 
     def __init__(self, bores: Mapping[int, tuple[float, float]], *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -55,7 +51,6 @@ def drawn(bores: Mapping[int, tuple[float, float]], marked: int | None) -> Conte
 
 
 def _cell(bores: Mapping[int, tuple[float, float]], bore: int) -> tuple[int, int]:
-    """Return row and column of a bore's letters; the plate keeps its shape."""
     x, y = bores[bore]
     xs, ys = [place[0] for place in bores.values()], [place[1] for place in bores.values()]
     reach = max(max(xs) - min(xs), max(ys) - min(ys)) or 1.0

@@ -42,11 +42,7 @@ _TEXTS = 3
 
 
 class LargeFigures(Panel):
-    """Three rows of letters as large as fit.
-
-    Args:
-        clock: real time, for stale readings [s].
-    """
+    """Three rows of letters as large as fit."""
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)

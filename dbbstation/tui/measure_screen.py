@@ -35,11 +35,7 @@ if TYPE_CHECKING:
 
 
 class MeasureScreen(RunScreen):
-    """The station's first screen.
-
-    Args:
-        clock: real time, for stale readings [s].
-    """
+    """The station's first screen."""
 
     help_name = "measure"
 
@@ -84,7 +80,6 @@ class MeasureScreen(RunScreen):
         self.set_class(judged, "-verdict")
 
     def keys(self) -> object:
-        """Return what decides the active keys and views."""
         return super().keys(), len(self.desk.board.views)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MessagesScreen(ModalScreen[None]):
-    """Stands before the screen whose messages it has."""
+    """Precedes the screen whose messages it shows."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,j,q", "dismiss", "Close")]
 

@@ -1,4 +1,4 @@
-"""What is measured: a row for each choice, and what is missing."""
+"""Choice of the measurement: a row for each part, and what is missing."""
 
 from __future__ import annotations
 
@@ -107,7 +107,6 @@ class NewScreen(RowScreen):
                 self._type(part, str(getattr(self.choice, _FIELDS[part]) or ""), lambda text: self._typed(part, text))
 
     def _kept(self) -> frozenset[SetUpPart]:
-        """Return the rows that an existing session decides."""
         return frozenset(ROWS) - frozenset(_OF_LINE) if self.choice.goes_on else frozenset()
 
     def _choose_file(self, part: SetUpPart) -> None:
@@ -302,6 +301,5 @@ _EMPTY: dict[SetUpPart, object] = {
 
 
 def _next(one: _Kind) -> _Kind:
-    """Return the next value of an enumeration, cyclically."""
     every = list(type(one))
     return every[(every.index(one) + 1) % len(every)]

@@ -1,4 +1,4 @@
-"""What to do now, in plain words."""
+"""The next action, in plain words."""
 
 from __future__ import annotations
 

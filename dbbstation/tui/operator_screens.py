@@ -83,7 +83,6 @@ class JobScreen(RowScreen):
         return (_BEGIN, *((_ANEW,) if goes_on else ()), *self._operated.job.may_change)
 
     def _begin(self, choice: Choice) -> None:
-        """Check and begin, if everything required is given and an old session is confirmed."""
         lacking = [texts.JOB_ROWS[name] for name in self._operated.job.required if not self._value(name).strip()]
         if lacking:
             self.say(texts.JOB_REQUIRED.format(names=", ".join(lacking)), wrong=True)
@@ -180,11 +179,7 @@ _FIELDS = {"operator": "operator", "order": "job"}
 
 
 class OperateScreen(RunScreen):
-    """Set-up before a circle, large letters during and after it.
-
-    Args:
-        clock: real time, for stale readings [s].
-    """
+    """Set-up before a circle, large letters during and after it."""
 
     help_name = "operate"
 
@@ -212,11 +207,7 @@ class OperateScreen(RunScreen):
 
 
 class AnswerScreen(ExplainedScreen):
-    """The answer in large letters, with reasons and what to do.
-
-    Args:
-        back: called on leaving.
-    """
+    """The answer in large letters, with reasons and what to do."""
 
     help_name = "answer"
 

@@ -44,13 +44,7 @@ _SHORTEST_NAME = 5
 
 @dataclass
 class ChosenTest:
-    """The chosen test and direction.
-
-    Attributes:
-        tests: in the plan's order.
-        way: 0 or 1 for its first or second direction.
-        back: 0 for its last run, 1 for the one before.
-    """
+    """The chosen test and direction."""
 
     tests: Sequence[str]
     at: int = 0

@@ -31,11 +31,7 @@ _VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecisio
 
 
 class OverviewScreen(BoardScreen):
-    """Shown over the present screen.
-
-    Args:
-        judging: whether verdicts may be changed; an operator's may not.
-    """
+    """Shown over the present screen."""
 
     help_name = "overview"
 
@@ -73,7 +69,6 @@ class OverviewScreen(BoardScreen):
         yield Footer(show_command_palette=False)
 
     def keys(self) -> object:
-        """Return what decides the active keys, with choice and verdict."""
         run = self._run()
         verdict = self.desk.board.verdicts.get(run.run.label) if run else None
         return super().keys(), self.choice.at, self.choice.way, verdict, len(self._runs())
@@ -106,7 +101,6 @@ class OverviewScreen(BoardScreen):
         self.draw()
 
     def action_earlier(self) -> None:
-        """Choose the run before, cyclically."""
         self.choice.back = (self.choice.back + 1) % max(len(self._runs()), 1)
         self.draw()
 
@@ -126,7 +120,6 @@ class OverviewScreen(BoardScreen):
         self.app.push_screen(ReasonQuestion(completed.run.label), answered)
 
     def action_accept_again(self) -> None:
-        """Accept a rejected run; a faulty one only for a reason."""
         completed = self._run()
         if completed is None:
             return

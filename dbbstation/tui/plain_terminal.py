@@ -23,17 +23,14 @@ _ALIKE = dict(zip("µ°±…·→›▸▶–×●○✓√⇧│┃║▊▎▌
 
 
 def plain_driver(usual: type[Driver]) -> type[Driver]:
-    """Return a driver whose characters this terminal has; each stands for one, so that the layout stays."""
+    """Return a driver with only this terminal's characters; each replaces one, so that the layout is kept."""
     encoding = getattr(sys.__stderr__, "encoding", None) or ""  # where Textual draws
     every = "utf" not in encoding.lower()
     if not every and os.environ.get("TERM") != "linux":
         return usual
 
     class PlainDriver(usual):  # type: ignore[valid-type, misc]  # the system's own driver
-        """Draws with the characters that there are."""
-
         def write(self, data: str) -> None:
-            """Write a text, in other characters where it has to be."""
             super().write(plain(data) if every else without_braille(data))
 
     return PlainDriver

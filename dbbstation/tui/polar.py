@@ -57,12 +57,7 @@ class Dial:
     def places(
         self, theta_deg: NDArray[np.float64], share: NDArray[np.float64] | float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return points in dots from the upper left corner, shape (n,) each.
-
-        Args:
-            theta_deg: from +X (right) towards +Y (up), shape (n,).
-            share: of the radius, shape (n,).
-        """
+        """Return points in dots from the upper left corner, shape (n,) each."""
         theta = np.radians(theta_deg)
         x = self.columns * braille.CELL_WIDE / 2.0 + self.radius * share * np.cos(theta)
         y = self.rows * braille.CELL_HIGH / 2.0 - self.radius * share * np.sin(theta) / self.dot_aspect
@@ -96,13 +91,7 @@ def draw_trace(
     *,
     thick: bool = False,
 ) -> None:
-    """Add a trace's dots and lines to a plane.
-
-    Args:
-        theta_deg: shape (n,).
-        deviation_um: bar length minus nominal, shape (n,); NaN breaks the line.
-        thick: two dots wide.
-    """
+    """Add a trace's dots and lines to a plane."""
     share = share_of(deviation_um, scale_um)
     for outward in (0.0, 1.0 / dial.radius) if thick else (0.0,):
         braille.light(plane, *braille.connect(*dial.places(theta_deg, share + outward)))

@@ -139,7 +139,6 @@ class PrepareScreen(RowScreen):
             self.about(lines(*(Content(f"{sign} {text}") for sign, text in told)))
 
     def _checked(self) -> Iterator[tuple[str, str]]:
-        """Yield sign and sentence of checked facts."""
         prepared = self._prepared
         if self._line is not None:
             yield self._reading(self._line)
@@ -184,7 +183,6 @@ class PrepareScreen(RowScreen):
         return texts.CHECK_PROGRAMS.format(count=len(programs), by=by, folder=where).rstrip()
 
     def _shop(self) -> Iterator[tuple[str, str]]:
-        """Yield bar, temperature and people."""
         choice, details = self._choice, self._prepared.job.details
         bar = details.bar
         if not self._goes_on and bar is not None and bar.calibrated is not None:
@@ -218,7 +216,6 @@ class PrepareScreen(RowScreen):
         self._reception.do(lambda: self._front.write_programs(choice, model), written, self._failed)
 
     def _take(self, choice: Choice) -> None:
-        """Check a changed choice, and go on if it is valid."""
         self.say(texts.NEW_CHECKS)
 
         def prepared(found: Prepared) -> None:

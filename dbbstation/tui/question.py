@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 
 
 class GiveUpQuestion(ModalScreen[bool]):
-    """Returns whether to end the run.
-
-    Args:
-        act: a capitalised verb.
-    """
+    """Returns whether to end the run."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("y", "answer(True)", "Yes"),

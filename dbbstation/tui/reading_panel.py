@@ -35,11 +35,7 @@ _FAR_UM = 9_999.9
 
 
 class Age:
-    """Tells a live reading from a stale one.
-
-    Args:
-        clock: real time [s].
-    """
+    """Tells a live reading from a stale one."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -55,11 +51,7 @@ class Age:
 
 
 class ReadingPanel(Panel):
-    """Two rows.
-
-    Args:
-        clock: real time, for stale readings [s].
-    """
+    """Two rows."""
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -77,7 +69,7 @@ class ReadingPanel(Panel):
 
 
 def seat_words(found: BarAtFeedIn) -> str:
-    """Return how the bar stands at the feed-in point, in words."""
+    """Return the bar's position at the feed-in point, in words."""
     if found.seated:
         return SEATED
     if found.backwards:
@@ -128,7 +120,6 @@ def _rate(board: Board, old_s: float | None) -> Content:
 
 
 def _lost(board: Board) -> list[Content]:
-    """Return what is missing in the run, and doubtful samples if any."""
     lost = (
         Content(f"{board.lost} lost") if not board.lost else Content.styled(f"{board.lost} lost", "bold $text-warning")
     )

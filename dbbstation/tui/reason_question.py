@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 class ReasonQuestion(ModalScreen[str | None]):
-    """Returns the reason, or None for no change.
-
-    Args:
-        counts: ask why it counts.
-    """
+    """Returns the reason, or None for no change."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         *((str(number), f"because({number})", f"Reason {number}") for number in range(1, len(REASONS) + 2)),
@@ -61,6 +57,5 @@ class ReasonQuestion(ModalScreen[str | None]):
         field.focus()
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
-        """Close with a text; an empty line is no reason."""
         if submitted.value.strip():
             self.dismiss(submitted.value.strip())

@@ -1,4 +1,4 @@
-"""What screens before and after a sequence need of the app."""
+"""Services of the app for screens before and after a sequence."""
 
 from __future__ import annotations
 

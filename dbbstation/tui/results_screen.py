@@ -73,7 +73,6 @@ class ResultsScreen(RowScreen):
         return super().check_action(action, parameters)
 
     def chosen_another(self) -> None:
-        """Tell of the step that the cursor is on."""
         self._draw()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:

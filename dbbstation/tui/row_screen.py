@@ -57,7 +57,7 @@ class RowScreen(ExplainedScreen):
 
     @property
     def stands(self) -> bool:
-        """Return whether its parts exist: background work may end too early or late."""
+        """Return whether its parts exist, because background work may end too early or late."""
         return bool(self.query("#row-text"))
 
     @property

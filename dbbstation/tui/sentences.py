@@ -1,4 +1,4 @@
-"""What to do now, and what is wrong, in plain sentences."""
+"""The next action, and faults, in plain sentences."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _later(found: RunAssessment) -> str:
 
 
 def _looked_back(board: Board) -> str:
-    """Return which earlier circles are wrong, and that Enter leads back to them."""
+    """Return the wrong earlier circles, and that Enter leads back to them."""
     first = next(iter(board.doubted.values()))
     completed = board.completed
     mine = f"{completed.answer.word}  {completed.run.label}. " if completed is not None else ""

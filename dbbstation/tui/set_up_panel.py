@@ -34,7 +34,6 @@ class SetUpPanel(Panel):
 
 
 def _place(ball: Ball) -> tuple[str, str, str]:
-    """Return where a ball stands and on what; under the spindle also the machine's place."""
     if not ball.place_known:
         x, y, z = ball.centre_mm
         return "under spindle", "at", f"X {x:g} Y {y:g} Z {z:g}"

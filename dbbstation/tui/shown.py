@@ -1,4 +1,4 @@
-"""What screens show beside events."""
+"""Content of screens beside events."""
 
 from __future__ import annotations
 
@@ -13,12 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Shown:
-    """Plan and plate.
-
-    Attributes:
-        bores: number and x, y on the plate [mm].
-        cell_aspect: height over width of a terminal's cell.
-    """
+    """Plan and plate."""
 
     plan: str
     bores: Mapping[int, tuple[float, float]] = field(default_factory=dict)

@@ -51,7 +51,6 @@ class StartScreen(RowScreen):
 
     @property
     def chosen(self) -> SessionLine | None:
-        """The session that the cursor is on."""
         return self._sessions[self.at] if self._sessions else None
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
@@ -76,7 +75,6 @@ class StartScreen(RowScreen):
             )
 
     def chosen_another(self) -> None:
-        """Tell of the session that the cursor is on."""
         self._tell()
 
     def action_new(self) -> None:
@@ -102,14 +100,11 @@ class StartScreen(RowScreen):
         self.refresh_bindings()
 
     def _prepared(self, choice: Choice, prepared: Prepared) -> None:
-        """Show the short checklist, unless another screen is open."""
         if self.is_current:
             self.say(texts.START_SOME)
             self._enter(PrepareScreen(self._reception, self._front, choice, prepared))
 
     def _enter(self, screen: RowScreen) -> None:
-        """Open a screen; on return the instrument is released."""
-
         def left(_: None) -> None:
             self._reception.do(self._front.release, lambda _: None, self._failed)
 

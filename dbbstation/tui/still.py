@@ -57,13 +57,7 @@ async def still_svg(
     theme: str = DARK,
     press: Sequence[str] = (),
 ) -> str:
-    """Return the screen after these events as SVG.
-
-    Args:
-        size: columns and rows.
-        theme: dark or light.
-        press: keys pressed afterwards.
-    """
+    """Return the screen after these events as SVG."""
     app = StationApp(shown, Happened(events), clock=lambda: 0.0)
     async with app.run_test(size=size) as pilot:
         app.theme = theme

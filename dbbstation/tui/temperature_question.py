@@ -21,7 +21,6 @@ class TemperatureQuestion(TypeQuestion):
         super().__init__(texts.TEMPERATURE_NOW)
 
     def on_input_submitted(self, submitted: Input.Submitted) -> None:
-        """Close with a temperature or without; refuse other texts."""
         submitted.prevent_default()
         text = submitted.value.strip()
         if not text or shop_degc(text) is not None:

@@ -51,7 +51,6 @@ _SHORTEST = 4
 
 
 def _shortened(name: str, room: int) -> str:
-    """Return a name, or its beginning, in so many columns; empty if too few."""
     if len(name) <= room:
         return name
     return f"{name[: room - 1].rstrip()}…" if room >= _SHORTEST else ""

@@ -50,11 +50,7 @@ _SMALLEST_ROWS = 6
 
 
 class TraceView(Widget):
-    """Deviation of the bar about the nominal circle, both directions in one dial.
-
-    Args:
-        cell_aspect: height over width of a terminal's cell.
-    """
+    """Deviation of the bar about the nominal circle, both directions in one dial."""
 
     COMPONENT_CLASSES: ClassVar[set[str]] = {
         "trace--scale",
@@ -93,13 +89,7 @@ class TraceView(Widget):
         head: Direction | None = None,
         beneath: Mapping[Direction, LiveTrace | Derived] | None = None,
     ) -> None:
-        """Draw what is new.
-
-        Args:
-            circle: for the dial's labels; None before the first run.
-            head: the running direction, marked.
-            beneath: circles of the session before, dim.
-        """
+        """Draw what is new."""
         fresh = circle is not self._circle or any(
             traces.get(direction) is not trace for direction, (trace, _) in self._drawn.items()
         )
@@ -145,7 +135,6 @@ class TraceView(Widget):
             self._drawn[direction] = (trace, count)
 
     def _compose_cells(self) -> None:
-        """Overlay planes and texts and request changed rows."""
         planes = (self._background, self._planes[Direction.CCW], self._planes[Direction.CW], self._last)
         codes, members = braille.overlay(planes)
         self._letter(codes, members)
@@ -190,12 +179,10 @@ class TraceView(Widget):
         self.show(self._circle, self._traces, self._head, self._beneath)
 
     def notify_style_update(self) -> None:
-        """Draw all rows in changed colours."""
         super().notify_style_update()
         self.refresh()
 
     def render_line(self, y: int) -> Strip:
-        """Return one row of the widget."""
         wide = self.size.width
         if y == 0:
             return self._text(self._caption(), wide)
@@ -214,7 +201,6 @@ class TraceView(Widget):
         return Strip(segments, len(row)).adjust_cell_length(wide, base)
 
     def _styles(self) -> dict[int, Style]:
-        """Return a cell's style by its planes, the trace first."""
         scale, last, ccw, cw, both, label = (
             self.get_component_rich_style(f"trace--{part}") for part in ("scale", "last", "ccw", "cw", "both", "label")
         )
@@ -255,6 +241,5 @@ class TraceView(Widget):
 
 
 def _rounded(times: float) -> str:
-    """Return a magnification with two significant digits."""
     place = 10.0 ** max(np.floor(np.log10(max(times, 1.0))) - 1.0, 0.0)
     return f"{round(times / place) * place:.0f}"

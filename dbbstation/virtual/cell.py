@@ -26,10 +26,7 @@ class _Running:
 class VirtualCell:
     """The bar's reading at any virtual time.
 
-    The bar lies aside before a run and during set-up; after a run it stays.
-
-    Args:
-        clock: [s].
+    The bar is off the balls before a run and during set-up; after a run it stays.
     """
 
     def __init__(self, machine: VirtualMachine, clock: ScaledClock) -> None:
@@ -41,7 +38,7 @@ class VirtualCell:
         self._origin_s: float | None = None
 
     def length_mm_at(self, t_s: float) -> float | None:
-        """Return the reading at a virtual time [mm]; None while the bar lies aside."""
+        """Return the reading at a virtual time [mm]; None while the bar is off the balls."""
         with self._lock:
             running, block_mm = self._running, self._block_mm
         if block_mm is not None:
@@ -101,7 +98,7 @@ class VirtualCell:
 
     @property
     def running(self) -> bool:
-        """Whether the machine moves."""
+        """Return whether the machine moves."""
         with self._lock:
             return (
                 self._running is not None and self._clock() < self._running.begin_s + self._running.run.path.duration_s

@@ -41,11 +41,7 @@ _LONGEST = 4096
 
 
 class CellCommands:
-    """Obeys the protocol's commands.
-
-    Args:
-        programs: from a program's name to its command; None: none.
-    """
+    """Obeys the protocol's commands."""
 
     def __init__(self, cell: VirtualCell, programs: Programs | None = None) -> None:
         self._cell = cell
@@ -88,11 +84,7 @@ class CellCommands:
 
 
 class ControlServer:
-    """Answers on a loopback port in one thread; a `with` block.
-
-    Args:
-        obey: from a line to its answer.
-    """
+    """Answers on a loopback port in one thread; a `with` block."""
 
     def __init__(self, obey: Callable[[str], dict[str, object]]) -> None:
         self._obey = obey

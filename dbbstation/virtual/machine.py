@@ -28,11 +28,7 @@ _SESSION, _BAR = "virtual session", "virtual bar"
 
 @dataclass(frozen=True)
 class Sizes:
-    """Accuracy of the virtual measurement, one standard deviation each.
-
-    Attributes:
-        set_up_mm: of balls under the spindle, per axis.
-    """
+    """Accuracy of the virtual measurement, one standard deviation each."""
 
     noise_mm: float = 0.0003
     bar_uncertainty_mm: float = 0.0005
@@ -59,12 +55,7 @@ class VirtualRun:
 
 
 class VirtualMachine:
-    """A machine with known errors, mountable balls and circles.
-
-    Args:
-        truth: nominal machine with errors.
-        seed: of mountings, balls, bar and noise.
-    """
+    """A machine with known errors, mountable balls and circles."""
 
     def __init__(self, truth: MachineModel, plan: Plan, *, seed: int = 0, sizes: Sizes | None = None) -> None:
         self.sizes = sizes or Sizes()

@@ -20,19 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class CommandedPath:
-    """Poses with times; motion is even in between.
-
-    Attributes:
-        t_s: rising from 0, shape (n,).
-        poses: shape (n, 6) [mm, deg].
-    """
+    """Poses with times; motion is even in between."""
 
     t_s: NDArray[np.float64]
     poses: NDArray[np.float64]
 
     @property
     def duration_s(self) -> float:
-        """From its begin to its end [s]."""
+        """Return the duration [s]."""
         return float(self.t_s[-1])
 
 

@@ -46,7 +46,7 @@ class MeasurementErrors:
     _of_mountings: dict[int, Fitted] = field(default_factory=dict)
 
     def bar(self, shared: str) -> Fitted:
-        """Length error of the bar."""
+        """Return the length error of the bar."""
         rng = np.random.default_rng([self.seed, 2])
         (source,) = sources_named(("bar-offset",))
         return Fitted(source, rng.normal(0.0, self.bar_uncertainty_mm, 1), shared)

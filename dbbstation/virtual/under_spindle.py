@@ -34,12 +34,7 @@ class MovingBall(ToolBallOffset):
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """Actual places of balls.
-
-    Attributes:
-        fixed_ball_mm: fixed ball less tool tip at its commanded place, machine frame, shape (3,).
-        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,).
-    """
+    """Actual places of balls."""
 
     fixed_ball_mm: NDArray[np.float64]
     moving_ball_mm: NDArray[np.float64]
@@ -63,10 +58,6 @@ class SetUp:
 
 def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s: float = 0.0) -> tuple[Fitted, Fitted]:
     """Return a set-up's effect on the bar: fixed and moving ball.
-
-    Args:
-        circle: gives the commanded place and tilt.
-        balls: at the tool tip.
 
     Raises:
         KinematicsError: the machine cannot take the pose.

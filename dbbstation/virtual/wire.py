@@ -44,8 +44,6 @@ _UNDER_WAY = 64
 
 @dataclass(slots=True)
 class _Outgoing:
-    """Bytes in transit, the first complete one character time after `start_s`."""
-
     raw: bytes
     start_s: float
     sent: int = 0
@@ -55,16 +53,13 @@ class VirtualInstrument:
     """A virtual length instrument; a `with` block switches it.
 
     Args:
-        length_mm_at: length at a virtual time [s]; None: no bar, reported as a fault. Called in the instrument's thread.
+        length_mm_at: length at a virtual time [s]; None: no bar, reported as a fault. Called in the instrument's
+            thread.
         clock: virtual time; None: real time.
         rate_hz: of a stream, instead of the protocol's.
         baud: of the device. A pseudo-terminal knows the other side's rate and garbles bytes if different.
         pty: pseudo-terminal, else loopback socket.
         seed: of latching moments within bounds.
-
-    Attributes:
-        port: for the program.
-        unknown_bytes: that were no command.
     """
 
     def __init__(
@@ -199,7 +194,6 @@ class VirtualInstrument:
             self._failure = error
 
     def _pause_s(self) -> float:
-        """Return the time until something is due, in real seconds."""
         with self._lock:
             if self._outgoing:
                 first = self._outgoing[0]
@@ -290,7 +284,6 @@ class VirtualInstrument:
         self._silent = self._silent_after_cut
 
     def _send(self, raw: bytes, start_s: float) -> None:
-        """Queue bytes on the line."""
         if self._silent or not raw:
             return
         if self._outgoing:

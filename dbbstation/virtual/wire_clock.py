@@ -50,26 +50,26 @@ class ScaledClock:
         return virtual_s / self.scale
 
     def stand_s(self) -> float:
-        """Return the bar's waiting time before a run [s of virtual time]."""
+        """Return the bar's waiting time before a run [s]."""
         return STAND_S * self.scale
 
     def advance(self) -> None:
         """Do nothing: this clock runs by itself."""
 
     def exchanges(self, period_s: float) -> bool:
-        """Return that a reading may be taken now: this clock runs by itself."""
+        """Return True: this clock runs by itself."""
         del period_s
         return True
 
     def line_s(self) -> float:
-        """Return the time up to which bytes of replies have gone over the line [s]."""
+        """Return the time up to which reply bytes have passed the line [s]."""
         return self()
 
     def run_until(self, t_s: float) -> None:
         """Do nothing: this clock runs by itself."""
 
     def settle(self) -> None:
-        """Do nothing: this clock never stands."""
+        """Do nothing: this clock never stops."""
 
 
 class WaitingClock(ScaledClock):
@@ -84,7 +84,7 @@ class WaitingClock(ScaledClock):
         self._stands = threading.Condition()
 
     def __call__(self) -> float:
-        """Return the time at which the clock stands [s]."""
+        """Return the time of the stopped clock [s]."""
         return self._now_s
 
     def real_s(self, virtual_s: float) -> float:
@@ -103,7 +103,7 @@ class WaitingClock(ScaledClock):
                 self._stands.notify_all()
 
     def exchanges(self, period_s: float) -> bool:
-        """Return whether a reading may be taken now; then a period passes behind it, which its exchange fits in."""
+        """Return whether a reading may be taken now, then advance by a period for its exchange."""
         with self._stands:
             if self._now_s >= self._until_s:
                 return False
@@ -113,7 +113,7 @@ class WaitingClock(ScaledClock):
             return True
 
     def line_s(self) -> float:
-        """Return infinity: a reply is there as soon as it is asked for, whatever the time."""
+        """Return infinity: a reply arrives at once."""
         return math.inf
 
     def run_until(self, t_s: float) -> None:

@@ -51,7 +51,7 @@ class SocketEnd:
 
     @property
     def connected(self) -> bool:
-        """Whether a program is connected."""
+        """Return whether a program is connected."""
         return self._client is not None
 
     def wait(self, real_s: float) -> bool:

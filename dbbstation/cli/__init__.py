@@ -150,7 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _with_new_name(problem: click.ClickException) -> click.ClickException:
-    """Let an unknown flag be answered with what it is called now."""
+    """Answer an unknown flag with its present name."""
     if not isinstance(problem, click.NoSuchOption) or problem.ctx is None:
         return problem
     now = RENAMED_FLAGS.get(f"{problem.ctx.info_name} {problem.option_name}")
@@ -184,7 +184,6 @@ def _noted(message: Warning | str, category: type[Warning], *where: Any, **furth
 
 
 def _own_first(given: list[str]) -> list[str]:
-    """Move the program's own options, often typed last, before the command."""
     own, others = [], list[str]()
     arguments = iter(given)
     for argument in arguments:

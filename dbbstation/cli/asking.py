@@ -31,8 +31,6 @@ class Asker:
 
         Args:
             option: equivalent on the command line.
-            choices: empty: any.
-            default: meaning of Enter; None: an answer is needed.
         """
         if not self.terminal:
             self._missing.append(f"{option} ({question})")
@@ -47,11 +45,7 @@ class Asker:
         self._missing.append(f"{option} ({why})")
 
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
-        """Return a number; None if none is possible or known.
-
-        Args:
-            option: equivalent on the command line.
-        """
+        """Return a number; None if none is possible or known."""
         if not self.terminal:
             self.text(question, option)
             return None

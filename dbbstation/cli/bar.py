@@ -132,12 +132,6 @@ def bar(
 
 
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
-    """Return the mean of good readings.
-
-    Raises:
-        InstrumentError: the line failed, or too many readings are no length.
-        click.UsageError: the resolution cannot be told.
-    """
     from dbbstation.instrument.driver import Instrument
     from dbbstation.service.bar_reading import read_on_calibrator
 
@@ -151,11 +145,6 @@ def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolutio
 def _file(
     found: Steady, of_bar: dict[str, object], calibrator: dict[str, object], instrument: str, now: datetime
 ) -> BarFile:
-    """Return the calibration as a file.
-
-    Raises:
-        click.UsageError: a value that no such file may have.
-    """
     from pydantic import ValidationError
 
     from dbbstation.service.bar_reading import bar_file

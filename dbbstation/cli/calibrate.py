@@ -66,7 +66,6 @@ def _print_plan_check(check: PlanCheck) -> None:
 
 
 def _print_misfit(result: CalibrationResult) -> None:
-    """Print the residual beyond noise and mountings, unless chance explains it."""
     from dbbstation.results.model_warnings import exceeds
 
     misfit = result.misfit

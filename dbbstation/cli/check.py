@@ -168,7 +168,6 @@ def _file(result: Checked) -> CheckedFile:
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRunResult]) -> None:
-    """Print sound files and notes; faults become the command's error."""
     from dbbstation.cli.output import say
 
     for result in results:
@@ -196,7 +195,6 @@ def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[S
 
 
 def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
-    """Check a file or session; instrument files by their own reader."""
     from dbbstation.errors import InputError
     from dbbstation.files.checking import Checked, check
     from dbbstation.files.yaml.text import load_yaml

@@ -66,7 +66,6 @@ def _print_runs(result: ComparisonResult) -> None:
 
 
 def _tenths(value: float) -> str:
-    """Return one decimal, zero without sign."""
     return f"{round(value, 1) + 0.0:.1f}"
 
 

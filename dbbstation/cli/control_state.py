@@ -1,4 +1,4 @@
-"""Options that state what a control knows and a program does not say: offsets, tool lengths, angles."""
+"""Options for the state of a control that a program does not contain: offsets, tool lengths, angles."""
 
 from __future__ import annotations
 

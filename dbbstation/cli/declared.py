@@ -35,17 +35,13 @@ def save(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any
 
 @dataclass(frozen=True)
 class CommandOutput:
-    """A file that a command writes of its result.
+    """A file written from a command's result.
 
     Attributes:
-        name: of the option.
         field: of the result, which gets the file's name; empty: as the option.
         write: takes result, path and `force`; by default saves the main product.
-        folder: a new session's, which is required.
-        table: has its provenance in a file beside it.
-        said: printed on standard error once written, with `{path}`.
-        check: of the path, before any work.
-        refused: why the result is not written, raised at the end.
+        table: has a provenance file beside it.
+        refused: reason not to write the result, raised at the end.
         only_with: parameter of the task that it needs.
     """
 
@@ -86,7 +82,6 @@ def command(
     Args:
         show: prints the result; its parameters with an `Option` are options too, others are the task's.
         remarks: printed on standard error, also beside JSON.
-        more: further arguments of the task.
     """
     task: Declared = function.declared  # type: ignore[attr-defined]
     shown = options_of(show)
@@ -127,7 +122,7 @@ def command(
 
 
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
-    """Run a task beside its progress bar. An `ArgumentError` becomes a usage error that names the option."""
+    """Run a task beside its progress bar; an `ArgumentError` becomes a usage error with the option's name."""
     from dbbstation.cli.output import say
     from dbbstation.cli.provenance import provenance
 
@@ -176,7 +171,6 @@ def _written(
     *,
     force: bool,
 ) -> Any:  # noqa: ANN401 - the same
-    """Write what is asked for; return the result with the names of the files."""
     from dbbstation.cli.output import say
 
     named = {one.name for one in fields(result)}

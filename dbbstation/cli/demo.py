@@ -166,7 +166,6 @@ _CONTENTS = (
 
 
 def _sizes(run: DemoCircle) -> tuple[tuple[float, float], ...]:
-    """Return centre deviation, mean radial error and circular deviation, each before and after [µm]."""
     before, after = run.before, run.after
     return (
         (before.centre_deviation_um, after.centre_deviation_um),

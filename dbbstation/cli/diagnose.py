@@ -80,7 +80,7 @@ def _print(result: DiagnosisFigures) -> None:
 
 
 def _print_limits(result: DiagnosisFigures) -> None:
-    """Print what ended at a limit, and whether a second search came to another answer."""
+    """Print reached limits, and whether a second search found another answer."""
     for limit in result.limits:
         echo(limit.text)
     if result.second_start_agrees is False:
@@ -105,7 +105,7 @@ def _print_mismatch(result: DiagnosisFigures) -> None:
 
 
 def _print_workspace(elsewhere: WorkspaceGain) -> None:
-    """Print how far two models put the tool apart, with and without common shift, and its uncertainty."""
+    """Print the distance of two models' tools, with and without common shift, and its uncertainty."""
     shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere.common_shift_um, strict=True))
     for which, error, u, more in (
         ("as a whole", elsewhere.error_with_shift_rms_um, elsewhere.uncertainty_with_shift_rms_um, ""),

@@ -32,12 +32,7 @@ def first_names(names: Sequence[str]) -> str:
 
 
 def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
-    """Return the count of held-out parts with gain; empty if other parts cannot show it.
-
-    Args:
-        gains: None: not tested.
-        acts: `always` or `once`.
-    """
+    """Return the count of held-out parts with gain; empty if other parts cannot show it."""
     return gains.counted if gains is not None and acts == "always" else ""
 
 
@@ -56,12 +51,7 @@ def residual_text(left: LeftOver, unit: str) -> str:
 
 
 def not_written(out: Path, levels: Levels) -> OutputError:
-    """Refuse to write a correction that is worse than none.
-
-    Args:
-        out: file that was asked for.
-        levels: say why.
-    """
+    """Refuse to write a correction that is worse than none."""
     from dbbstation.results.levels_text import no_correction
 
     return OutputError(f"not written. {no_correction(levels)}", where=str(out), remedy=MEND)

@@ -55,7 +55,6 @@ def show(result: DriveResult) -> None:
 
 
 def _print_rest(result: DriveResult) -> None:
-    """Print unnamed, cancelling and undecided parts, and the band."""
     echo("\n" + result.unexplained.text)
     if result.unexplained.significant:
         for effect in result.unexplained.effects[:3]:
@@ -111,7 +110,6 @@ def _print_sources(sources: Sequence[DriveFinding]) -> None:
 
 
 def _print_parts(source: DriveFinding) -> None:
-    """Print a cause's numbers, by wave or pulse."""
     if source.parameters and len(source.parts) <= 1:
         for name, number in source.parameters.items():
             echo(f"{source.name}: {name} {_number(number)}")

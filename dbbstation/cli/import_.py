@@ -134,8 +134,6 @@ def import_(
 
 @dataclass(frozen=True)
 class _Told:
-    """Stated facts of the files: runs, starts, trusted and unknown facts."""
-
     named: Sequence[str]
     started: Sequence[str]
     trusted: frozenset[str]

@@ -80,10 +80,6 @@ def chosen_protocol(
 ) -> Protocol:
     """Return the protocol of the options.
 
-    Args:
-        zero_mm: reading position of a relative instrument's zero.
-        bar_length_mm: calibrated length, the default zero.
-
     Raises:
         InstrumentError: unknown instrument or profile, or a relative one without zero.
         InputError: faults of the protocol file.

@@ -237,12 +237,7 @@ def holders(
 
 
 def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
-    """Write a jig file with new values of its holders.
-
-    Raises:
-        InputError: an unknown holder.
-        OutputError: the file cannot be written.
-    """
+    """Write a jig file with new values of its holders."""
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.jig import HolderSchema, checked_jig, jig_text, read_jig
@@ -284,11 +279,7 @@ _WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz", "axis",
 
 
 def _pairs(texts: Sequence[str], option: str, known: Sequence[str] = ()) -> dict[str, str]:
-    """Return pairs `A=B` of an option.
-
-    Raises:
-        click.UsageError: no pair, or a first part that is not known.
-    """
+    """Return pairs `A=B` of an option."""
     found = {}
     for text in texts:
         first, has, second = text.partition("=")
@@ -312,11 +303,7 @@ def _texts(change_um: Sequence[float] | None) -> list[str]:
 
 
 def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str, list[Any]]:
-    """Return centres by holder and place, shape (n, axes) each [µm].
-
-    Raises:
-        InputError: a row without a holder.
-    """
+    """Return centres by holder and place, shape (n, axes) each [µm]."""
     import numpy as np
 
     from dbbstation.errors import InputError, Problem

@@ -24,15 +24,7 @@ def made_ready(command: click.Command) -> click.Command:
 
 
 class LazyGroup(click.Group):
-    """Loads a command's module on demand.
-
-    Args:
-        table: name and one line of help of every command.
-        package: modules named as commands, underscores for hyphens and behind Python keywords.
-        modules: other names of modules, by command.
-        renamed: former commands and what they are now.
-        more: for `click.Group`.
-    """
+    """Loads a command's module on demand."""
 
     def __init__(
         self,

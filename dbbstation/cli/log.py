@@ -74,7 +74,6 @@ def _attended(callback: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextmanager
 def _kept(context: click.Context) -> Iterator[None]:
-    """Log begin, events and end of a command."""
     verbose = bool(context.find_root().params.get("verbose"))
     handlers = [_to_file(), _to_screen() if verbose else None]
     used = [handler for handler in handlers if handler is not None] or [logging.NullHandler()]

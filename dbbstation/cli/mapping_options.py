@@ -163,7 +163,6 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
 
 
 def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | None, encoding: str) -> ForeignTable:
-    """Read one file as stated, else by settings unless exported by this program; errors as `read_foreign`."""
     from dbbstation.errors import InputError
     from dbbstation.files.recordings.foreign_csv import read_foreign
     from dbbstation.tasks.importing.proposal import EXPORTED
@@ -265,11 +264,6 @@ def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, obj
 
 
 def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:
-    """Return the mapping as a file.
-
-    Raises:
-        click.UsageError: something that no mapping may say.
-    """
     from pydantic import ValidationError
 
     from dbbstation.files.formats.mapping import MappingFile

@@ -89,20 +89,11 @@ class MeasureOptions:
     """The options of `measure`.
 
     Attributes:
-        instrument: name or protocol file.
-        profile: None: the usual one.
         zero_mm: None: the bar's length.
-        baud: None: the usual one [1/s].
-        spy: log of all bytes; None: none.
-        out: session folder.
         auto: control address of `instrument emulate`; None: a person starts circles.
-        programs: folder; None: none.
-        rate_hz: None: the usual one.
         largest_loss_percent: of a run's samples; None: the plan's.
         largest_bar_age_h: None: any.
         model_file: None: the nominal machine.
-        source_files: own sources of that model.
-        gate: repeated at the end.
     """
 
     plan_file: Path

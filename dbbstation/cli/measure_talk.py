@@ -1,4 +1,4 @@
-"""Talk of `measure`: lines, a progress bar, keys."""
+"""Dialogue of `measure`: lines, a progress bar, keys."""
 
 from __future__ import annotations
 
@@ -53,11 +53,7 @@ _ASKED_OF_WRONG = "Enter: repeat   a WHY: accept all the same   x: reject   q: q
 
 
 class Talk:
-    """Tells a person what happens; an observer.
-
-    Args:
-        asking: name possible answers.
-    """
+    """Shows a person the events; an observer."""
 
     def __init__(self, *, asking: bool) -> None:
         self._asking = asking
@@ -91,7 +87,7 @@ class Talk:
 
 
 class Log:
-    """Logs what happens; an observer."""
+    """Logs events; an observer."""
 
     def __call__(self, event: events.Event) -> None:
         """Log an event."""
@@ -102,7 +98,7 @@ class Log:
 
 
 class Summary:
-    """Collects what `--json` prints; an observer."""
+    """Collects the output of `--json`; an observer."""
 
     def __init__(self) -> None:
         self._completed: dict[str, events.RunCompleted] = {}
@@ -170,7 +166,7 @@ class Keyboard:
         self._thread.start()
 
     def __call__(self, event: events.Event) -> None:
-        """Take over the station's state."""
+        """Take the station's state."""
         if isinstance(event, events.StateChanged):
             self._state = event.state
         elif isinstance(event, events.RunCompleted):
@@ -185,7 +181,6 @@ class Keyboard:
 
     @property
     def _doubtful(self) -> bool:
-        """Return whether a faulty run awaits its verdict."""
         return self._state is State.COMPLETE and self._wrong
 
     def _listen(self) -> None:

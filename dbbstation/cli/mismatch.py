@@ -118,7 +118,7 @@ def _print(result: MismatchResult) -> None:
 
 
 def _print_first(result: MismatchResult) -> None:
-    """What is wrong with the answer as a whole."""
+    """Print faults of the answer as a whole."""
     unit, held_out = result.unit, result.held_out_rms
     if held_out and held_out.worse:
         echo(

@@ -1,4 +1,4 @@
-"""Warnings of a model, said first by every command."""
+"""Warnings of a model, printed first by every command."""
 
 from __future__ import annotations
 

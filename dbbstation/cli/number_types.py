@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 class Finite(click.FloatRange):
     """A finite number, with a range as of `click.FloatRange`.
 
-    `nan` lies in every range, and `inf` in open ones.
+    `nan` is in every range, and `inf` in open ones.
     """
 
     def __init__(self, *limits: Any, **more: Any) -> None:  # noqa: ANN401 - as click has it

@@ -12,9 +12,5 @@ _Options = TypeVar("_Options")
 
 
 def taken_from(options: MutableMapping[str, Any], kind: type[_Options]) -> _Options:
-    """Remove the options of one class from `options` and return them.
-
-    Args:
-        kind: dataclass with fields named as its options.
-    """
+    """Remove the options of one class from `options` and return them."""
     return kind(**{one.name: options.pop(one.name) for one in fields(kind)})  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Output of commands: data on standard output, talk on standard error."""
+"""Output of commands: data on standard output, messages on standard error."""
 
 from __future__ import annotations
 
@@ -27,12 +27,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
-    """Print text, the one way to a terminal.
-
-    Args:
-        text: control characters are shown.
-        nl: end with a line end.
-    """
+    """Print text, the one way to a terminal."""
     # While a bar is drawn Rich stands in for standard error and puts lines above the bar; Click would look through it.
     above = sys.stderr if err and hasattr(sys.stderr, "rich_proxied_file") else None
     click.echo(printable(str(text)), above, err=err, nl=nl)
@@ -73,18 +68,18 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell user and log something beside the result, on one line: names in it may hold line ends."""
+    """Tell user and log something beside the result, on one line, because names may contain line ends."""
     log_said(text)
     echo(on_one_line(text), err=True)
 
 
 def echo_line(text: str) -> None:
-    """Print text on one line, whatever names in it hold."""
+    """Print text on one line, even with line ends in names."""
     echo(on_one_line(text))
 
 
 def log_said(text: str) -> None:
-    """Log what the user sees anyhow, hidden from `--verbose`."""
+    """Log a text that the user sees anyway, hidden from `--verbose`."""
     _LOG.info("%s", text, extra={"said": True})
 
 

@@ -49,7 +49,6 @@ def _or_empty(value: float | None) -> float | str:
 
 
 def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:
-    """Compare the model's largest uncertainty with the requested chord error."""
     reasons = [each.model_uncertainty_not_known_because for each in programs]
     for why in dict.fromkeys(one for one in reasons if one):
         say(f"how well the model knows the path is not known in every coordinate: {why}")

@@ -49,7 +49,7 @@ class Tell(Protocol):
     """Receives the progress of work."""
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Take a stage, and how much of it is done if countable."""
+        """Take a stage, and its completed part if countable."""
 
 
 class ProgressBar:
@@ -57,7 +57,6 @@ class ProgressBar:
 
     Args:
         form: `COUNTED`, `SHARE` or `ENDLESS`.
-        unit: behind a count.
         passing: remove the bar at its end.
     """
 
@@ -70,13 +69,7 @@ class ProgressBar:
         self._started_s = now_s()
 
     def show(self, done: float = 0.0, of: float | None = None, text: str = "", *, at_once: bool = True) -> None:
-        """Show how much of how much is done.
-
-        Args:
-            of: None if unknown.
-            text: beside the bar.
-            at_once: draw without delay.
-        """
+        """Show how much of how much is done."""
         left = time_left(done / of, now_s() - self._started_s) if of else ""
         beside = left + on_one_line(text)
         if self._drawn is not None:
@@ -127,7 +120,7 @@ class Compiling:
         self._said = False
 
     def __call__(self, begun: bool) -> None:  # noqa: FBT001 - as the compiler tells it
-        """Show that a loop begins to be compiled, or that it is."""
+        """Show that a loop begins or ends compiling."""
         if not begun:
             self._bar.end()
             return
@@ -173,9 +166,6 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
     """Show a bar; yield a callback for stages.
 
     The bar appears with the first stage.
-
-    Args:
-        stages: percentage at each begin, in order; by the begin of its text.
     """
     bar = _Stages(ProgressBar(label, SHARE), stages)
     try:
@@ -187,11 +177,7 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
 
 @contextmanager
 def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
-    """Show bars for reading sessions and a task's stages.
-
-    Args:
-        stages: of the task, as in `stage_bar`.
-    """
+    """Show bars for reading sessions and a task's stages."""
     from dbbstation.tasks.load import READING
 
     with count_bar(READING) as reading, stage_bar(label, stages) as rest:
@@ -236,7 +222,6 @@ def time_left(share: float, passed_s: float) -> str:
 
 
 def _shown() -> bool:
-    """Return whether a bar is visible."""
     context = click.get_current_context(silent=True)
     verbose = context is not None and bool(context.find_root().params.get("verbose"))
     return sys.stderr.isatty() and not verbose

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 
 def sampled_circles(plan: Plan, protocol: Protocol, baud: int | None = None) -> tuple[SampledCircle, ...]:
-    """Return for each circle of a plan what the instrument sees of it.
-
-    Args:
-        baud: None: the usual rate.
-    """
+    """Return the instrument's readings of each circle of a plan."""
     from dbbstation.plan.sampling import enough_feed_mm_min, sampling
     from dbbstation.results.sampling import SampledCircle
 
@@ -72,6 +68,6 @@ def sampling_notes(plan: Plan, protocol: Protocol, baud: int | None = None) -> I
 
 
 def say_sampling(plan: Plan, protocol: Protocol, baud: int | None) -> None:
-    """Print what the instrument sees of the circles."""
+    """Print the instrument's readings of the circles."""
     for note in sampling_notes(plan, protocol, baud):
         say(f"note: {note}")

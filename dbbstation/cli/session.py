@@ -313,7 +313,6 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
 
 
 def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
-    """Return circles with several accepted runs, and how many."""
     from dbbstation.files.recordings.entries import RunState
 
     counted = Counter(f"{run.test} {run.direction}" for run in read.in_state(RunState.ACCEPTED))
@@ -321,7 +320,6 @@ def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
 
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:
-    """Return tests and directions without accepted run."""
     from dbbstation.files.recordings.entries import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
@@ -330,12 +328,6 @@ def _missing(read: SessionFolder) -> list[tuple[str, str]]:
 
 
 def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
-    """Find a run by name and note its verdict.
-
-    Raises:
-        InputError: faults of the session, or no such run.
-        OutputError: another process writes into the session.
-    """
     import difflib
 
     from dbbstation.errors import InputError, Problem
@@ -356,11 +348,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
 
 
 def _reason_for(run: str, unusable: str) -> str:
-    """Ask why an unusable run is accepted; empty for a usable one.
-
-    Raises:
-        click.UsageError: nobody can answer.
-    """
+    """Ask why an unusable run is accepted; empty for a usable one."""
     from dbbstation.cli.asking import Asker
 
     if not unusable:

@@ -77,13 +77,9 @@ class SessionOptions:
     """Stated facts of machine, shop and bar.
 
     Attributes:
-        serial_number: of the machine; may be empty.
-        ambient_temp_c: of the shop; None if unknown.
-        bar_length_mm: distance of its balls; None if unknown.
-        bar_uncertainty_um: standard; None if unknown.
         bar_temp_c: at calibration; None if unknown.
         bar_file: instead of these; None for none.
-        bar_waiver: why without fresh calibration; may be empty.
+        bar_waiver: reason for no fresh calibration; may be empty.
     """
 
     operator: str
@@ -99,9 +95,6 @@ class SessionOptions:
 
     def details(self, stroke_mm: float | None = None) -> SessionDetails:
         """Return what a session notes.
-
-        Args:
-            stroke_mm: by the instrument file; None if not stated.
 
         Raises:
             click.UsageError: length without uncertainty, something of the bar without either, or a file and options of the bar.
@@ -164,9 +157,6 @@ class SessionOptions:
 
 def require_bar(job: Job, largest_age_h: float | None) -> None:
     """Refuse a new session whose plan needs the bar's length without fresh calibration or reason.
-
-    Args:
-        largest_age_h: None: the usual one.
 
     Raises:
         InputError: what is wrong with the bar, and what to do.

@@ -35,11 +35,7 @@ _ONE_THING = frozenset({"bar", "numbers"})
 
 
 class ShopOption(click.Option):
-    """An option with a default from the shop's settings.
-
-    Args:
-        setting: dotted key.
-    """
+    """An option with a default from the shop's settings."""
 
     def __init__(
         self,
@@ -103,11 +99,7 @@ def shop_settings() -> Settings:
 
 
 def folder_of_sessions(command: str | None, values: Mapping[str, Any]) -> Path | None:
-    """Return the folder of a command's sessions, or None.
-
-    Args:
-        values: parameters by name.
-    """
+    """Return the folder of a command's sessions, or None."""
     names = (*_SESSIONS, *(["out"] if command in _MADE else []))
     given = next((values[name] for name in names if values.get(name)), None)
     if isinstance(given, list | tuple):

@@ -196,11 +196,6 @@ def station(
 def _check_options(
     *, virtual: bool, time_scale: float, baud: int | None, needed: tuple[Path | str | None, ...]
 ) -> None:
-    """Refuse options that do not combine.
-
-    Raises:
-        click.UsageError: it does not.
-    """
     names = ("--plan", "--machine", "--instrument", "--port", "--out")
     if virtual and (needed[3] is not None or baud is not None):
         raise click.UsageError("--virtual brings its own instrument: leave out --port and --baud")
@@ -212,11 +207,6 @@ def _check_options(
 
 
 def _check_terminal() -> None:
-    """Refuse to draw into a file.
-
-    Raises:
-        click.UsageError: this is no terminal.
-    """
     if not (sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()):
         raise click.UsageError("the screen needs a terminal; `dbbstation measure` does the same without one")
 
@@ -308,12 +298,7 @@ def _limits(largest_loss_percent: float | None, largest_bar_age_h: float | None)
 
 
 def _shown(app: StationApp) -> int:
-    """Show the screen until closed; return the exit code.
-
-    Raises:
-        StationError: the unhandled fault that ended the sequence.
-        click.Abort: a signal ended it.
-    """
+    """Show the screen until closed; return the exit code."""
     with _stopped_politely(app) as stopped, ended_when_hung_up(app.give_up):
         app.run()
     if app.crash is not None:

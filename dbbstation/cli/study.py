@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class StudyGroup(LazyGroup):
-    """The studies of the checkout; a wheel has none and says where they are."""
+    """The studies of the checkout; a wheel has none and says so."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -36,7 +36,6 @@ class StudyGroup(LazyGroup):
 
 
 def _studies() -> Mapping[str, str]:
-    """Return name and help of every study; empty without checkout."""
     root = checkout()
     if root is None:
         return {}

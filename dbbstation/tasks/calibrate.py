@@ -151,7 +151,6 @@ def _drawn(calibration: Calibration, wanted: object) -> Any:  # noqa: ANN401 - a
 
 
 def _prescribed(names: Sequence[str] | None, method: Method) -> list[Name] | None:
-    """Return named parameters, or by method the directions themselves or the program's choice."""
     from dbbstation.calibration.fit.methods import Method
 
     if names is None:

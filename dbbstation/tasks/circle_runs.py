@@ -45,9 +45,7 @@ def load_circles(
     Findings compare with all accepted runs, also of excluded tests.
 
     Args:
-        paths: folders or session files, or what was read of them.
         chosen: filter of G, F and H.
-        tests: names; empty for all.
         model: gives expected circles; None: the nominal machine.
 
     Raises:
@@ -84,7 +82,6 @@ def load_circles(
 
 
 def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
-    """Return notes on circles with unplanned accepted runs, one of which may be a mistake."""
     of: dict[str, list[str]] = {}
     for run in runs:
         of.setdefault(f"{run.test} {run.direction}", []).append(str(run.repeat))
@@ -128,7 +125,7 @@ def _measured(
 
 
 def _corrected(session: SessionFolder, recording: Recording) -> Recording:
-    """Return a recording less the bar's excess, as a fit treats it (`Setup.bar_reads_long_mm`)."""
+    """Return a recording minus the bar's excess, as a fit treats it (`Setup.bar_reads_long_mm`)."""
     if session.bar is None:
         return recording
     long_mm, _ = session.bar.reads_long_mm(session.bar_temp_c(recording.temperature_degc))
@@ -165,7 +162,6 @@ def _not_absolute(bar: Bar | None, measured_c: float | None) -> str:
 
 
 def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[MeasuredPair]:
-    """Return both directions of each test, repeat and mounting."""
     first: dict[tuple[str, int, str], MeasuredCircle] = {}
     pairs = []
     for circle in circles:

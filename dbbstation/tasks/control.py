@@ -199,7 +199,6 @@ _HELD_IN_INI = re.compile(r"(COMP_FILE|BACKLASH)\s*=\s*(?P<value>[^#;\s]+)")
 def _volume(
     machine: Machine, volume_mm: Sequence[float] | None, tilt_deg: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return least and greatest pose, shape (6,) each [mm, deg]."""
     middle_mm, half = np.array([0.0, 0.0, sum(machine.travel.z_mm) / 2.0]), SIZE_MM / 2.0
     pairs = np.column_stack([middle_mm - half, middle_mm + half])
     if volume_mm is not None:
@@ -239,7 +238,7 @@ def _rotation_note(machine: Machine) -> list[str]:
 
 
 def _active(ini: Path) -> list[str]:
-    """Return what an INI file corrects of joints already, a note each.
+    """Return an INI file's existing corrections of joints, a note each.
 
     Raises:
         InputError: it cannot be read.

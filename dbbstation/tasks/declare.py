@@ -43,10 +43,11 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """What a parameter's name, type and default do not say.
+    """Facts of a parameter beyond its name, type and default.
 
     Attributes:
-        help: one or two sentences, the unit in brackets; of a flag that is True by default what its absence means.
+        help: one or two sentences, the unit in brackets; for a flag that is True by default, the meaning of its
+            absence.
         kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
         setting: key in the shop's settings.
         least: `most`, `above`: range of a number.
@@ -78,12 +79,12 @@ class TaskParameter:
 
     @property
     def many(self) -> bool:
-        """Whether it takes several values."""
+        """Return whether it takes several values."""
         return get_origin(self.type) is tuple
 
     @property
     def flag(self) -> str:
-        """Its name on the command line."""
+        """Return its name on the command line."""
         if self.option.kind == "argument":
             return self.option.metavar or self.name
         return f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
@@ -163,7 +164,6 @@ _KINDS: dict[Any, str] = {
 
 
 def _one_of(value: str, known: Sequence[str]) -> str:
-    """Return a value that is known, or refuse it with the nearest one."""
     if value in known:
         return value
     near = difflib.get_close_matches(value, known, n=1)
@@ -179,12 +179,8 @@ class Declared:
     """A task as declared.
 
     Attributes:
-        name: of its command.
         label: beside its progress bar.
         stages: of its work and the passed share of time as each begins [%]; a function of the arguments; None: counted.
-        help: the docstring before `Args:`.
-        parameters: those with an `Option`.
-        signature: all parameters.
     """
 
     name: str
@@ -260,7 +256,6 @@ def options_of(function: Callable[..., Any]) -> dict[str, TaskParameter]:
 
 
 def _plain(kind: Any) -> Any:  # noqa: ANN401 - a type
-    """Return a type without None."""
     if get_origin(kind) not in {Union, UnionType}:
         return kind
     others = [one for one in get_args(kind) if one is not NoneType]

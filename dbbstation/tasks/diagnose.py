@@ -124,7 +124,6 @@ def diagnose(
 
 
 def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
-    """Return the unmodelled effect to keep, or None with a note."""
     from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
 
     try:

@@ -27,11 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """Recorded sessions with their diagnosis.
-
-    Attributes:
-        lacking: reasons against further candidates, by name.
-    """
+    """Recorded sessions with their diagnosis."""
 
     recorded: Recorded
     diagnosis: Diagnosis
@@ -61,10 +57,7 @@ def diagnose_sessions(
     """Read sessions of one machine and find physics beyond a kinematic calibration.
 
     Args:
-        paths: folders or session files.
-        candidates: source names; None: all.
         known: sources by name; None: the package's.
-        only: names of tests; empty for all.
 
     Raises:
         InputError: faults of files and traces.
@@ -94,11 +87,6 @@ def diagnosed_of(
     how: Callable[..., Diagnosis] = search.diagnose,
 ) -> Diagnosed:
     """Read sessions and diagnose them.
-
-    Args:
-        candidates: names; None: all.
-        chosen: tests to take and to leave out.
-        how: the diagnosis.
 
     Raises:
         InputError: faults of files and traces.

@@ -1,4 +1,4 @@
-"""Run work in processes of this computer or by a Dask scheduler's workers."""
+"""Run work in processes of this computer or on a Dask scheduler's workers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SchedulerError(StationError):
 
 @dataclass(frozen=True)
 class Ended:
-    """A piece of work whose process was ended, even alone."""
+    """A piece of work that ended its process, even when run alone."""
 
     why: str
 
@@ -41,7 +41,6 @@ class WorkPool(Generic[Item, Result]):
     """Where work is done.
 
     Attributes:
-        count: of processes on this computer.
         scheduler: such as `tcp://server:8786`; empty for this computer.
     """
 
@@ -51,9 +50,6 @@ class WorkPool(Generic[Item, Result]):
     @contextmanager
     def executor(self, count: int) -> Iterator[Executor]:
         """Yield an executor, which ends when this process is interrupted.
-
-        Args:
-            count: of processes on this computer.
 
         Raises:
             SchedulerError: no such scheduler; its workers have another program or several threads.
@@ -70,10 +66,6 @@ class WorkPool(Generic[Item, Result]):
 
         If a process ends, only its item is done anew. A local pool restarts and tries suspects singly; an item that ends
         its process again is `Ended`.
-
-        Args:
-            work: can be pickled.
-            items: can be pickled.
 
         Raises:
             SchedulerError: as `executor`; or the scheduler disappeared.
@@ -115,7 +107,6 @@ class WorkPool(Generic[Item, Result]):
 
 
 def _is_killed(error: Exception) -> bool:
-    """Return whether Dask gave up because every worker of a piece ended."""
     return type(error).__name__ == "KilledWorker"
 
 
@@ -146,11 +137,7 @@ def _of_dask(address: str) -> Iterator[Executor]:
 
 
 def _within(limit_s: float, act: Callable[[], Any]) -> Any:  # noqa: ANN401 - what it returns
-    """Return what a function returns; Dask's own limit does not hold for a server that takes a connection and is mute.
-
-    Raises:
-        TimeoutError: it takes longer; it goes on in a thread that does not hold up the end of the program.
-    """
+    """Return a function's result within a time limit, because Dask's own does not cover a connected but silent server."""
     work = Background(act)
     work.wait(limit_s)
     if not work.done:

@@ -114,17 +114,13 @@ _WHOLE = frozenset({"repeat", "mounting"})
 
 @dataclass(frozen=True, eq=False)
 class Exporting:
-    """What is exported.
-
-    Attributes:
-        runs: with sessions, in order.
-    """
+    """What is exported."""
 
     runs: tuple[tuple[SessionFolder, RunEntry], ...]
     names: tuple[str, ...]
 
     def is_text(self, name: str) -> bool:
-        """Return whether a column holds texts."""
+        """Return whether a column has texts."""
         return name not in _WHOLE and name not in {ANGLE, DEVIATION} and name not in columns.COLUMNS
 
 
@@ -156,9 +152,6 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
 
 def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
     """Return each sample's commanded angle on the full turn, 0 to 360, NaN for others, shape (n,) [deg].
-
-    Args:
-        recording: a whole run, or cut to its circle.
 
     Raises:
         TraceError: neither angles nor edges of a circle.

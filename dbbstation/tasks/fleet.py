@@ -53,9 +53,7 @@ class _Named:
     """A session of the fleet.
 
     Attributes:
-        session: None if unreadable.
         inputs: SHA-256 of files that decide its result.
-        problem: why it is unreadable, or empty.
         apart: whether it counts as an own machine without a serial number.
     """
 
@@ -171,7 +169,6 @@ def fleet(
 
 
 def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:
-    """Yield the sessions of some folders in counting order."""
     for folder in folders:
         if (folder / SESSION_FILE).is_file() or folder.name == SESSION_FILE:
             place = folder.parent if folder.name == SESSION_FILE else folder
@@ -186,7 +183,6 @@ def _sessions(folders: Sequence[Path], telling: Telling) -> Iterator[_Named]:
 
 
 def _read(name: str, folder: Path) -> _Named:
-    """Read a session's own statements and hash what decides its results."""
     name = text_of_name(name)
     try:
         session = read_session(folder)
@@ -218,7 +214,7 @@ def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
 
 
 def _plain(options: FleetOptions) -> dict[str, object]:
-    """Return options that decide results: settings by their tolerances, and where a report says that they stand."""
+    """Return options that determine results: settings by their tolerances, and their place as shown in a report."""
     data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
     settings = options.settings
     return {**data, "tolerances": [asdict(one) for one in settings.tolerances], "from": settings.tolerances_from}
@@ -268,7 +264,7 @@ def _failed(one: _Named, problem: str) -> _Outcome:
 
 
 def _without_number(named: Sequence[_Named]) -> tuple[str, ...]:
-    """Return notes on sessions without serial number that count as one machine or several."""
+    """Return notes on sessions without serial number, which count as one machine or several."""
     of_name: dict[str, list[_Named]] = {}
     for one in named:
         if one.session is not None and not one.session.serial_number:
@@ -291,7 +287,6 @@ def _result(
     false_alarms: float,
     notes: tuple[str, ...],
 ) -> FleetResult:
-    """Return the outcomes with a comparison of each machine's last session."""
     last: dict[str, int] = {}
     for place, outcome in enumerate(outcomes):
         if outcome.found is None:

@@ -28,11 +28,7 @@ CLAIMED = frozenset({"identified", "happened"})
 
 @dataclass(frozen=True, eq=False)
 class Sister:
-    """One machine, by its last session.
-
-    Attributes:
-        name: serial number, or the name in its file.
-    """
+    """One machine, by its last session."""
 
     name: str
     session: str
@@ -47,9 +43,6 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
     """Compare machines.
 
     Figures compare between machines with the same circle. Parameters and causes compare only within one nominal geometry.
-
-    Args:
-        false_alarms: probability that like machines show any unlike value.
     """
     kinds, notes = _geometries(sisters)
     rows: dict[_Key, dict[int, FleetValue]] = defaultdict(dict)
@@ -148,7 +141,6 @@ def _named(names: Sequence[str]) -> str:
 
 
 def _causes(sisters: Sequence[Sister]) -> tuple[SharedCause, ...]:
-    """Return the found causes, those of the fewest machines first."""
     there: dict[str, dict[str, float]] = defaultdict(dict)
     asked: dict[str, int] = defaultdict(int)
     for sister in sisters:

@@ -39,13 +39,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FleetOptions:
-    """What is asked of every session.
-
-    Attributes:
-        sources: None: the task's choice.
-        method: of ball positions, as in `calibrate`.
-        tests: empty for all.
-    """
+    """Options for every session."""
 
     sources: tuple[str, ...] | None = None
     method: Literal["jig", "conv-a", "conv-b"] = "jig"
@@ -70,12 +64,7 @@ class FleetOptions:
 
 @dataclass(frozen=True)
 class FleetPiece:
-    """One session to work on.
-
-    Attributes:
-        inputs: SHA-256 by path of the files that decide its result.
-        program: identity of the asking program.
-    """
+    """One session to work on."""
 
     task: str
     folder: Path
@@ -86,13 +75,10 @@ class FleetPiece:
 
 @dataclass(frozen=True)
 class Worked:
-    """What came of a piece.
+    """Result of a piece of work.
 
     Attributes:
-        problem: empty without failure.
         found: comparable results as plain numbers.
-        result: JSON of the task's command.
-        files: by extension.
     """
 
     problem: str = ""
@@ -249,7 +235,7 @@ COMPARED = ("G", "X", "Y", "R")
 
 
 def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
-    """Return means over repeats; u keeps what is common to them."""
+    """Return means over repeats; u keeps their common part."""
     grouped: dict[tuple[str, str, str, str], list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
         for figure in run.figures:

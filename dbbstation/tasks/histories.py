@@ -154,13 +154,7 @@ class _Reading:
         others: Callable[[Path], Sequence[Path]],
         processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
     ) -> dict[str, _Kind]:
-        """Return the figures of readable files in order.
-
-        Args:
-            work: computes them, or says why not.
-            others: further files that decide the result.
-            processes: number.
-        """
+        """Return the figures of readable files in order."""
         found: dict[str, _Kind] = {}
         reasons: dict[str, str] = {}
         unknown: dict[str, list[_File]] = {}
@@ -206,7 +200,6 @@ class _Reading:
 
 
 def _beside(session_file: Path) -> list[Path]:
-    """Return a session's other files: machine, plan, runs, seal."""
     folder = session_file.parent
     names = sorted(os.path.join(place, name) for place, _, here in os.walk(folder) for name in here)  # noqa: PTH118 - hundreds of folders
     return [Path(name) for name in names if name != str(session_file) and os.path.isfile(name)]  # noqa: PTH113 - the same
@@ -229,7 +222,6 @@ RUNS_WORTH_PROCESSES = 300
 
 
 def _processes_for(sessions: Sequence[Path]) -> int:
-    """Return how many processes are worth starting."""
     runs = sum(1 for path in sessions for _ in path.parent.glob("runs/*.csv"))
     return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
 
@@ -262,7 +254,6 @@ def _called(name: str) -> str:
 
 
 def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
-    """Return the content of a kept text, or None."""
     try:
         return None if text is None else read_json(kind, text)
     except ValueError:
@@ -270,7 +261,6 @@ def _understood(kind: type[_Kind], text: str | None) -> _Kind | None:
 
 
 def _first_of(error: StationError) -> str:
-    """Return an error on one line, with the count of further ones."""
     lines = str(error).splitlines()
     return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
 

@@ -40,7 +40,6 @@ class Recorded:
     Attributes:
         machine: nominal, equal in all sessions but for its name (the first's).
         observations: accepted runs in recording order.
-        sessions: SHA-256 of each session file by session name.
         warnings: harmless findings, and omitted runs.
     """
 
@@ -192,7 +191,7 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
 
 
 def _under(machine: Machine | None, observation: Observation) -> Observation:
-    """Return a run under a correcting control as a run of a nominal control whose struts were driven the same."""
+    """Return a run under a correcting control as one of a nominal control with equal strut lengths."""
     if machine is None:
         return observation
     poses = np.vstack([observation.motion().poses, observation.standing_pose])
@@ -201,7 +200,7 @@ def _under(machine: Machine | None, observation: Observation) -> Observation:
 
 
 def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
-    """Return a note on centres about balls under the spindle, which do not show the machine's place [CAL III-A]."""
+    """Return a note on balls under the spindle, whose centres do not show the machine's place [CAL III-A]."""
     tests = dict.fromkeys(run.test for run in runs if not session.plan.tests[run.test].ball.place_known)
     if not tests:
         return []
@@ -214,7 +213,7 @@ def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str
 
 
 def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[SessionFolder]) -> list[Observation]:
-    """Name a ball of one CMM sheet alike in all sessions, so that it has one error."""
+    """Give a ball of one CMM sheet the same name in all sessions, so that it has one error."""
     names: dict[tuple[object, ...], str] = {}
     of = {session.name: session for session in sessions}
     shared = []
@@ -229,7 +228,7 @@ def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[S
 def _with_thermometers(
     observations: Sequence[Observation], logs: Mapping[str, Sequence[tuple[float, Recording]]]
 ) -> list[Observation]:
-    """Tell every run the thermometers of its session that all used runs have."""
+    """Give every run the thermometers of its session that all used runs have."""
     of = {}
     for session, runs in logs.items():
         known = (set(o.raw.temperature_degc) for o in observations if o.setup.session == session)
@@ -244,7 +243,6 @@ def _thermometer(name: str, runs: Sequence[tuple[float, Recording]]) -> Thermome
 
 
 def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[float, Recording]]:
-    """Return readable runs of excluded tests, for their thermometers."""
     found = []
     for run in session.in_state(RunState.ACCEPTED):
         began = session.started_s(run)

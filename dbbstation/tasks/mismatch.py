@@ -233,7 +233,6 @@ def mismatch(
 
 
 def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
-    """Return the files' columns with the corrected simulation and the residual."""
     corrected = found.table.simulated + found.correction
     columns: dict[str, tuple[str | float, ...]] = {name: tabulated.columns[name] for name in tabulated.names}
     unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""

@@ -23,7 +23,7 @@ class HasModel(Protocol):
 
     @property
     def model(self) -> IdentifiedModel:
-        """The model."""
+        """Return the model."""
 
 
 Model = str | PathLike[str] | IdentifiedModel | HasModel

@@ -28,11 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ProgramText:
-    """An NC program in memory.
-
-    Attributes:
-        name: for messages and the header; its ending tells the dialect.
-    """
+    """An NC program in memory."""
 
     text: str
     name: str = "program.ngc"
@@ -56,10 +52,6 @@ def inverse_of(
 ) -> Inverse:
     """Return the model to compensate with; the header names its file and sessions by hash.
 
-    Args:
-        largest_mm: greatest correction.
-        prefer: `accuracy` or `position-only`.
-
     Raises:
         InputError: every fault with its place.
         ValueError: an unknown `prefer`.
@@ -74,9 +66,6 @@ def inverse_of(
 
 def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Provenance) -> dict[str, str]:
     """Return a program's origin for its header: files by role, program, command, other inputs.
-
-    Args:
-        inverse: states its own origin.
 
     Raises:
         InputError: a file cannot be read.
@@ -122,13 +111,11 @@ def setup_of(
     parameters: Path | None,
     tools: Path | None,
 ) -> ControlSetup:
-    """Return the offsets and tool lengths of a control as declared and from its files; what is declared comes first.
+    """Return the offsets and tool lengths of a control, declared ones before those of its files.
 
     Args:
         offsets: X, Y, Z, and A, B, C if not zero, of `G54` to `G59.3`, `G92`, `G28` and `G30` [mm, deg].
-        lengths: of tools by number [mm].
         parameters: LinuxCNC's parameter file.
-        tools: its tool table.
 
     Raises:
         InputError: faults of the files.

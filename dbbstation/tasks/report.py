@@ -147,7 +147,6 @@ _PHYSICS_MISSING = (
 def _read(
     sessions: Sequence[SessionFolder], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
 ) -> Recorded | StationError:
-    """Return the runs of sessions, or why they cannot be used."""
     tests, exclude = chosen
     try:
         found = load_sessions(sessions, exclude, telling.counted(READING), tests)
@@ -160,7 +159,7 @@ def _read(
 
 
 def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, telling: Telling) -> Modelled:
-    """Return what a model leaves, with a note on runs that it cannot take."""
+    """Return a model's residual, with a note on unsuitable runs."""
     if isinstance(runs, StationError):
         return Modelled(identified, None, str(runs))
     try:
@@ -175,7 +174,7 @@ def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, tellin
 def _ranked(
     recorded: Recorded | StationError, names: Sequence[str], identified: IdentifiedModel, telling: Telling
 ) -> Ranked:
-    """Return each cause's contribution under nominal programs, with a note on sessions that the model cannot take."""
+    """Return each cause's contribution under nominal programs, with a note on unsuitable sessions."""
     telling.stage("effects of causes")
     try:
         if isinstance(recorded, StationError):

@@ -96,7 +96,6 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
 
 
 def _as_printed(parameter: ModelParameter) -> ModelParameter:
-    """Return a parameter as `calibrate` prints it: in micrometres, name without unit."""
     name = parameter.name.removesuffix("_mm").replace("_", " ")
     if parameter.unit != "mm":
         return replace(parameter, name=name)
@@ -105,7 +104,7 @@ def _as_printed(parameter: ModelParameter) -> ModelParameter:
 
 
 def _in_words(circle: Circle) -> str:
-    """Return what comparable circles share: place, bar, tilt, elevation, feed."""
+    """Return the common facts of comparable circles: place, bar, tilt, elevation, feed."""
     place = " ".join(f"{axis}{round(value)}" for axis, value in zip("XYZ", circle.ball_mm, strict=True))
     tilt = " ".join(f"{axis}{value:g}" for axis, value in zip("ABC", circle.tilt_deg, strict=True) if value)
     raised = f", bar raised {circle.elevation_deg:g}°" if circle.elevation_deg else ""
@@ -113,7 +112,6 @@ def _in_words(circle: Circle) -> str:
 
 
 def _programs(runs: Iterable[RunEntry]) -> str:
-    """Return a hash over commanded programs, by their models or content."""
     found = sorted({run.program.model_sha256 or run.program.sha256 for run in runs if run.program is not None})
     return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16] if found else ""
 

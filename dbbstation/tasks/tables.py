@@ -48,15 +48,11 @@ class TableOptions:
     """What is asked of the files.
 
     Attributes:
-        measured: column.
-        simulated: column.
-        variables: meaning by name of columns that the difference may follow; None: all that qualify.
-        run: column that separates runs, or None.
+        variables: meaning by name of columns that the difference may follow; None: all suitable ones.
         time: column of time, `ROWS` for row order; None: guess.
         numbers: notation; None: decimal point and the header's most frequent separator.
         known: prior standard uncertainty of parameters, by name.
         free: parameters without prior.
-        has_offset: whether a constant difference is of no interest.
     """
 
     measured: str
@@ -72,12 +68,7 @@ class TableOptions:
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """Files read.
-
-    Attributes:
-        columns: texts by name, rows as in `table`.
-        notes: omissions with reasons.
-    """
+    """Files read."""
 
     table: Table
     names: tuple[str, ...]
@@ -188,7 +179,6 @@ millimetres. A difference of which the smaller is the millionth part has no digi
 
 
 def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
-    """Return columns with impossible numbers, with the line of the greatest."""
     faults = []
     for name in dict.fromkeys(names):
         size = np.abs(np.nan_to_num(file.values[name], nan=0.0, posinf=0.0, neginf=0.0))
@@ -202,7 +192,6 @@ def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
 
 
 def _faults_of_scale(files: Sequence[TableFile], asked: TableOptions) -> list[Problem]:
-    """Return why measured and simulated values cannot be one quantity."""
     greatest = {name: _greatest(files, name) for name in (asked.measured, asked.simulated)}
     less, more = min(greatest, key=lambda name: greatest[name]), max(greatest, key=lambda name: greatest[name])
     if greatest[less] == 0.0 or greatest[more] <= LARGEST_RATIO * greatest[less]:
@@ -287,7 +276,7 @@ class _Reader:
         return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
 
     def _note_order(self, clock: str | None, at: Variable | None, blocks: Sequence[slice]) -> None:
-        """Note what rows cannot say: a clock that stands, one run only."""
+        """Note the limits of the rows: a constant clock, or a single run."""
         if clock is not None and at is None:
             self._notes.append(
                 f"`{clock}` is the same in all rows: their order is unknown; give --time rows if they are in order"
@@ -318,7 +307,6 @@ class _Reader:
         return [name for name in found if self._is_numeric(name, values[name])]
 
     def _chosen(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
-        """Return the named columns that the difference may follow, or all without another role."""
         asked = self._asked
         if asked.variables is not None:
             return list(asked.variables)
@@ -363,7 +351,7 @@ class _Reader:
     def _order(
         self, values: Mapping[str, NDArray[np.float64]], used: Sequence[str], clock: str | None
     ) -> tuple[NDArray[np.int64], tuple[slice, ...], tuple[str, ...]]:
-        """Return complete rows, block by block in time order, with the blocks and their names."""
+        """Return complete rows, by block in time order, with the blocks and their names."""
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
         if not good.all():
             self._notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
@@ -408,7 +396,6 @@ class _Reader:
         return Meaning(found.unit, Kind.TIME) if name == self._asked.time else found
 
     def _variable(self, name: str, values: NDArray[np.float64], *, quiet: bool = False) -> Variable | None:
-        """Return a variable, or None for a constant."""
         meaning = self._meaning(name)
         if np.ptp(values) == 0.0:
             if not quiet:
@@ -441,7 +428,7 @@ class _Reader:
 
 
 def _is_a_line(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Whether columns are one but for scale and origin: no effect tells them apart."""
+    """Return whether columns are equal except for scale and origin, so that no effect separates them."""
     if np.array_equal(one, other):
         return True
     a, b = (column - column.mean() for column in (one, other))
@@ -454,7 +441,6 @@ ROUNDED = 1e-9
 
 
 def _by_clock(rows: NDArray[np.int64], clock: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Return parts of rows at restarts of a clock; all rows as one if it restarts often."""
     back = np.flatnonzero(np.diff(clock[rows]) < 0.0) + 1
     if len(back) and len(rows) >= MOST_RESETS * (len(back) + 1):
         return np.split(rows, back)

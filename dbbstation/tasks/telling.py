@@ -18,7 +18,7 @@ class Progress(Protocol):
     """Receives the progress of work."""
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Take a stage, and how much of it is done if countable."""
+        """Take a stage, and its completed part if countable."""
 
 
 def silent(text: str, done: int = 0, of: int = 0) -> None:

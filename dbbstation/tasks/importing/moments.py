@@ -1,4 +1,4 @@
-"""When a run was taken, by a column, lines above the table, or the file's name."""
+"""When a run was recorded, by a column, lines above the table, or the file's name."""
 
 from __future__ import annotations
 
@@ -49,11 +49,7 @@ _IN_A_NAME = re.compile(
 
 
 class UnclearMomentError(ValueError):
-    """A date that is none, or ambiguous.
-
-    Args:
-        key: of the line above the table, or empty.
-    """
+    """A date that is none, or ambiguous."""
 
     def __init__(self, what: str, key: str = "") -> None:
         self.what, self.key = what, key
@@ -110,10 +106,9 @@ def moment_in(text: str, zone: tzinfo | None) -> Moment:
 
 
 def moment_of(in_column: str, comments: Mapping[str, str], stem: str, zone: str | None) -> Moment | None:
-    """Return when a run was taken: by column, lines above the table, or file name; else None.
+    """Return when a run was recorded: by column, lines above the table, or file name; else None.
 
     Args:
-        in_column: its cell; may be empty.
         comments: lines above the table, by key in small letters.
         zone: default; None: this computer's.
 
@@ -133,9 +128,6 @@ def moment_of(in_column: str, comments: Mapping[str, str], stem: str, zone: str 
 
 def moment_above(comments: Mapping[str, str], zone: tzinfo | None) -> tuple[str, Moment] | None:
     """Return key and moment of the lines above a table, or None.
-
-    Args:
-        comments: by key in small letters.
 
     Raises:
         UnclearMomentError: such a line is unclear.

@@ -35,7 +35,7 @@ class RunName:
 
 
 def named_by(pattern: str, stem: str) -> dict[str, str]:
-    """Return the run in a file name by a pattern such as `{test}_{direction}`; empty if it does not fit."""
+    """Return the run in a file name by a pattern such as `{test}_{direction}`; empty without match."""
     parts = re.split(r"\{(test|direction|repeat)\}", pattern)
     fields = {
         TEST: r"(?P<test>[A-Za-z0-9][A-Za-z0-9.]*?)",

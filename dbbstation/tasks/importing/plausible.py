@@ -37,11 +37,7 @@ CHANCE = 1e-3
 
 @dataclass(frozen=True)
 class Implausible:
-    """Numbers that contradict their meaning.
-
-    Attributes:
-        others: plausible meanings, such as `deviation:mm`.
-    """
+    """Numbers that contradict their meaning."""
 
     what: str
     means: str
@@ -54,7 +50,6 @@ def unlike_a_bar(
     """Return why a turn's readings contradict their unit while another fits, or None.
 
     Args:
-        numbers: as in the file, shape (n,).
         means: `length` or `deviation`.
         zero_mm: length at deviation 0.
         feed_in_mm: spanned too; None for a turn alone.
@@ -83,11 +78,7 @@ def unlike_a_bar(
 
 
 def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | None:
-    """Return why angles contradict their unit while another gives a turn, or None.
-
-    Args:
-        theta_deg: by the stated unit, in order of time, shape (n,).
-    """
+    """Return why angles contradict their unit while another gives a turn, or None."""
     span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
     turns = [
         f"{ANGLE}:{one}"
@@ -102,12 +93,7 @@ def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | No
 def unlike_the_feed(
     t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], unit: str, circle: Circle
 ) -> Implausible | None:
-    """Return why times contradict their unit while another gives the plan's feed, or None.
-
-    Args:
-        t_s: by the stated unit, shape (n,).
-        theta_deg: in order of time, shape (n,).
-    """
+    """Return why times contradict their unit while another gives the plan's feed, or None."""
     turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
     took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
     if took <= 0.0 or turned <= 0.0:
@@ -135,9 +121,6 @@ def check_units(
     circle: Circle,
 ) -> None:
     """Refuse numbers that contradict their unit while another fits.
-
-    Args:
-        values: by meaning, in units of run files, shape (n,).
 
     Raises:
         UnusableTravelError: with the fitting units.
@@ -177,12 +160,7 @@ def check_units(
 
 
 def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the least-squares centre, shape (2,) [mm], from the first harmonic.
-
-    Args:
-        length_mm: shape (n,).
-        theta_deg: from +X towards +Y, shape (n,).
-    """
+    """Return the least-squares centre, shape (2,) [mm], from the first harmonic."""
     angle = np.radians(theta_deg)
     columns = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
     found: NDArray[np.float64] = np.linalg.lstsq(columns, length_mm, rcond=None)[0][1:]
@@ -190,10 +168,10 @@ def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) ->
 
 
 def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[NDArray[np.float64]]]]) -> float | None:
-    """Return the probability that raw circles lie as near to their commanded centres by chance; None if unknown.
+    """Return the probability that raw circles are as near to their commanded centres by chance; None if unknown.
 
-    Each axis of a centre scatters at least by CMM and holder (sigma). A distance up to r has a probability of at most 1 -
-    exp(-r² / (2 sigma²)). Fisher's method combines independent balls.
+    Each axis of a centre scatters at least by CMM and holder (sigma). A distance up to r has a probability of at most 1
+    - exp(-r² / (2 sigma²)). Fisher's method combines independent balls.
 
     Args:
         centres: of each ball with known place, its runs' centres, shape (2,) each [mm].

@@ -158,11 +158,7 @@ EXPORTED = frozenset({"test", "direction", "repeat", columns.TIME, columns.THETA
 
 @dataclass(frozen=True)
 class Proposed:
-    """A column's probable meaning.
-
-    Attributes:
-        unit: empty if not named or none exists.
-    """
+    """A column's probable meaning."""
 
     means: str
     unit: str = ""
@@ -215,7 +211,6 @@ def _meaning(name: str) -> str | None:
 
 
 def _unit(text: str, meaning: str) -> str:
-    """Return the unit in a name, in brackets or as last word; empty if none."""
     bracket = re.search(r"[\[(（]\s*([^\])）]*?)\s*[\])）]", text)
     word = bracket[1] if bracket else re.split(r"[\s_,/]+", text.strip())[-1]
     unit = _UNIT_WORDS.get(_plain(word), "")
@@ -223,5 +218,4 @@ def _unit(text: str, meaning: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return a unit for comparison: micro sign, small letters."""
     return text.strip().lower().replace("μ", "µ").replace("μ", "µ")

@@ -57,11 +57,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ImportedRun:
-    """A run as it will be written.
-
-    Attributes:
-        computed: values that the file lacks, in words.
-    """
+    """A run as it will be written."""
 
     file: str
     run: FinishedRun
@@ -79,7 +75,6 @@ class Reader:
     """Turns tables into runs and gathers every fault.
 
     Args:
-        started: of each file's first run, if stated.
         trusted: doubtful properties to accept: `unit`.
         left_out: grows by skipped runs with reasons.
     """
@@ -93,11 +88,7 @@ class Reader:
     _taken: set[tuple[str, Direction, int]] = field(default_factory=set)
 
     def read(self, table: ForeignTable, told: Sequence[RunName]) -> list[ImportedRun]:
-        """Return the runs of a table.
-
-        Args:
-            told: runs in order, if rows do not name them; a single test names all.
-        """
+        """Return the runs of a table."""
         file = table.table.file
         unmapped = [name for name in table.table.names if name not in self.mapping.columns]
         missing = [name for name in self.mapping.columns if name not in table.table.names]
@@ -270,7 +261,6 @@ class Reader:
     def _values(
         self, table: ForeignTable, rows: NDArray[np.int64]
     ) -> tuple[dict[str, NDArray[np.float64]], tuple[str, ...]]:
-        """Return numbers by meaning in units of a run file, shape (n,), and notes; columns without numbers are left out."""
         found, said = {}, list[str]()
         for name, column in self.mapping.columns.items():
             if column.means not in UNITS or column.unit is None:
@@ -284,7 +274,6 @@ class Reader:
         return found, tuple(said)
 
     def _named(self, table: ForeignTable, said: Mapping[str, str], told: RunName, line: int) -> RunName:
-        """Return the run by command line, else columns, lines above the table, or file name."""
         file = PurePath(table.table.file).stem
         pattern = named_by(self.mapping.file_name, file) if self.mapping.file_name else {}
         sources = (
@@ -330,7 +319,7 @@ class Reader:
         return next(iter(spans), None) if all(span is not None for span in spans) else None
 
     def says_test(self, table: ForeignTable) -> bool:
-        """Return whether a file names its test and direction."""
+        """Return whether a file states its test and direction."""
         if self.mapping.column(TEST) is not None:
             return True
         name = self._named(table, {}, RunName(), table.table.header)
@@ -363,7 +352,6 @@ class Reader:
     def _started(
         self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
     ) -> datetime | None:
-        """Return a run's time by command line, else column, lines above the table, or file name; else None."""
         later = timedelta(seconds=self._later_s(table, rows))
         if table.table.file in self.started:
             return self.started[table.table.file] + later
@@ -381,7 +369,6 @@ class Reader:
         return found.at if in_column else found.at + later
 
     def _later_s(self, table: ForeignTable, rows: NDArray[np.int64]) -> float:
-        """Return a run's begin after the file's first sample [s]; 0 if unknown."""
         name = self.mapping.column(TIME)
         if name is None:
             return 0.0
@@ -398,11 +385,7 @@ _SAY_IT = "add it to the mapping, as `ignored` where it does not matter"
 
 
 def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
-    """Return the probability that runs lie as near to their commanded centres by chance; None if unknown.
-
-    Args:
-        runs: those without angles are ignored.
-    """
+    """Return the probability that runs are as near to their commanded centres by chance; None if unknown."""
     centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
     for one in runs:
         columns_of = one.run.columns

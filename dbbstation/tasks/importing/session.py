@@ -34,12 +34,7 @@ IMPORTED = "imported"
 def originals(
     tables: Mapping[Path, bytes], mapping: MappingFile, provenance: Provenance, statements: Sequence[str]
 ) -> dict[str, str | bytes]:
-    """Return what a session keeps of its import, content by relative path.
-
-    Args:
-        tables: original bytes.
-        statements: computed and assumed facts.
-    """
+    """Return the files of its import that a session keeps, content by relative path."""
     names: dict[str, bytes] = {}
     for path, data in tables.items():
         name, k = path.name, 2
@@ -64,15 +59,10 @@ def staged(
     *,
     dry: bool,
 ) -> Iterator[Callable[[], None]]:
-    """Write a session beside its place, read it and cut every accepted run; yield what moves it there.
+    """Write a session beside its place, read it and cut every accepted run; yield a function that moves it there, or else it is removed.
 
     Args:
-        runs: in order.
-        more: further files by relative path.
         dry: never move it; use the system's temporary folder.
-
-    Yields:
-        What puts the session in its place; it is gone where that was not called.
 
     Raises:
         InputError: no circle of the plan has a run's lengths, times or angles.

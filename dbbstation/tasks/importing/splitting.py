@@ -21,11 +21,7 @@ SMALLEST_RUN_DEG = 90.0
 
 
 def longest_pause_s(circles: Sequence[Circle]) -> float:
-    """Return the longest pause within a run [s].
-
-    Args:
-        circles: the slowest decides.
-    """
+    """Return the longest pause within a run [s]."""
     return max(LARGEST_GAP_DEG / circle.turning_deg_s for circle in circles)
 
 
@@ -34,7 +30,6 @@ def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pau
 
     Args:
         t_s: shape (n,); None if the file has none.
-        lines: of each row, shape (n,).
     """
     begins = np.diff(lines) > 1
     if t_s is not None:
@@ -47,9 +42,6 @@ def parts_by_direction(angle_deg: NDArray[np.float64]) -> list[NDArray[np.int64]
     """Return the rows of each run, separated by a change of turning direction.
 
     A turn back is at least 90 degrees; the run ends at its farthest angle.
-
-    Args:
-        angle_deg: in order of time, shape (n,).
     """
     travelled = np.unwrap(angle_deg, period=FULL_TURN_DEG)
     ends: list[int] = []

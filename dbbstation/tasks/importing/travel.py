@@ -43,9 +43,7 @@ class TravelledPath:
     """When and where a run's samples were taken.
 
     Attributes:
-        t_s: rising, shape (n,).
         theta_deg: from +X towards +Y, shape (n,); None: find the circle in the trace.
-        rows: which rows of the file these are, shape (n,).
         computed: values that the file lacks, in words.
     """
 
@@ -64,7 +62,6 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
     """Return angles from +X towards +Y, shape (n,) [deg].
 
     Args:
-        angle_deg: as in the file, shape (n,).
         said: its zero and sense.
 
     Raises:
@@ -82,11 +79,7 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
 
 
 def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float | None:
-    """Return the angles' span if it is neither a turn nor the plan's path with overshoot, else None [deg].
-
-    Args:
-        theta_deg: in the machine, in order of time, shape (n,).
-    """
+    """Return the angles' span if it is neither a turn nor the plan's path with overshoot, else None [deg]."""
     travelled = _unwrapped(theta_deg)
     spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
     span = float(np.ptp(travelled))
@@ -102,7 +95,6 @@ def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle:
     """Return notes on a confirmed span that is not the plan's.
 
     Args:
-        theta_deg: in the machine, in order of time, shape (n,).
         stated_deg: confirmed; None if not.
 
     Raises:
@@ -126,8 +118,6 @@ def travel(
     """Return a run's times and angles.
 
     Args:
-        t_s: of the file, shape (n,); None if it has none.
-        theta_deg: in the machine, shape (n,); None if it has none.
         trace: without angles: `whole` or `turn`.
 
     Raises:
@@ -168,7 +158,6 @@ def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str
 
 
 def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -> TravelledPath:
-    """Return angles of a turn from the first sample at the programmed feed."""
     progress = (t_s - t_s[0]) * circle.turning_deg_s
     if progress[-1] < LEAST_TURN * FULL_TURN_DEG:
         turn_s = FULL_TURN_DEG / circle.turning_deg_s

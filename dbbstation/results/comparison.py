@@ -13,7 +13,7 @@ from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 from dbbstation.results.levels_text import level_sentences
 
 
@@ -197,16 +197,5 @@ class ComparisonResult(Framed):
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per run."""
-        return [
-            {
-                "test": run.test,
-                "direction": run.direction,
-                "differs": run.differs,
-                "found_rms_um": run.found_rms_um,
-                "rms_um": run.rms_um,
-                "noise_rms_um": run.noise_rms_um,
-                "peak_um": run.peak_um,
-                "peak_theta_deg": run.peak_theta_deg,
-            }
-            for run in self.runs
-        ]
+        beyond = ("differs", "found_rms_um", "rms_um", "noise_rms_um", "peak_um", "peak_theta_deg")
+        return [picked(run, "test", "direction", *beyond) for run in self.runs]

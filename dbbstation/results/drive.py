@@ -10,7 +10,7 @@ from dbbstation.diagnosis.drive.findings import DriveFindings
 from dbbstation.facts.serialise import Absent
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.recordings.drive_csv import compared_csv
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class DriveResult(Framed, DriveFindings):
     def rows(self) -> list[dict[str, object]]:
         """Return one row per cause."""
         shown = ("name", "verdict", "probability", "gain", "concealed", "signature_rms_n", "text")
-        return [{name: getattr(one, name) for name in shown} for one in self.sources]
+        return [picked(one, *shown) for one in self.sources]
 
 
 def drive_result(found: DriveFindings, drawing: Callable[[object], bytes] | None = None) -> DriveResult:

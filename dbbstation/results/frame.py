@@ -149,6 +149,11 @@ class Framed:
         return f"{said}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 
+def picked(one: object, *names: str) -> dict[str, object]:
+    """Return fields of an object by name."""
+    return {name: getattr(one, name) for name in names}
+
+
 def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row))
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dbbstation.facts.serialise import Kept
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 
 
 @dataclass(frozen=True)
@@ -188,24 +188,15 @@ class HistoryResult(Framed):
 
     def rows(self) -> list[dict[str, object]]:
         """Return a row per machine, quantity and session, None for gaps."""
+        of_quantity = ("quantity", "figure", "test", "direction", "of", "unit")
+        charted = ("level", "z", "cusum_high", "cusum_low")
         return [
             {
                 "machine": machine.machine,
-                "quantity": one.quantity,
-                "figure": one.figure,
-                "test": one.test,
-                "direction": one.direction,
-                "of": one.of,
-                "unit": one.unit,
-                "session": value.session,
-                "started": value.started,
-                "value": value.value,
-                "u": value.u,
+                **picked(one, *of_quantity),
+                **picked(value, "session", "started", "value", "u"),
                 "limit": one.limit,
-                "level": value.level,
-                "z": value.z,
-                "cusum_high": value.cusum_high,
-                "cusum_low": value.cusum_low,
+                **picked(value, *charted),
                 "event": next((event.verdict for event in one.events if event.found == value.session), None),
                 "model_warning": "; ".join(self.model_warnings.get(value.session, ())) if one.test is None else None,
             }

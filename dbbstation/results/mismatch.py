@@ -20,7 +20,7 @@ from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import Span
 from dbbstation.inference.verdict import Gains
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 from dbbstation.results.levels_text import level_sentences
 
 
@@ -188,15 +188,5 @@ class MismatchResult(Framed):
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per effect."""
-        return [
-            {
-                "name": one.name,
-                "verdict": one.verdict,
-                "probability": one.probability,
-                "log_bayes_factor": one.log_bayes_factor,
-                "rms": one.rms,
-                "confounded": one.confounded,
-                "text": one.text,
-            }
-            for one in self.findings
-        ]
+        shown = ("name", "verdict", "probability", "log_bayes_factor", "rms", "confounded", "text")
+        return [picked(one, *shown) for one in self.findings]

@@ -12,7 +12,7 @@ from dbbstation.facts.serialise import Kept
 from dbbstation.files.atomic import write_text
 from dbbstation.files.provenance import Provenance
 from dbbstation.nc.remarks import said_acceleration
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
@@ -82,18 +82,8 @@ class ProgramsResult(Framed):
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per program."""
-        return [
-            {
-                "file": one.file,
-                "points": one.points,
-                "greatest_correction_um": one.greatest_correction_um,
-                "model_uncertainty_um": one.model_uncertainty_um,
-                "chord_error_um": one.chord_error_um,
-                "feed_s": one.feed_s,
-                "nominal_feed_s": one.nominal_feed_s,
-            }
-            for one in self.programs
-        ]
+        sizes = ("greatest_correction_um", "model_uncertainty_um", "chord_error_um", "feed_s", "nominal_feed_s")
+        return [picked(one, "file", "points", *sizes) for one in self.programs]
 
 
 def programs_result(

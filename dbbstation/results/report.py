@@ -13,7 +13,7 @@ from dbbstation.facts.serialise import Kept
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.effects import CauseContribution
 from dbbstation.results.evaluation import EvaluationResult
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 
 
 @dataclass(frozen=True)
@@ -93,10 +93,7 @@ class ReportResult(Framed):
         """Return one row per circle; lengths in µm."""
         return [
             {
-                "session": one.session,
-                "test": one.test,
-                "direction": one.direction,
-                "repeat": one.repeat,
+                **picked(one, "session", "test", "direction", "repeat"),
                 **{
                     f"{name.replace('-', '_')}_{unit}": value
                     for name, size in one.now.items()

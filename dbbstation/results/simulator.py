@@ -16,7 +16,7 @@ from dbbstation.files.provenance import Provenance
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 from dbbstation.results.levels_text import level_sentences
 
 
@@ -161,16 +161,5 @@ class SimulatorResult(Framed):
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per term."""
-        return [
-            {
-                "name": one.name,
-                "verdict": one.verdict,
-                "port": one.port,
-                "probability": one.probability,
-                "log_bayes_factor": one.log_bayes_factor,
-                "rms": one.rms,
-                "confounded": one.confounded,
-                "text": one.text,
-            }
-            for one in self.findings
-        ]
+        shown = ("name", "verdict", "port", "probability", "log_bayes_factor", "rms", "confounded", "text")
+        return [picked(one, *shown) for one in self.findings]

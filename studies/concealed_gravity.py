@@ -93,8 +93,8 @@ def concealed_gravity(
         "held_out_um": {"kinematic": held_out[0], "joint": held_out[1]},
         "verdict": str(gravity_finding.verdict),
         "concealed": gravity_finding.concealed,
-        "signature_um": gravity_finding.whole_um,
-        "unconcealed_um": gravity_finding.rest_um,
+        "signature_um": gravity_finding.signature_rms_um,
+        "unconcealed_um": gravity_finding.unconcealed_rms_um,
         "compliance_um_kn": {"true": COMPLIANCE_UM_KN, "found": value.value, "uncertainty": value.uncertainty},
         "base_joint_shift_um": {"greatest": float(np.abs(shifts).max(initial=0.0)), "rms": _rms(shifts)},
         "tilted_circle": {

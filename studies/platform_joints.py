@@ -133,11 +133,11 @@ def _round(found: Diagnosis, truth: MachineModel, tests: int, added: Sequence[st
         added=tuple(added),
         verdict=str(finding.verdict),
         ambiguous_with=finding.ambiguous_with,
-        gain=finding.gain,
-        concealed=finding.concealed,
+        gain=finding.gain or 0.0,
+        concealed=finding.concealed or 0.0,
         kinematic_um=_apart_um(found.before.model.of_the_machine(), truth),
         joint_um=_apart_um(found.after.model.of_the_machine(), truth),
-        stated_um=None if found.workspace is None else found.workspace.uncertainty_um,
+        stated_um=None if found.workspace is None else found.workspace.uncertainty_rms_um,
         held_out=(before.normalised, after.normalised),
     )
 
@@ -153,16 +153,16 @@ def _apart_um(model: MachineModel, truth: MachineModel) -> float:
 def _planned(plan: Plan, proposed: Sequence[NextTest], round_number: int) -> dict[str, PlannedTest]:
     tests = {}
     for k, test in enumerate(proposed):
-        place = tuple(test.circle[f"{axis}_mm"] for axis in "xyz")
+        place = tuple(getattr(test, f"{axis}_mm") for axis in "xyz")
         like = min(
             plan.tests.values(), key=lambda known: float(np.linalg.norm(np.subtract(known.ball.centre_mm, place)))
         )
         x, y, z = like.ball.centre_mm
-        elevation = test.circle["elevation_deg"]
+        elevation = test.elevation_deg
         height = z + like.circle.bar_mm * float(np.sin(np.radians(elevation)))
         circle = replace(
             like.circle,
-            tilt_deg=(test.circle["a_deg"], test.circle["b_deg"], 0.0),
+            tilt_deg=(test.a_deg, test.b_deg, 0.0),
             elevation_deg=elevation,
             centre_mm=(x, y, height),
         )

@@ -16,13 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dbbstation.results.diagnosis import (
-        CauseResult,
-        DiagnosisFigures,
-        DiagnosisResult,
-        UnexplainedCurve,
-        WorkspaceGain,
-    )
+    from dbbstation.diagnosis.findings import Curve, SourceFinding
+    from dbbstation.diagnosis.workspace import WorkspaceError
+    from dbbstation.results.diagnosis import DiagnosisFigures, DiagnosisResult
 
 EFFECTS = "Rank the causes by what each contributes to the circles, with its cure and the circles as they would be without it."
 
@@ -104,7 +100,7 @@ def _print_mismatch(result: DiagnosisFigures) -> None:
     echo()
 
 
-def _print_workspace(elsewhere: WorkspaceGain) -> None:
+def _print_workspace(elsewhere: WorkspaceError) -> None:
     """Print the distance of two models' tools, with and without common shift, and its uncertainty."""
     shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere.common_shift_um, strict=True))
     for which, error, u, more in (
@@ -144,7 +140,7 @@ MOST_POINTS = 12
 """Points of a curve that are printed, at the most; a wave has many more, and its size and period are printed."""
 
 
-def _print_curve(curve: UnexplainedCurve) -> None:
+def _print_curve(curve: Curve) -> None:
     from dbbstation.cli.output import print_table
 
     points = curve.points
@@ -182,7 +178,7 @@ def _print_gain(result: DiagnosisFigures) -> None:
         )
 
 
-def _print_sources(sources: Sequence[CauseResult]) -> None:
+def _print_sources(sources: Sequence[SourceFinding]) -> None:
     from dbbstation.cli.output import print_table
 
     rows = []
@@ -217,7 +213,7 @@ SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
 """Verdicts of causes whose values are printed."""
 
 
-def _probable(source: CauseResult) -> str:
+def _probable(source: SourceFinding) -> str:
     """Return a probability, no closer to one or zero than the catalogue is complete."""
     if source.probability is None:
         return ""

@@ -95,7 +95,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     findings = judge(explained, outcome, anew, levels)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
-    rivals = [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]]
+    rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[:RIVALS]]
     again = {} if stopped else found_again(explained, rivals)
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
     rest = _unexplained(explained, settled.left)
@@ -161,7 +161,7 @@ def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str
     causes remain.
     """
     members = {member.cause.name for member in explained.settled.members}
-    doubted = {f.name for f in findings if f.probability < EVEN and not (f.ambiguous_with or f.equivalent)}
+    doubted = {f.name for f in findings if (f.probability or 0.0) < EVEN and not (f.ambiguous_with or f.equivalent)}
     return members & doubted
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
 
+from pydantic import Field, computed_field
+
+from dbbstation.diagnosis.shapes import Follows
+from dbbstation.facts.serialise import Absent, Kept, OrNull
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
-    from dbbstation.diagnosis.shapes import Follows
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.chosen_anew import ChosenAnew
@@ -34,53 +38,54 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SourceFinding:
     """Finding on one source.
 
     Attributes:
-        ambiguous_with: sources of about equal explanation.
+        verdict: see docs/verdicts.md.
+        ambiguous_with: causes of about equal explanation.
         concealed: share of squares absorbed by machine parameters.
-        whole_um: signature's rms over runs.
-        parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
-        probability: given the catalogue; of its class if any.
+        signature_rms_um: its effect on readings.
+        unconcealed_rms_um: part beyond kinematic parameters.
+        gain: log Bayes factor.
         stability: selection frequency over seven tenths of tests; None if not tried.
-        equivalent: with itself; may be empty.
-        acts: always or once.
+        probability: given the catalogue; of its class if any.
+        equivalent: with itself; `class` in JSON.
+        log_evidence: the gain under its older name.
+        persists: a single event, confirmed by held-out tests.
         sigmas: norm over standard deviation; 0 if outside the best set.
         gains: held-out; None if not tested.
+        parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
     """
 
     name: str
     verdict: Verdict
-    ambiguous_with: tuple[str, ...]
-    gain: float
-    concealed: float
-    whole_um: float
-    rest_um: float
-    parameters: dict[str, Value]
-    text: str
-    probability: float
+    ambiguous_with: tuple[str, ...] = ()
+    concealed: float | None = None
+    signature_rms_um: Annotated[float | None, Absent] = None
+    unconcealed_rms_um: Annotated[float | None, Absent] = None
+    gain: float | None = None
     stability: float | None = None
-    equivalent: tuple[str, ...] = ()
-    acts: Acts = Acts.ALWAYS
-    sigmas: float = 0.0
+    probability: float | None = None
+    equivalent: Annotated[tuple[str, ...], Field(serialization_alias="class")] = ()
+    log_evidence: float | None = None
+    acts: Acts | None = None
+    persists: bool = False
+    sigmas: float | None = None
     gains: Gains | None = None
-
-    @property
-    def persists(self) -> bool:
-        """Return whether held-out tests confirm a single event."""
-        return self.verdict is Verdict.HAPPENED and self.gains is not None and self.gains.predicts
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Location:
-    """Where the misfit is.
+    """Where the misfit is large.
 
     Attributes:
-        direction: `ccw` or `cw`.
         theta_deg: from, to: from +X towards +Y.
-        strut: 1 to 6.
+        strut: 1 to 6; None if no strut stands out.
+        variable: None in JSON if it is empty.
         peak_um: greatest smoothed deviation.
     """
 
@@ -88,9 +93,19 @@ class Location:
     direction: str
     theta_deg: tuple[float, float]
     strut: int | None
-    variable: str
+    variable: OrNull
     share: float
     peak_um: float
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def text(self) -> str:
+        """Return it in words."""
+        first, last = self.theta_deg
+        by = f", by {self.variable}" if self.variable else ""
+        strut = f", strut {self.strut} most" if self.strut else ""
+        where = f"test {self.test} {self.direction} from {first:.0f} to {last:.0f} degrees"
+        return f"{where}: up to {self.peak_um:+.1f} µm{by}{strut}"
 
 
 @dataclass(frozen=True)
@@ -127,19 +142,17 @@ class Curve:
     unconcealed_um: float
     points: tuple[CurvePoint, ...]
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def variable(self) -> str:
         """Return the variable as printed."""
         return str(self.follows)
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def period_mm(self) -> float | None:
         """Return a length wave's period [mm], else None."""
         return self.period if self.follows.variable == "strut-length" else None
-
-    def plain(self) -> dict[str, object]:
-        """Return it as plain values for JSON."""
-        return {"variable": self.variable, "period_mm": self.period_mm, **asdict(self)}
 
 
 @dataclass(frozen=True)
@@ -152,11 +165,12 @@ class Unexplained:
 
     rms_um: float
     strut: int | None
-    follows: Follows | None
-    gain: float
+    follows: Annotated[Follows | None, Kept]
+    gain: Annotated[float, Kept]
     text: str
     curve: Curve | None = None
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def variable(self) -> str | None:
         """Return the variable as printed, or None."""
@@ -165,35 +179,38 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Shift:
-    """A parameter's bias in the earlier calibration.
+    """Bias of a kinematic parameter in the earlier calibration.
 
     Attributes:
         before_um: without found sources.
+        shift_um: before less after.
     """
 
     parameter: str
     before_um: float
     after_um: float
+    shift_um: float
     uncertainty_um: float
 
-    @property
-    def shift_um(self) -> float:
-        """Return the bias [µm]."""
-        return self.before_um - self.after_um
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class NextTest:
-    """A test worth measuring next.
+    """A circle worth measuring next.
 
     Attributes:
-        circle: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg, feed_mm_min, wait_s.
         source: to reveal or distinguish.
         sigma_before: of its amplitude or most improved combination, with earlier tests.
     """
 
     text: str
-    circle: dict[str, float]
+    x_mm: float
+    y_mm: float
+    z_mm: float
+    a_deg: float
+    b_deg: float
+    elevation_deg: float
+    feed_mm_min: float
+    wait_s: float
     source: str
     sigma_before: float
     sigma_after: float

@@ -50,7 +50,9 @@ def next_tests(
     """
     channel, settled = explained.channel, explained.settled
     could_be = ForeseenTests(channel)
-    known = elsewhere is None or (elsewhere.uncertainty_um is not None and elsewhere.uncertainty_um < elsewhere.rms_um)
+    known = elsewhere is None or (
+        elsewhere.uncertainty_rms_um is not None and elsewhere.uncertainty_rms_um < elsewhere.error_rms_um
+    )
     causes = {cause.name: cause for cause in settled.causes if cause.named}
     found = {m.cause.name: channel.whole(m.cause.name, m.variant) for m in settled.members}
     for finding in findings:
@@ -157,9 +159,20 @@ def _in_words(
 ) -> NextTest:
     parameter = next(p for p in source.parameters(channel.machine) if not p.grid)
     unit = float(variant.plausible[0])
-    x, y, z = proposal.circle.ball_mm
-    a, b, _ = proposal.circle.tilt_deg
-    circle = {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "wait_s": proposal.wait_s}
-    circle["elevation_deg"] = proposal.circle.elevation_deg
-    circle["feed_mm_min"] = proposal.circle.feed_mm_min
-    return NextTest(proposal.text, circle, source.name, before * unit, after * unit, parameter.unit)
+    circle = proposal.circle
+    (x, y, z), (a, b, _) = circle.ball_mm, circle.tilt_deg
+    return NextTest(
+        text=proposal.text,
+        x_mm=x,
+        y_mm=y,
+        z_mm=z,
+        a_deg=a,
+        b_deg=b,
+        elevation_deg=circle.elevation_deg,
+        feed_mm_min=circle.feed_mm_min,
+        wait_s=proposal.wait_s,
+        source=source.name,
+        sigma_before=before * unit,
+        sigma_after=after * unit,
+        unit=parameter.unit,
+    )

@@ -24,7 +24,7 @@ def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]
             continue
         for k, parameter in enumerate(term.parameters):
             row = row_of[term.source.name, term.shared, parameter.name]
-            old, new = before.x[term.columns.start + k], after.x[row]
+            old, new = 1e3 * float(before.x[term.columns.start + k]), 1e3 * float(after.x[row])
             name = f"{term.source.name} {parameter.name.removesuffix('_mm')}"
-            shifts.append(Shift(name, 1e3 * float(old), 1e3 * float(new), 1e3 * float(sigma[row])))
+            shifts.append(Shift(name, old, new, old - new, 1e3 * float(sigma[row])))
     return tuple(sorted(shifts, key=lambda shift: -abs(shift.shift_um)))

@@ -12,6 +12,7 @@ from dbbstation.diagnosis.findings import CurvePoint
 from dbbstation.diagnosis.refit import refitted
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.errors import CalibrationError, ModelError
+from dbbstation.facts.serialise import plain
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Effect, ErrorSource, Fitted
 from dbbstation.sources.registry import sources_named
@@ -51,7 +52,7 @@ class JointFitWithCurve:
 
     def identified(self, report: Mapping[str, Any], sessions: Mapping[str, str]) -> IdentifiedModel:
         """Return the model to keep; unfitted parameters are zero."""
-        found = identified_model(self.fit, {**report, "unexplained": self.curve.plain()}, sessions)
+        found = identified_model(self.fit, {**report, "unexplained": plain(self.curve)}, sessions)
         machine, name = found.model.machine, self.source.name
         names = [parameter.name for parameter in self.source.parameters(machine)]
         sources = tuple(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from dbbstation.inference.concealment import concealment
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.verdict import ABSENT, OUT, SURE
+from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -58,11 +58,16 @@ class _CircleJudge(CauseJudge):
     def findings(self) -> tuple[SourceFinding, ...]:
         """Return all findings."""
         found = [self._source_finding(cause) for cause in self._named.values()]
+        nothing: Any = dict.fromkeys(
+            ("concealed", "signature_rms_um", "unconcealed_rms_um", "gain", "log_evidence"), 0.0
+        )
         found += [
-            SourceFinding(name, Verdict.RULED_OUT, (), 0.0, 0.0, 0.0, 0.0, {}, why, probability=0.0)
+            SourceFinding(
+                name=name, verdict=Verdict.RULED_OUT, **nothing, probability=0.0, acts=Acts.ALWAYS, sigmas=0.0, text=why
+            )
             for name, why in self._settled.refused.items()
         ]
-        return tuple(sorted(found, key=lambda f: (f.verdict.rank, -f.gain)))
+        return tuple(sorted(found, key=lambda f: (f.verdict.rank, -(f.gain or 0.0))))
 
     def _source_finding(self, cause: Cause) -> SourceFinding:
         one, member = self.finding(cause), self._members.get(cause.name)
@@ -79,13 +84,15 @@ class _CircleJudge(CauseJudge):
             ambiguous_with=self._in_words(one.ambiguous_with),
             gain=one.log_factor,
             concealed=one.confounded,
-            whole_um=1e3 * one.whole_rms,
-            rest_um=1e3 * one.rms,
+            signature_rms_um=1e3 * one.whole_rms,
+            unconcealed_rms_um=1e3 * one.rms,
             parameters=one.values,
             text=text,
             probability=one.probability,
             equivalent=tuple(name for name in one.equivalent if name in self._named),
+            log_evidence=one.log_factor,
             acts=one.acts,
+            persists=one.persists,
             sigmas=0.0 if member is None else one.sigmas,
             gains=one.gains,
         )

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import MachineError
+from dbbstation.facts.value import finite
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length
 from dbbstation.sources.contract import Motion
@@ -33,20 +34,21 @@ class WorkspaceError:
     """Difference of tool position between the earlier calibration and the joint model, over the workspace.
 
     Attributes:
-        shift_um: mean along X, Y and Z [µm]; a program's zero on the part removes it.
-        with_shift_rms_um: rms length including the shift [µm].
-        greatest_um: greatest length about the common shift [µm].
+        error_rms_um: without common shift.
+        error_greatest_um: greatest length about the common shift.
         at_pose: place of the greatest, X, Y, Z, A, B, C [mm, deg].
-        uncertainty_um: rms standard uncertainty of the joint model about a common shift [µm]; None if unknown.
+        uncertainty_rms_um: rms standard uncertainty of the joint model about a common shift; None if unknown.
+        common_shift_um: mean along X, Y and Z; a program's zero on the part removes it.
+        uncertainty_with_shift_rms_um: None if unknown.
     """
 
-    shift_um: tuple[float, ...]
-    with_shift_rms_um: float
-    rms_um: float
-    greatest_um: float
+    error_rms_um: float
+    error_greatest_um: float
     at_pose: tuple[float, ...]
-    uncertainty_um: float | None
-    with_shift_uncertainty_um: float | None
+    uncertainty_rms_um: float | None
+    common_shift_um: tuple[float, ...]
+    error_with_shift_rms_um: float
+    uncertainty_with_shift_rms_um: float | None
 
 
 def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError | None:
@@ -70,13 +72,13 @@ def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError |
         1e3 * rms_length(position_uncertainty_mm(identified, motion, about_mean=about)) for about in (True, False)
     )
     return WorkspaceError(
-        shift_um=tuple(shift_um.tolist()),
-        with_shift_rms_um=rms_length(apart_um),
-        rms_um=rms_length(apart_um - shift_um),
-        greatest_um=float(length_um[worst]),
+        error_rms_um=rms_length(apart_um - shift_um),
+        error_greatest_um=float(length_um[worst]),
         at_pose=tuple(poses[worst].tolist()),
-        uncertainty_um=None if np.isnan(own_um) else own_um,
-        with_shift_uncertainty_um=None if np.isnan(own_with_shift_um) else own_with_shift_um,
+        uncertainty_rms_um=finite(own_um),
+        common_shift_um=tuple(shift_um.tolist()),
+        error_with_shift_rms_um=rms_length(apart_um),
+        uncertainty_with_shift_rms_um=finite(own_with_shift_um),
     )
 
 

@@ -68,7 +68,7 @@ def test_gravity_is_named_and_its_size_is_right(gravity):
     assert compliance.uncertainty == pytest.approx(0.02 * 9.68, rel=0.05)
     # The jig circles conceal nine tenths of it: 15.1 µm rms leave 4.5 on the reference machine.
     assert found.concealed == pytest.approx(0.91, abs=0.02)
-    assert found.rest_um == pytest.approx(4.5, abs=0.5)
+    assert found.unconcealed_rms_um == pytest.approx(4.5, abs=0.5)
     assert diagnosis.left.probability > 1e-3
     del truth
 

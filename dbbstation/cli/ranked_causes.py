@@ -10,13 +10,13 @@ from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.effects import CauseContribution
+    from dbbstation.diagnosis.effects import CauseEffect
 
 MOST_CAUSES = 4
 """Causes whose circles are listed beside the measured ones; the JSON has all."""
 
 
-def print_effects(effects: Sequence[CauseContribution]) -> None:
+def print_effects(effects: Sequence[CauseEffect]) -> None:
     """Print causes and cures by contribution, and G measured and without each."""
     if not effects:
         echo("\nno cause contributes to these circles")

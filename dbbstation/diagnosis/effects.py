@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -12,11 +12,14 @@ from dbbstation.calibration.reporting.prediction import smooth_circularities_um,
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.errors import KinematicsError
+from dbbstation.facts.run import OfRun
+from dbbstation.facts.serialise import Array, AsItIs, Kept
 from dbbstation.machine.kinematics import position_responses
 from dbbstation.model.identified import known_u
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion, Need, Owner
 from dbbstation.trace.analysis import figures
+from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,61 +30,63 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import BarReading, MachineModel
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Fitted
-    from dbbstation.trace.circle import RawCircle
 
 GEOMETRY = "geometry"
 """Name of the kinematic parameters as one cause: one calibration finds them, one compensation cures them."""
 
 
-@dataclass(frozen=True, eq=False)
-class CuredCircle:
-    """One run with and without a cause.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CuredCircle(OfRun):
+    """One run with and without a cause; G up to 30 undulations per revolution.
 
     Attributes:
-        g_um: circular deviation of the cause alone, up to 30 undulations per revolution.
+        g_um: circular deviation of the cause alone.
         centre_um: shift, X and Y, shape (2,).
         measured_centre_um: less commanded, shape (2,).
         cured_centre_um: without the cause, shape (2,).
         effect_mm: on readings, shape (n,).
     """
 
-    test: str
-    direction: str
-    repeat: int
     g_um: float
-    centre_um: NDArray[np.float64]
+    centre_um: Array
     measured_g_um: float
     cured_g_um: float
-    measured_centre_um: NDArray[np.float64]
-    cured_centre_um: NDArray[np.float64]
-    raw: RawCircle
-    effect_mm: NDArray[np.float64]
+    measured_centre_um: Array
+    cured_centre_um: Array
+    raw: Annotated[RawCircle, AsItIs, Kept] = field(repr=False)
+    effect_mm: Annotated[Array, Kept] = field(repr=False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class CauseEffect:
-    """A cause's contribution.
+    """A cause's contribution over all runs.
 
     Attributes:
-        name: source, or `geometry` for all kinematic parameters.
+        cause: source, or `geometry` for all kinematic parameters.
         sources: removed with it.
+        verdict: empty for geometry or without diagnosis.
+        g_um: mean, of the cause alone.
         g_u_um: standard uncertainty; None if unknown.
         centre_u_um: standard uncertainty; None if unknown.
         workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
         workspace_u_um: standard uncertainty; None if unknown.
+        measured_g_um: mean circular deviation.
     """
 
-    name: str
+    cause: str
     sources: tuple[str, ...]
+    verdict: str = ""
     g_um: float
     g_u_um: float | None
     centre_um: float
     centre_u_um: float | None
     workspace_um: float | None
     workspace_u_um: float | None
+    measured_g_um: float
+    cured_g_um: float
     cure: str
     confirm: str
-    circles: tuple[CuredCircle, ...]
+    runs: tuple[CuredCircle, ...]
 
 
 COMPENSATION = "Compensate programs with the model (`dbbstation program`, `dbbstation compensate`), or enter the geometry into the control."
@@ -137,7 +142,7 @@ def effects_of(
         space, space_u = _over_the_workspace(model, without, group, (roots, hidden))
         found.append(
             CauseEffect(
-                name=name,
+                cause=name,
                 sources=tuple(dict.fromkeys(f.source.name for f in group)),
                 g_um=float(np.mean([circle.g_um for circle in circles])),
                 g_u_um=_u_of_mean_g(observations, effects, spread, circles),
@@ -145,9 +150,11 @@ def effects_of(
                 centre_u_um=_u_of_centres(observations, effects, spread, centres),
                 workspace_um=space,
                 workspace_u_um=space_u,
+                measured_g_um=sum(circle.measured_g_um for circle in circles) / len(circles),
+                cured_g_um=sum(circle.cured_g_um for circle in circles) / len(circles),
                 cure=COMPENSATION if name == GEOMETRY else texts.cure,
                 confirm=REMEASURE if name == GEOMETRY else texts.confirm,
-                circles=circles,
+                runs=circles,
             )
         )
     return tuple(sorted(found, key=lambda one: -one.g_um))

@@ -46,7 +46,6 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
     """Return the rows of the table of causes."""
     rows = []
     for one in ranked.effects:
-        count = len(one.circles)
         g, centre, space = (
             ("-", "-") if value is None else with_uncertainty(value, expanded_uncertainty(u, coverage_factor))
             for value, u in (
@@ -57,13 +56,13 @@ def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
         )
         rows.append(
             CauseRow(
-                cause=one.name,
-                verdict=(ranked.verdicts or {}).get(one.name, ""),
+                cause=one.cause,
+                verdict=one.verdict,
                 g=g,
                 centre=centre,
                 workspace=space,
-                measured=f"{sum(c.measured_g_um for c in one.circles) / count:.1f}",
-                cured=f"{sum(c.cured_g_um for c in one.circles) / count:.1f}",
+                measured=f"{one.measured_g_um:.1f}",
+                cured=f"{one.cured_g_um:.1f}",
                 cure=one.cure,
                 confirm=one.confirm,
             )
@@ -77,7 +76,7 @@ def cured_polars(ranked: Ranked) -> list[TitledPolar]:
         return []
     first = ranked.effects[0]
     of: dict[str, CuredCircle] = {}
-    for circle in sorted(first.circles, key=lambda one: -one.g_um):
+    for circle in sorted(first.runs, key=lambda one: -one.g_um):
         of.setdefault(circle.test, circle)
     chosen = sorted(list(of.values())[:MOST_DRAWN], key=lambda one: one.test)
     return [

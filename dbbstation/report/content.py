@@ -16,7 +16,6 @@ from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.shown import ReportContent, ShownCauses, ShownFindings, ShownModel, ShownSession
 from dbbstation.results.circle_figures import RunWithoutCircle
 from dbbstation.results.circles import circles_result
-from dbbstation.results.effects import effect_results
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.of_report import compared, means_of, side_by_side, tolerances_by_test
 from dbbstation.results.report import (
@@ -100,7 +99,7 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
         measured=measured,
         measured_means=tuple(means_of(measured)),
         circles=circles_result(reported.found, reported.chosen),
-        causes=() if ranked is None else effect_results(ranked.effects, ranked.verdicts or {}),
+        causes=() if ranked is None else ranked.effects,
         causes_of=None if ranked is None or not ranked.effects else ranked.session,
         model=None if modelled is None else modelled.evaluation or NotEvaluated(),
     )

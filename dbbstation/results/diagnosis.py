@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import computed_field
 
 from dbbstation.calibration.outliers.outlier import Outlier
+from dbbstation.diagnosis.effects import CauseEffect
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError
 from dbbstation.facts.by_name import ByName
@@ -20,7 +21,6 @@ from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.limit_reached import LimitReached
 from dbbstation.model.identified import IdentifiedModel
-from dbbstation.results.effects import CauseContribution
 from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences, short_sentences
 
@@ -120,7 +120,7 @@ class DiagnosisFigures(Framed):
 class DiagnosisResult(DiagnosisFigures):
     """The result of a diagnosis."""
 
-    effects: tuple[CauseContribution, ...]
+    effects: tuple[CauseEffect, ...]
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
     recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)
 

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from dbbstation.calibration.outliers.outlier import Outlier
+    from dbbstation.diagnosis.effects import CauseEffect
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.results.effects import CauseContribution
 
 
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:
@@ -61,7 +61,7 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
 def diagnosis_result(
     figures: DiagnosisFigures,
     *,
-    effects: tuple[CauseContribution, ...],
+    effects: tuple[CauseEffect, ...],
     model: IdentifiedModel,
     drawing: Callable[[object], bytes],
     notes: tuple[str, ...],

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from dbbstation.diagnosis.effects import CauseEffect
 
 
@@ -18,14 +16,12 @@ class Ranked:
     """Causes beside the circles.
 
     Attributes:
-        verdicts: of the model's diagnosis, by cause.
-        why_not: reason if there are no verdicts; else empty.
+        why_not: reason if there are no causes; else empty.
         said: the model's diagnosis in two sentences; may be empty.
     """
 
     session: str = ""
     effects: tuple[CauseEffect, ...] = ()
-    verdicts: Mapping[str, str] | None = None
     why_not: str = ""
     said: tuple[str, ...] = ()
 
@@ -38,6 +34,6 @@ def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
         centre, _ = with_uncertainty(one.centre_um, expanded_uncertainty(one.centre_u_um, coverage_factor))
         known = "" if g_u == "-" else f", U {g_u} µm"
         told.append(
-            f"Cause {rank}, {one.name}: {g} µm of G{known}, {centre} µm of the centres. {one.cure[0].upper()}{one.cure[1:].rstrip('.')}."
+            f"Cause {rank}, {one.cause}: {g} µm of G{known}, {centre} µm of the centres. {one.cure[0].upper()}{one.cure[1:].rstrip('.')}."
         )
     return tuple(told)

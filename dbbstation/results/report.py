@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from dbbstation.diagnosis.effects import CauseEffect
 from dbbstation.facts.held import ComparedTolerance, ReportVerdict, ToleranceOfTest
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Kept
 from dbbstation.results.circles import CirclesResult
-from dbbstation.results.effects import CauseContribution
 from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.frame import Framed, picked
 
@@ -85,7 +85,7 @@ class ReportResult(Framed):
     measured: tuple[MeasuredFigures, ...]
     measured_means: tuple[MeasuredMean, ...]
     circles: CirclesResult
-    causes: tuple[CauseContribution, ...]
+    causes: tuple[CauseEffect, ...]
     causes_of: str | None
     model: EvaluationResult | NotEvaluated | None
 

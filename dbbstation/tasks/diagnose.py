@@ -92,7 +92,6 @@ def diagnose(
     from dbbstation.diagnosis import diagnose as search
     from dbbstation.diagnosis.effects import effects_of
     from dbbstation.files.own_sources import every_source
-    from dbbstation.results.effects import effect_results
     from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
     from dbbstation.tasks.diagnosed import diagnosed_of
     from dbbstation.tasks.load import paths_of
@@ -113,9 +112,10 @@ def diagnose(
     of_formulas = fit.layout.formula_variance(fit.x)
     covariance = fit.solution.covariance + np.diag(of_formulas)
     effects = effects_of(fit.model, fit.observations, names, covariance, fit.null_space, of_formulas)
+    verdicts = {one.name: str(one.verdict) for one in figures.sources}
     result = diagnosis_result(
         figures,
-        effects=effect_results(effects, {one.name: one.verdict for one in figures.sources}),
+        effects=tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in effects),
         model=model,
         drawing=partial(_drawn, found),
         notes=tuple(telling.notes),

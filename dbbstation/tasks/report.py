@@ -202,4 +202,6 @@ def _ranked(
     said = identified.report.get("diagnosis")
     said = said if isinstance(said, Mapping) else {}
     told = tuple(str(one) for one in said.get("said", ()))
-    return Ranked(", ".join(dict.fromkeys(names)), found, said.get("verdicts", {}), said=told)
+    verdicts = said.get("verdicts", {})
+    effects = tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in found)
+    return Ranked(", ".join(dict.fromkeys(names)), effects, said=told)

@@ -56,18 +56,18 @@ def known(tmp_path_factory):
 
 def test_contributions_are_those_of_the_virtual_machine(known):
     model, runs, truth = known
-    found = {one.name: one for one in effects_of(model, runs)}
+    found = {one.cause: one for one in effects_of(model, runs)}
     assert set(found) == {GEOMETRY, "gravity", "servo-lag"}
     for name, one in found.items():
         assert one.g_um == pytest.approx(truth[name], rel=0.01, abs=0.02), name
-    order = [one.name for one in effects_of(model, runs)]
+    order = [one.cause for one in effects_of(model, runs)]
     assert order == sorted(truth, key=lambda name: -truth[name])
 
 
 def test_a_circle_without_a_cause_is_the_circle_of_a_machine_without_it(known):
     model, runs, _ = known
-    gravity = next(one for one in effects_of(model, runs) if one.name == "gravity")
-    for circle, run in zip(gravity.circles, runs, strict=True):
+    gravity = next(one for one in effects_of(model, runs) if one.cause == "gravity")
+    for circle, run in zip(gravity.runs, runs, strict=True):
         assert circle.measured_g_um == pytest.approx(smooth_circularity_um(run.raw, run.raw.length_mm))
         np.testing.assert_allclose(circle.measured_centre_um - circle.cured_centre_um, circle.centre_um, atol=1e-9)
         np.testing.assert_allclose(circle.raw.length_mm, run.raw.length_mm)
@@ -80,11 +80,11 @@ def test_a_cause_of_one_amplitude_is_known_as_well_as_its_amplitude(known):
     (rows,) = [[("gravity", "", one.name) for one in model.sources[2].source.parameters(model.machine)]]
     share = 0.03
     covariance = np.array([[(share * model.sources[2].values[0]) ** 2]])
-    gravity = next(one for one in effects_of(model, runs, rows, covariance) if one.name == "gravity")
+    gravity = next(one for one in effects_of(model, runs, rows, covariance) if one.cause == "gravity")
     assert gravity.g_u_um == pytest.approx(share * gravity.g_um, rel=0.03)
     assert gravity.centre_u_um == pytest.approx(share * gravity.centre_um, rel=0.03)
     assert gravity.workspace_u_um == pytest.approx(share * gravity.workspace_um, rel=0.03)
-    geometry = next(one for one in effects_of(model, runs, rows, covariance) if one.name == GEOMETRY)
+    geometry = next(one for one in effects_of(model, runs, rows, covariance) if one.cause == GEOMETRY)
     assert geometry.g_u_um is None
 
 
@@ -96,7 +96,7 @@ def test_what_a_formula_lacks_it_lacks_on_every_strut(known):
     covariance = np.diag(of_formula)
 
     def u_of_g(formula):
-        (found,) = (one for one in effects_of(model, runs, rows, covariance, None, formula) if one.name == "servo-lag")
+        (found,) = (one for one in effects_of(model, runs, rows, covariance, None, formula) if one.cause == "servo-lag")
         return found.g_u_um / found.g_um
 
     assert u_of_g(of_formula) == pytest.approx(0.1, rel=0.02)
@@ -109,8 +109,8 @@ def test_what_was_not_determined_leaves_the_workspace_without_an_uncertainty(kno
     covariance = np.diag(np.full(len(names), 1e-6**2))
     strut = np.zeros((1, len(names)))
     strut[0, 0] = 0.1
-    sure = next(one for one in effects_of(model, runs, names, covariance) if one.name == GEOMETRY)
-    unsure = next(one for one in effects_of(model, runs, names, covariance, strut) if one.name == GEOMETRY)
+    sure = next(one for one in effects_of(model, runs, names, covariance) if one.cause == GEOMETRY)
+    unsure = next(one for one in effects_of(model, runs, names, covariance, strut) if one.cause == GEOMETRY)
     assert sure.workspace_u_um is not None
     assert unsure.workspace_u_um is None
     assert unsure.g_u_um == pytest.approx(sure.g_u_um)
@@ -118,14 +118,14 @@ def test_what_was_not_determined_leaves_the_workspace_without_an_uncertainty(kno
 
 def test_over_the_workspace_a_cause_is_what_poses_say(known):
     model, runs, _ = known
-    geometry = next(one for one in effects_of(model, runs) if one.name == GEOMETRY)
+    geometry = next(one for one in effects_of(model, runs) if one.cause == GEOMETRY)
     motion = Motion(workspace(model.machine))
     anywhere = model.anywhere()
     rest = MachineModel(model.machine, tuple(f for f in anywhere.sources if f.source.name == "gravity"))
     apart = 1e3 * (anywhere.actual_poses(motion) - rest.actual_poses(motion))[:, :3]
     expected = np.sqrt(np.mean(np.sum((apart - apart.mean(axis=0)) ** 2, axis=1)))
     assert geometry.workspace_um == pytest.approx(expected, rel=1e-6)
-    lag = next(one for one in effects_of(model, runs) if one.name == "servo-lag")
+    lag = next(one for one in effects_of(model, runs) if one.cause == "servo-lag")
     assert lag.workspace_um is None
 
 

@@ -73,9 +73,9 @@ NO_FIGURE = {
     "outlier.Outlier.uncertainty_um": "beside a run that is left out, not beside a figure of the machine",
     "scatter.ScatterCheck.interval_um": "of what balls scatter by: the interval itself is the answer",
     "visibility.WeakDirection.uncertainty": "says how little a direction is seen; no value stands beside it",
-    "effects.CauseContribution.g_u_um": "of a cause that was named: the studies of hidden effects count those",
-    "effects.CauseContribution.centre_u_um": "as above",
-    "effects.CauseContribution.workspace_u_um": "as above",
+    "effects.CauseEffect.g_u_um": "of a cause that was named: the studies of hidden effects count those",
+    "effects.CauseEffect.centre_u_um": "as above",
+    "effects.CauseEffect.workspace_u_um": "as above",
 }
 """Why a field has no row."""
 

@@ -6,16 +6,17 @@ diagnosed, compensated and measured again.
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.facts.serialise import read_json
+from dbbstation.facts.serialise import as_objects, read_json
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
@@ -23,16 +24,7 @@ from dbbstation.files.formats.plan import plan_text, read_inline_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.results.demo import (
-    DemoCalibration,
-    DemoCircle,
-    DemoDiagnosis,
-    DemoEvaluation,
-    DemoReport,
-    DemoResult,
-    DemoRun,
-    MeasuredBeforeAfter,
-)
+from dbbstation.results.demo import DemoCircle, DemoResult, MeasuredBeforeAfter
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.system.children import python_module
@@ -106,8 +98,7 @@ def run_demo(
         job.answer(["program", *job.what, "--dialect", "linuxcnc", "--model", "joint.yaml", "--out", "programs"])
         job.measure(place, "verified", ["--programs", "programs"])
     before, after = (
-        read_json(DemoEvaluation, job.answer(["evaluate", session, "--model", "joint.yaml"]))
-        for session in ("measured", "verified")
+        _read(job.answer(["evaluate", session, "--model", "joint.yaml"])) for session in ("measured", "verified")
     )
     report = job.answer(
         ["report", "verified", "--before", "measured", "--model", "joint.yaml", "--page", "report.html"]
@@ -115,9 +106,9 @@ def run_demo(
     return DemoResult(
         folder,
         _side_by_side(before, after),
-        read_json(DemoCalibration, calibration),
-        read_json(DemoDiagnosis, diagnosis),
-        read_json(DemoReport, report),
+        _read(calibration),
+        _read(diagnosis),
+        _read(report),
         {"diagnosis": diagnosis, "report": report},
     )
 
@@ -229,7 +220,11 @@ def _short(argument: str) -> str:
     return argument.rpartition("/")[2] if argument.endswith(".yaml") else argument
 
 
-def _side_by_side(before: DemoEvaluation, after: DemoEvaluation) -> tuple[DemoCircle, ...]:
+def _read(printed: str) -> Any:  # noqa: ANN401 - of any command
+    return as_objects(json.loads(printed))
+
+
+def _side_by_side(before: Any, after: Any) -> tuple[DemoCircle, ...]:  # noqa: ANN401 - results as objects
     """Return figures of the same runs in two sessions [CAL Table III]."""
     later = {(run.test, run.direction): _measured(run) for run in after.runs}
     return tuple(
@@ -239,8 +234,5 @@ def _side_by_side(before: DemoEvaluation, after: DemoEvaluation) -> tuple[DemoCi
     )
 
 
-def _measured(run: DemoRun) -> MeasuredBeforeAfter:
-    of = run.measured
-    return MeasuredBeforeAfter(
-        of.centre_deviation_um, of.mean_radial_error_um, of.circularity_um, run.circularity_30_upr_um.measured
-    )
+def _measured(run: Any) -> MeasuredBeforeAfter:  # noqa: ANN401 - the same
+    return MeasuredBeforeAfter(**vars(run.measured), circularity_30_upr_um=run.circularity_30_upr_um.measured)

@@ -113,7 +113,7 @@ def _print(result: DemoResult) -> None:
     for source in result.diagnosis.sources:
         if source.verdict == "identified":
             hidden = 100 * (source.concealed or 0.0)
-            for name, number in source.parameters.items():
+            for name, number in vars(source.parameters).items():
                 echo(
                     f"The diagnosis names {source.name}: {name} {number.value:.3g} ± {number.uncertainty:.1g} {number.unit}; "
                     f"the kinematic parameters had concealed {hidden:.0f} % of it."

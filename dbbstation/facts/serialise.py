@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
@@ -82,6 +83,13 @@ def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
     """
     # The parser of pydantic refuses what Python's takes: escapes of names that are not in UTF-8.
     return read_plain(kind, json.loads(text))
+
+
+def as_objects(data: Any) -> Any:  # noqa: ANN401 - of any result
+    """Return what `plain` wrote as objects with the same names, for who cannot load the classes of the results."""
+    if isinstance(data, Mapping):
+        return SimpleNamespace(**{name: as_objects(value) for name, value in data.items()})
+    return [as_objects(value) for value in data] if isinstance(data, list) else data
 
 
 def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:

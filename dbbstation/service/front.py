@@ -9,12 +9,11 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
-from dbbstation.facts.serialise import read_plain
+from dbbstation.facts.serialise import as_objects
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
 from dbbstation.service.after import JOINT, KINEMATIC, After
-from dbbstation.service.answers import ProgramsAnswer
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import CandidateFormat, candidates
@@ -189,7 +188,7 @@ class Front:
         try:
             if work.wait() is not WorkProgress.DONE:
                 raise StationError(work.failure())
-            return len(read_plain(ProgramsAnswer, work.answer()).programs), folder
+            return len(as_objects(work.answer()).programs), folder
         finally:
             work.close()
 

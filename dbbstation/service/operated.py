@@ -6,10 +6,10 @@ import time
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import InputError, InstrumentError, Problem
-from dbbstation.facts.serialise import read_plain
+from dbbstation.facts.serialise import as_objects
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.job import JobFile, read_job
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
@@ -23,7 +23,6 @@ from dbbstation.files.yaml.schema import format_of, read_document, validate
 from dbbstation.instrument.library import load_instrument
 from dbbstation.quality.conformity import Conformity
 from dbbstation.service.after import After
-from dbbstation.service.answers import ReportAnswer
 from dbbstation.service.choice import Choice
 from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
@@ -157,7 +156,7 @@ class JobAnswer:
             return None
         if result.progress is not WorkProgress.DONE:
             return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
-        answered = answer_of(read_plain(ReportAnswer, result.answer), self._missing, result.path, self._trouble)
+        answered = answer_of(as_objects(result.answer), self._missing, result.path, self._trouble)
         return replace(answered, reasons=(_CHANGED, *answered.reasons)) if self._changed else answered
 
     def close(self) -> None:
@@ -165,7 +164,12 @@ class JobAnswer:
         self._after.close()
 
 
-def answer_of(answer: ReportAnswer, missing: Sequence[str], report: Path | None, trouble: str = "") -> Answered:
+def answer_of(
+    answer: Any,  # noqa: ANN401 - a report as objects
+    missing: Sequence[str],
+    report: Path | None,
+    trouble: str = "",
+) -> Answered:
     """Return the answer of a report, which is complete only with every planned run.
 
     A limit is exceeded even if runs are missing. Commands, which the operator cannot run, are left to the report.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from textual.content import Content
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.facts.held import HeldTolerance, ToleranceOfTest, WorstCircle
-    from dbbstation.service.answers import AcceptanceAnswer
     from dbbstation.service.former_sessions import Former, InForce
 
 _WIDE = 12
@@ -43,7 +42,7 @@ def test_line(one: ToleranceOfTest) -> Content:
     return Content.assemble(row, (texts.CONFORMITY_WORDS[conformity], f"bold {_STYLES[conformity]}"))
 
 
-def worst_lines(answer: AcceptanceAnswer) -> Iterator[str]:
+def worst_lines(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     """Yield a sentence for each tolerance: the worst circle before and now, or what is missing."""
     told = [(one, one.worst) for one in answer.tolerances if one.worst is not None]
     for one, worst in told:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.content import Content
 
 from dbbstation.computing.background import Background
 from dbbstation.errors import StationError
-from dbbstation.facts.serialise import read_plain
-from dbbstation.service.answers import AcceptanceAnswer, ReportAnswer
+from dbbstation.facts.serialise import as_objects
 from dbbstation.service.former_sessions import before_and_now
 from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
@@ -113,7 +112,7 @@ class AcceptanceScreen(RowScreen):
         if not self.stands:
             return
         told = self._after.results[SessionTask.ACCEPTANCE].answer
-        answer = read_plain(AcceptanceAnswer, told) if told else None
+        answer = as_objects(told) if told else None
         sentence, wrong = self._sentence()
         self.say(sentence, wrong=wrong)
         tests = () if answer is None else answer.tolerances_by_test
@@ -143,7 +142,7 @@ class AcceptanceScreen(RowScreen):
     def _compared(result: Result) -> tuple[str, bool]:
         match result.progress:
             case WorkProgress.DONE:
-                kind = read_plain(ReportAnswer, result.answer).verdict.kind
+                kind = as_objects(result.answer).verdict.kind
                 return texts.ACCEPTANCE_VERDICT[kind], kind == "exceeded"
             case WorkProgress.FAILED:
                 return result.failure, True
@@ -155,7 +154,7 @@ class AcceptanceScreen(RowScreen):
     def _about_now(self) -> Content:
         return Content("" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now)))
 
-    def _notes(self, answer: AcceptanceAnswer | None) -> list[Content]:
+    def _notes(self, answer: Any) -> list[Content]:  # noqa: ANN401 - a result as objects, or None
         after = self._after
         told = [] if answer is None else [Content(text) for text in worst_lines(answer)]
         if self._found is not None:

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from dbbstation.facts.serialise import read_plain
-from dbbstation.service.answers import (
-    AcceptanceAnswer,
-    CalibrationAnswer,
-    DiagnosisAnswer,
-    ProgramsAnswer,
-    ReportAnswer,
-)
+from dbbstation.facts.serialise import as_objects
 from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import worst_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
 _MOST = 6
 """Causes, and sentences of a kind, that are shown; the files have all."""
@@ -25,20 +18,10 @@ _MOST = 6
 
 def result_lines(step: SessionTask, answer: Mapping[str, object]) -> list[str]:
     """Return the main results of a step's JSON."""
-    match step:
-        case SessionTask.CALIBRATE:
-            return list(_calibrated(read_plain(CalibrationAnswer, answer)))
-        case SessionTask.DIAGNOSE:
-            return list(_diagnosed(read_plain(DiagnosisAnswer, answer)))
-        case SessionTask.PROGRAMS:
-            return list(_programmed(read_plain(ProgramsAnswer, answer)))
-        case SessionTask.REPORT:
-            return list(_reported(read_plain(ReportAnswer, answer)))
-        case SessionTask.ACCEPTANCE:
-            return list(_accepted(read_plain(AcceptanceAnswer, answer)))
+    return list(_LINES[step](as_objects(answer)))
 
 
-def _calibrated(answer: CalibrationAnswer) -> Iterator[str]:
+def _calibrated(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     yield texts.FITTED.format(
         count=answer.parameters_identified,
         nominal=answer.nominal_rms_um,
@@ -60,7 +43,7 @@ def _calibrated(answer: CalibrationAnswer) -> Iterator[str]:
         yield texts.TOO_FEW.format(tests=answer.plan_check.tests, left=answer.plan_check.left)
 
 
-def _diagnosed(answer: DiagnosisAnswer) -> Iterator[str]:
+def _diagnosed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     yield from answer.said
     form = texts.MISMATCH if answer.mismatch else texts.NO_MISMATCH
     yield form.format(rms=answer.misfit_rms_um, noise=answer.noise_um)
@@ -74,14 +57,14 @@ def _diagnosed(answer: DiagnosisAnswer) -> Iterator[str]:
         yield texts.MEASURE_NEXT.format(text=answer.next_test.text)
 
 
-def _programmed(answer: ProgramsAnswer) -> Iterator[str]:
+def _programmed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     yield texts.PROGRAMMED.format(count=len(answer.programs), dialect=answer.dialect)
     greatest = [one.greatest_correction_um for one in answer.programs if one.greatest_correction_um is not None]
     if greatest:
         yield texts.CORRECTED.format(most=max(greatest))
 
 
-def _reported(answer: ReportAnswer) -> Iterator[str]:
+def _reported(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     verdict = answer.verdict
     yield texts.REPORT_VERDICT[verdict.kind]
     yield verdict.headline
@@ -89,6 +72,15 @@ def _reported(answer: ReportAnswer) -> Iterator[str]:
     yield from verdict.to_do[:_MOST]
 
 
-def _accepted(answer: AcceptanceAnswer) -> Iterator[str]:
+def _accepted(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     yield texts.ACCEPTANCE_VERDICT[answer.verdict.kind]
     yield from worst_lines(answer)
+
+
+_LINES: dict[SessionTask, Callable[[Any], Iterator[str]]] = {
+    SessionTask.CALIBRATE: _calibrated,
+    SessionTask.DIAGNOSE: _diagnosed,
+    SessionTask.PROGRAMS: _programmed,
+    SessionTask.REPORT: _reported,
+    SessionTask.ACCEPTANCE: _accepted,
+}

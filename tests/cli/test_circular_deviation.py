@@ -10,10 +10,8 @@ import pytest
 from dbbstation.cli.demo import _print
 from dbbstation.cli.figures import G_LOW_PASSED, G_WITH_NOISE
 from dbbstation.demo import _side_by_side
-from dbbstation.facts.held import ReportVerdict
-from dbbstation.facts.serialise import read_plain
-from dbbstation.results.demo import DemoCalibration, DemoCause, DemoDiagnosis, DemoEvaluation, DemoReport, DemoResult
-from dbbstation.results.diagnosis import BeforeAfter
+from dbbstation.facts.serialise import as_objects
+from dbbstation.results.demo import DemoResult
 
 NOISE_UM = 0.3
 """Of one reading of the bar in the recorded sessions."""
@@ -56,15 +54,15 @@ def test_low_passed_deviations_hold_less_noise(numbers):
 
 
 def test_the_demonstration_means_what_evaluate_means(capsys, tmp_path, printed, numbers):
-    measured = read_plain(DemoEvaluation, numbers)
+    measured = as_objects(numbers)
+    cause = {"name": "play", "verdict": "ruled-out", "concealed": None, "parameters": {}}
+    held_out = {"held_out": "tested", "held_out_rms_um": {"before": 7.0, "after": 0.2}}
     result = DemoResult(
         tmp_path,
         _side_by_side(measured, measured),
-        DemoCalibration(residual_within_mounting_rms_um=3.0),
-        DemoDiagnosis(
-            (DemoCause("play", "ruled-out", None, {}),), held_out="tested", held_out_rms_um=BeforeAfter(7.0, 0.2)
-        ),
-        DemoReport(verdict=ReportVerdict("none", "Nothing is held against anything.", (), ()), causes=()),
+        as_objects({"residual_within_mounting_rms_um": 3.0}),
+        as_objects({"sources": [cause], **held_out}),
+        as_objects({"verdict": {"headline": "Nothing is held against anything."}, "causes": []}),
         printed={},
     )
     _print(result)

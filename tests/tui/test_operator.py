@@ -28,7 +28,6 @@ from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
-from dbbstation.service.answers import ReportAnswer
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
@@ -130,7 +129,9 @@ def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path
         ("none", (), Conformity.UNDECIDED),
     ):
         verdict = ReportVerdict(kind, "All within.", (), ("`dbbstation calibrate` it.", "Look after the ball."))
-        told = answer_of(ReportAnswer(verdict, (tolerance,)), missing, None, "Do not cut, call 4711.")
+        told = answer_of(
+            SimpleNamespace(verdict=verdict, tolerances=(tolerance,)), missing, None, "Do not cut, call 4711."
+        )
         assert told.word is word
         # No command that the operator cannot reach; the shop's own words where the machine is not within.
         assert not any("dbbstation" in step for step in told.to_do)

@@ -17,7 +17,7 @@ import numpy as np
 from dbbstation.control.parameters import Values, hal_lines, home_mm, tables
 from dbbstation.demo import DemoJob, write_plan, write_truth
 from dbbstation.errors import StationError
-from dbbstation.facts.serialise import read_json
+from dbbstation.facts.serialise import as_objects
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import write_model
@@ -29,7 +29,7 @@ from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.results.demo import ControlWay, DemoEvaluation
+from dbbstation.results.demo import ControlWay
 from dbbstation.virtual.linuxcnc import ControlKins, driven_program, installed_component, missing, run
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def _way(job: DemoJob, name: str, driven: Path, seed: int, **more: str) -> Contr
         _session(job, name, driven, seed, **more)
         write_text(kept, job.answer(["evaluate", name, "--model", "truth.yaml"]))
     took = sum(float(said) for path in sorted(driven.glob("*.ngc")) for said in _SECONDS.findall(_text(path)))
-    return ControlWay(name, read_json(DemoEvaluation, _text(kept)).runs, took)
+    return ControlWay(name, tuple(as_objects(json.loads(_text(kept))).runs), took)
 
 
 def _text(path: Path) -> str:

@@ -49,9 +49,10 @@ class ControlWay:
     """What a bar measures of a machine under one way of correction.
 
     Attributes:
+        runs: of `evaluate`, as objects.
         seconds: LinuxCNC's time for all programs [s].
     """
 
     way: str
-    runs: tuple[DemoRun, ...]
+    runs: tuple[Any, ...]
     seconds: float

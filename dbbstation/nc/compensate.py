@@ -13,7 +13,17 @@ from dbbstation.errors import StationError
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import LOOKS_AHEAD, cuts
-from dbbstation.nc.splitting import Pieces, looked_at, moves_of, off_chord_mm, parts_of, rows_as_pieces, runs_of, split
+from dbbstation.nc.splitting import (
+    Pieces,
+    along,
+    looked_at,
+    moves_of,
+    off_chord_mm,
+    parts_of,
+    rows_as_pieces,
+    runs_of,
+    split,
+)
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
@@ -114,15 +124,11 @@ def compensate_toolpath(
             None if started_s is None else started_s + float(toolpath.end_s[rows.start - 1] if rows.start else 0.0)
         )
         curve = CommandCurve(path, model, begins_s, hold_tilt=prefer is Prefer.POSITION_ONLY, before=before)
-        if chord_mm is None:
-            pieces = rows_as_pieces(path)
-        else:
-            pieces = split(curve, model, chord_mm, runs[rows], whole=whole[rows])
-        at = looked_at(curve, pieces, DENSELY)
-        shift_mm = felt_mm(at[:, -1] - path.between(*row_and_share(pieces.end)))
+        pieces, commanded, off_mm = _commanded(curve, model, chord_mm, runs[rows], whole[rows])
+        shift_mm = felt_mm(commanded - path.between(*row_and_share(pieces.end)))
         _check_corrections(path, pieces, shift_mm, largest_mm)
-        off_mm = np.where(path.kind[pieces.row] == RowKind.FEED, off_chord_mm(at, DENSELY), 0.0)
-        parts.append(_Part(pieces.begin + rows.start, pieces.end + rows.start, at[:, -1], shift_mm, off_mm))
+        off_mm = np.where(path.kind[pieces.row] == RowKind.FEED, off_mm, 0.0)
+        parts.append(_Part(pieces.begin + rows.start, pieces.end + rows.start, commanded, shift_mm, off_mm))
         before, tilt_left_mm = curve.behind, max(tilt_left_mm, curve.tilt_left_mm)
     begin, end, commanded, shift_mm, off_mm = (np.concatenate(each) for each in zip(*parts, strict=True))
     pieces = Pieces(begin, end)
@@ -145,6 +151,31 @@ def compensate_toolpath(
         slowest_mm_min=slowest,
         slowest_line=int(done.line[at_slowest]) if np.isfinite(slowest) else 0,
     )
+
+
+def _commanded(
+    curve: CommandCurve,
+    model: MachineModel,
+    chord_mm: float | None,
+    runs: NDArray[np.int64],
+    whole: NDArray[np.bool_],
+) -> tuple[Pieces, NDArray[np.float64], NDArray[np.float64]]:
+    """Return pieces, poses to command at their ends, shape (k, 6) [mm, deg], and the curve's distance from them, shape (k,) [mm]."""
+    if chord_mm is None:
+        pieces = rows_as_pieces(curve.toolpath)
+    else:
+        pieces, ends, off_mm = split(curve, model, chord_mm, runs, whole=whole)
+    if chord_mm is None or curve.has_history:
+        at = looked_at(curve, pieces, DENSELY)
+        return pieces, at[:, -1], off_chord_mm(at, DENSELY)
+    some = np.flatnonzero(np.isnan(off_mm))
+    if len(some):
+        behind, places = curve.behind, along(curve.toolpath, Pieces(pieces.begin[some], pieces.end[some]), DENSELY[:-1])
+        inner = curve.at(places.reshape(-1)).reshape(*places.shape, 6)
+        curve.behind = behind
+        at = np.concatenate([ends[some, :1], inner, ends[some, 1:]], axis=1)
+        off_mm[some] = off_chord_mm(at, DENSELY)
+    return pieces, ends[:, 1], off_mm
 
 
 class _Part(NamedTuple):

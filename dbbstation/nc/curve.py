@@ -68,8 +68,8 @@ class CommandCurve:
         self._started_s = started_s
         self._hold_tilt = hold_tilt
         self.leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
-        has_history = any(fitted.source.has_history for fitted in model.of_the_machine().sources)
-        self._waits = ~self.leads_on & (toolpath.duration_s > 0.0) & has_history
+        self.has_history = any(fitted.source.has_history for fitted in model.of_the_machine().sources)
+        self._waits = ~self.leads_on & (toolpath.duration_s > 0.0) & self.has_history
         self.tilt_left_mm = 0.0
         """Largest correction of the tilt that was left out so far, as felt at `LEVER_MM` [mm]."""
         self._before = before

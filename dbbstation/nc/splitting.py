@@ -148,8 +148,11 @@ def split(
     runs: NDArray[np.int64],
     *,
     whole: NDArray[np.bool_],
-) -> Pieces:
+) -> tuple[Pieces, NDArray[np.float64], NDArray[np.float64]]:
     """Return the longest pieces in which a toolpath keeps the tolerance.
+
+    Pieces, the poses to command at begin and end of each, shape (k, 2, 6) [mm, deg], and how far the curve leaves the chord of
+    each, shape (k,) [mm]; NaN for pieces of several cells.
 
     Args:
         model: its shortest period determines the sampling.
@@ -168,16 +171,20 @@ def split(
     chosen = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
     alone = np.bincount(number)[number] == 1
     chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
-    begins, ends = [cells.begin[~chosen]], [cells.end[~chosen]]
+    begins, ends, known = [cells.begin[~chosen]], [cells.end[~chosen]], [off_mm[~chosen]]
+    command = [at[~chosen][:, [0, -1]]]
     places = cells.places(LOOKED_AT)
     for of in _runs(number, chosen):
         nodes = _Nodes(curve, cells.begin[of[0]], places[of], at[of], off_mm[of] > tolerance_mm)
-        ended = longest(nodes.way, nodes.at, nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
-        begins.append(nodes.places[np.concatenate([[0], ended[:-1]])])
+        ended = longest(nodes.way, in_mm(nodes.at), nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
+        begun = np.concatenate([[0], ended[:-1]])
+        begins.append(nodes.places[begun])
         ends.append(nodes.places[ended])
-    end = np.concatenate(ends)
-    order = np.argsort(end, kind="stable")
-    return Pieces(np.concatenate(begins)[order], end[order])
+        command.append(nodes.at[np.column_stack([begun, ended])])
+        known.append(np.full(len(ended), np.nan))
+    order = np.argsort(np.concatenate(ends), kind="stable")
+    begin, end, commanded, off = (np.concatenate(each)[order] for each in (begins, ends, command, known))
+    return Pieces(begin, end), commanded, off
 
 
 class _Nodes:
@@ -193,7 +200,7 @@ class _Nodes:
     ) -> None:
         toolpath = curve.toolpath
         self.places = np.concatenate([[begin], places.reshape(-1)])
-        self.at = in_mm(np.vstack([at[0, :1], at[:, 1:].reshape(-1, 6)]))
+        self.at = np.vstack([at[0, :1], at[:, 1:].reshape(-1, 6)])
         # A cell with a step in it is not cut again.
         inner = np.ones(places.shape, dtype=np.bool_)
         inner[steps, :-1] = False
@@ -216,13 +223,14 @@ def off_chord_mm(at: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArra
 
 def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6)."""
-    at = curve.at(np.concatenate([[0.0], _along(curve.toolpath, pieces, shares).reshape(-1)]))
+    at = curve.at(np.concatenate([[0.0], along(curve.toolpath, pieces, shares).reshape(-1)]))
     inside = at[1:].reshape(len(pieces.end), len(shares), 6)
     begins = np.vstack([at[0], inside[:-1, -1]])
     return np.concatenate([begins[:, None], inside], axis=1)
 
 
-def _along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return places at shares of the way of successive pieces, shape (k, len(shares))."""
     places = pieces.places(shares)
     across = np.flatnonzero(np.floor(pieces.begin) < pieces.row)
     if len(across):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import bdtrc
 
+from dbbstation.machine.compiled import compiled
 from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
@@ -50,9 +51,6 @@ FARTHEST_PLACE, FARTHEST_ANGLE, FARTHEST_ANGLE_OF_FEW = 1, 3, 9
 """Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre; half a nanometre, or three, at a point 100 mm from the
 tip. Where A, B and C stand still one pose in five has the mark; thirty poses are enough then."""
 
-TRIED_AT_ONCE = 16_384
-"""Steps that are tried together, of all poses: enough for arrays to be quick, and half a megabyte."""
-
 _FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
 """What the last decimal is worth, of an angle at a point 100 mm from the tip [nm]."""
 
@@ -70,6 +68,9 @@ _ODD = np.array(
 """Odd numbers of 64 bits with about as many ones as zeros, one for each axis. They are part of what compensated programs are
 known by: never change them."""
 
+_SHIFTS, _MIXING = np.array([30, 27, 31], np.uint64), np.array([0xBF58476D1CE4E5B9, 0x94D049BB133111EB], np.uint64)
+"""Of the finaliser of SplitMix64 [Steele et al. 2014]."""
+
 
 def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
     """Return a compensated toolpath with marked poses, rounded as they will be written."""
@@ -80,10 +81,11 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
     free = _free(toolpath, moves, decimals)
     can = np.flatnonzero(free.any(axis=1))
     bits = BITS[min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]  # a pose that comes again counts once
-    if bits == BITS[4]:
-        _mark_many(numbers, free, can)
-    else:
-        _mark_few(numbers, free, can, bits)
+    steps = _steps(FARTHEST_ANGLE, 1) if bits == BITS[4] else _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
+    shifts = np.append(_SHIFTS, np.uint64(64 - bits))
+    fixed, moved = _as_bits(~free[can]), _as_bits(steps != 0)
+    chosen = _first_marked(_sums(numbers[can]), fixed, _sums(steps), moved, _MIXING, shifts)
+    numbers[can] += np.where(chosen[:, None] < 0, 0, steps[chosen])
     written = toolpath.numbers_written
     written[moves] = numbers / 10.0 ** np.array(decimals)
     poses = toolpath.with_numbers(written).poses
@@ -97,11 +99,12 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
 def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance explains."""
     poses = toolpath.numbers_written[toolpath.is_move & (toolpath.unknown == 0)]
+    count = len(np.unique(_sums(_numbers(poses, DECIMALS))))
     for decimals in decimals_of(poses):
-        sums = np.unique(_sums(_numbers(poses, decimals)))
+        sums = _sums(_numbers(poses, decimals))
         for bits in BITS.values():
-            hits = int(np.count_nonzero(_has_mark(sums, bits)))
-            if hits > 0 and float(bdtrc(hits - 1, len(sums), 0.5**bits)) < BY_CHANCE:
+            hits = len(np.unique(sums[_has_mark(sums, bits)]))
+            if hits > 0 and float(bdtrc(hits - 1, count, 0.5**bits)) < BY_CHANCE:
                 return True
     return False
 
@@ -120,36 +123,33 @@ def _off(numbers: NDArray[np.float64], decimals: int) -> float:
     return float(np.abs(numbers - np.round(numbers, decimals)).max(initial=0.0))
 
 
-def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDArray[np.int64]) -> None:
-    sums = _sums(numbers)
-    missing = missing[~_has_mark(sums[missing], BITS[4])]
-    steps = _steps(FARTHEST_ANGLE, 1)
-    step_sums, moved, fixed = _sums(steps), _as_bits(steps != 0), _as_bits(~free)
-    begin, together = 0, max(TRIED_AT_ONCE // max(len(missing), 1), 1)
-    while len(missing) and begin < len(steps):
-        # The more are found, the more steps are tried at once.
-        some = slice(begin, begin + together)
-        may = (moved[some] & fixed[missing, None]) == 0
-        found = may & _has_mark(sums[missing, None] + step_sums[some], BITS[4])
-        hit = found.any(axis=1)
-        numbers[missing[hit]] += steps[some][found[hit].argmax(axis=1)]
-        missing = missing[~hit]
-        begin, together = begin + together, max(TRIED_AT_ONCE // max(len(missing), 1), 1)
-
-
 def _as_bits(axes: NDArray[np.bool_]) -> NDArray[np.int64]:
     bits: NDArray[np.int64] = axes @ (1 << np.arange(6))
     return bits
 
 
-def _mark_few(numbers: NDArray[np.int64], free: NDArray[np.bool_], rows: NDArray[np.int64], bits: int) -> None:
-    steps = _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
-    sums = _sums(steps)
-    for row in rows:
-        allowed = ~(steps[:, ~free[row]] != 0).any(axis=1)
-        found = np.flatnonzero(allowed & _has_mark(_sums(numbers[row]) + sums, bits))
-        if len(found):
-            numbers[row] += steps[found[0]]
+@compiled
+def _first_marked(
+    sums: NDArray[np.uint64],
+    fixed: NDArray[np.int64],
+    step_sums: NDArray[np.uint64],
+    moved: NDArray[np.int64],
+    mixing: NDArray[np.uint64],
+    shifts: NDArray[np.uint64],
+) -> NDArray[np.int64]:
+    """Return the first step that marks each row without moving a fixed axis, -1 if none, shape (n,); as `_has_mark`."""
+    chosen = np.full(len(sums), -1)
+    for row in range(len(sums)):
+        for step in range(len(step_sums)):
+            if moved[step] & fixed[row]:
+                continue
+            mixed = sums[row] + step_sums[step]
+            mixed = (mixed ^ (mixed >> shifts[0])) * mixing[0]
+            mixed = (mixed ^ (mixed >> shifts[1])) * mixing[1]
+            if (mixed ^ (mixed >> shifts[2])) >> shifts[3] == 0:
+                chosen[row] = step
+                break
+    return chosen
 
 
 def _numbers(poses: NDArray[np.float64], decimals: Sequence[int]) -> NDArray[np.int64]:
@@ -164,11 +164,11 @@ def _sums(numbers: NDArray[np.int64]) -> NDArray[np.uint64]:
 
 
 def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
-    """Return whether a sum, spread over 64 bits, begins with zeros [finaliser of SplitMix64, Steele et al. 2014]."""
+    """Return whether a sum, spread over 64 bits, begins with zeros."""
     with np.errstate(over="ignore"):
-        mixed = (sums ^ (sums >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    marked_ones: NDArray[np.bool_] = (mixed ^ (mixed >> np.uint64(31))) >> np.uint64(64 - bits) == 0
+        mixed = (sums ^ (sums >> _SHIFTS[0])) * _MIXING[0]
+        mixed = (mixed ^ (mixed >> _SHIFTS[1])) * _MIXING[1]
+    marked_ones: NDArray[np.bool_] = (mixed ^ (mixed >> _SHIFTS[2])) >> np.uint64(64 - bits) == 0
     return marked_ones
 
 

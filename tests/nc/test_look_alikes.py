@@ -143,7 +143,7 @@ FOREIGN = {
     "Fanuc's subroutine": ("M98 P100\n", 4, "M98"),
     "a named parameter": ("G1 X#<wide>\n", 4, "#"),
     "a skipped line": ("/G1 X10\n", 4, "/"),
-    "polar coordinates": ("G1 @10 ^45\n", 4, "@"),
+    "polar coordinates beside X": ("G1 X1 @10 ^45\n", 4, "@"),
     "pallets": ("M60\n", 4, "M60"),
     "an output": ("M62 P1\n", 4, "M62"),
     "waiting for an input": ("M66 P0 L3 Q5\n", 4, "M66"),

@@ -100,8 +100,15 @@ def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance explains."""
     poses = toolpath.numbers_written[toolpath.is_move & (toolpath.unknown == 0)]
     count = len(np.unique(_sums(_numbers(poses, DECIMALS))))
+
+    @cache
+    def part(first: int, decimals: int) -> NDArray[np.uint64]:
+        only = np.zeros_like(poses)
+        only[:, first : first + 3] = poses[:, first : first + 3]
+        return _sums(_numbers(only, (decimals,) * 6))
+
     for decimals in decimals_of(poses):
-        sums = _sums(_numbers(poses, decimals))
+        sums = part(0, decimals[0]) + part(3, decimals[5])
         for bits in BITS.values():
             hits = len(np.unique(sums[_has_mark(sums, bits)]))
             if hits > 0 and float(bdtrc(hits - 1, count, 0.5**bits)) < BY_CHANCE:

@@ -35,6 +35,11 @@ one can all lie on the zeros of a wave. On 150 lines with drawn screw errors the
 LOOKED_AT = np.array([0.19, 0.5, 0.73, 1.0])
 """Shares of a cell at which the curve is taken: not evenly spaced, so that no wave is met at its zeros each time."""
 
+SHORT_MM, SHORT_DEG, SHORT_OF_A_PERIOD = 1.0, 0.1, 0.02
+"""If all cells at feed are shorter, their middles are enough: the curve is a parabola there."""
+
+MIDDLE = np.array([0.5, 1.0])
+
 FINER = 16.0
 """Cells are halved until the curve leaves their chord by less than this part of the tolerance: pieces then begin and end
 within a fraction of their length of where they best would, and what lies between two places can be neglected."""
@@ -163,8 +168,8 @@ def split(
     Raises:
         StationError: the path has too many cells.
     """
-    cells, at = _cells(curve, model, tolerance_mm, whole)
-    off_mm = off_chord_mm(at, LOOKED_AT)
+    cells, at, shares = _cells(curve, model, tolerance_mm, whole)
+    off_mm = off_chord_mm(at, shares)
     toolpath, row = curve.toolpath, cells.row
     # What needs no choice: what is no move at feed, and moves that are one cell near the curve.
     number = runs[row]
@@ -173,7 +178,7 @@ def split(
     chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
     begins, ends, known = [cells.begin[~chosen]], [cells.end[~chosen]], [off_mm[~chosen]]
     command = [at[~chosen][:, [0, -1]]]
-    places = cells.places(LOOKED_AT)
+    places = cells.places(shares)
     for of in _runs(number, chosen):
         nodes = _Nodes(curve, cells.begin[of[0]], places[of], at[of], off_mm[of] > tolerance_mm)
         ended = longest(nodes.way, in_mm(nodes.at), nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
@@ -247,21 +252,26 @@ def _cells(
     model: MachineModel,
     tolerance_mm: float,
     whole: NDArray[np.bool_],
-) -> tuple[Pieces, NDArray[np.float64]]:
+) -> tuple[Pieces, NDArray[np.float64], NDArray[np.float64]]:
+    """Return cells, the curve at their begin and at shares of each, and these shares."""
     toolpath = curve.toolpath
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     cutting = np.maximum(toolpath.tip_mm / FIRST_CELL_MM, toolpath.turn_deg / FIRST_CELL_DEG)
-    cutting = np.maximum(cutting, _way_mm(toolpath, model.machine) / (OF_A_PERIOD * model.shortest_period_mm))
+    periods = _way_mm(toolpath, model.machine) / model.shortest_period_mm
+    cutting = np.maximum(cutting, periods / OF_A_PERIOD)
+    short = np.maximum(toolpath.tip_mm / SHORT_MM, toolpath.turn_deg / SHORT_DEG)
+    long = (np.maximum(short, periods / SHORT_OF_A_PERIOD) > 1.0) & (toolpath.kind == RowKind.FEED)
+    shares = LOOKED_AT if (long | whole).any() or curve.has_history else MIDDLE
     cells = _in(toolpath, np.where(whole, 1.0, np.where(toolpath.kind == RowKind.RAPID, history, cutting)))
     while True:
-        at = looked_at(curve, cells, LOOKED_AT)
+        at = looked_at(curve, cells, shares)
         row, share = cells.row, cells.end - cells.begin
         way_mm, turn_deg = share * toolpath.tip_mm[row], share * toolpath.turn_deg[row]
         can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
         at_feed = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
-        bent = at_feed & can & (off_chord_mm(at, LOOKED_AT) > tolerance_mm / FINER)
+        bent = at_feed & can & (off_chord_mm(at, shares) > tolerance_mm / FINER)
         if not bent.any():
-            return cells, at
+            return cells, at, shares
         _check_number(toolpath, len(row) + int(bent.sum()))
         again = 1 + bent.astype(np.int64)
         part, within = in_pieces(again)

@@ -21,8 +21,8 @@ STEP_DEG = 0.5
 """Spacing of the poses that are checked: struts are shortest somewhere in the middle of a move, where they change by
 less than a micrometre over half a step."""
 
-AT_ONCE = 200_000
-"""Poses that are checked together: some hundred megabytes."""
+AT_ONCE = 20_000
+"""Poses that are checked together: ten megabytes."""
 
 
 def check_reach(machine: Machine, toolpath: Toolpath) -> None:
@@ -97,7 +97,8 @@ class _Poses:
 
 def _is_inside(machine: Machine, poses: NDArray[np.float64]) -> bool:
     try:
-        check_travel(machine, poses, where="")
+        for begin in range(0, len(poses), AT_ONCE):
+            check_travel(machine, poses[begin : begin + AT_ONCE], where="")
     except TravelError:
         return False
     return True

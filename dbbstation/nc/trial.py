@@ -155,7 +155,7 @@ THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
     "the spindle": _said(RowKind.FUNCTION, "S1200 M3", "M5", "S800.5 M4"),
     "a slow spindle": _said(RowKind.FUNCTION, "S0.00001 M3"),
     "coolant": _said(RowKind.FUNCTION, "M8", "M7", "M9"),
-    "a tool": _said(RowKind.FUNCTION, "T2 M6"),
+    "a tool": _said(RowKind.FUNCTION, "T2 M6", "M61 Q3"),
     "a message": _said(RowKind.MESSAGE, "MSG, hello"),
     "a work system": _systems,
     "machine coordinates": _machine,

@@ -7,6 +7,7 @@ line.
 from __future__ import annotations
 
 import math
+from io import StringIO
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -70,7 +71,9 @@ class WordDialect(Dialect):
         Raises:
             CannotSayError: the dialect has no words for something in it.
         """
-        return "\n".join(self.lines(toolpath, header)) + "\n"
+        text = StringIO()
+        text.writelines(f"{line}\n" for line in self.lines(toolpath, header))
+        return text.getvalue()
 
     def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
         """Yield lines of the program, made some thousand at a time."""

@@ -27,7 +27,7 @@ MODES = "G21 G90 G94 G17 G40 G49"
 tool tip. A program must not inherit any of these from the one before it."""
 
 
-_FUNCTION = re.compile(r"[ST][0-9.]+|G97|M(?:[3-9]|48|49)")
+_FUNCTION = re.compile(r"[STQ][0-9.]+|G97|M(?:[3-9]|48|49|61)")
 """Words of spindle, coolant, tool changes, override switches."""
 
 

@@ -143,7 +143,7 @@ class Followed:
         form: None if not followed, or time.
         slope: of the straight line through the members' sum over the first variable; None for times and angles.
         straight: share of the squares that the line makes.
-        where: strut, or all struts; None if uncertain.
+        where: strut, all struts, or the set-up of all tests; None if uncertain.
     """
 
     variables: tuple[tuple[str, ...], ...]

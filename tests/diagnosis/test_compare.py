@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.compare.pairs import at_common_angles, match
-from dbbstation.diagnosis.compare.set_up import JIG
+from dbbstation.diagnosis.compare.set_up import ALIKE, JIG
 from dbbstation.errors import TraceError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
@@ -129,11 +129,28 @@ def test_the_bar_is_told(reference):
     assert found.differ
     best = the_cause(found, Verdict.HAPPENED)
     assert best.name == "bar-offset"
+    assert [one.where for one in found.levels.follows] == [ALIKE]
     (offset,) = best.values.values()
     assert offset.value == pytest.approx(0.005, abs=2 * np.hypot(BAR_MM, BAR_MM))
     assert all(run.radial_mm == pytest.approx(0.005, abs=0.0002) for run in found.runs)
     # 5 µm where both bars together are known to 0.7 µm: seven sigma in every run.
     assert all(run.radial_sigma_mm == pytest.approx(np.hypot(BAR_MM, BAR_MM), rel=0.05) for run in found.runs)
+
+
+def test_one_curve_in_all_tests_is_the_set_ups_and_one_of_a_strut_is_not(reference):
+    """A ball that is out of round by 2 µm: cos 3 theta in every run, whatever the pose; and a strut's length."""
+
+    def out_of_round(_, theta_deg, __):
+        return 0.002 * np.cos(np.radians(3.0 * theta_deg))
+
+    def longer(circle, theta_deg, _):
+        return 0.002 * strut_gain(reference, circle, theta_deg)[:, 4]
+
+    for change, alike in ((out_of_round, True), (longer, False)):
+        shop = Workshop(12, tests="abgl")
+        found = compare(reference, shop.session("A"), shop.session("B", change))
+        assert found.levels.follows
+        assert [one.where == ALIKE for one in found.levels.follows] == [alike] * len(found.levels.follows)
 
 
 def test_a_constant_within_what_is_stated_of_the_bars_is_no_difference(reference):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from dbbstation.diagnosis.compare.channel import channel_of
 from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm
 from dbbstation.diagnosis.compare.left_out import predicted, tried_without_tests
 from dbbstation.diagnosis.compare.pairs import match
+from dbbstation.diagnosis.compare.set_up import with_set_up
 from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
 from dbbstation.inference.cancelling import cancelling, effects_by_name
@@ -200,6 +201,7 @@ def compare(
     trial, gains = tried_without_tests(sides, settled, hold_out=hold_out)
     left = left_over(settled)
     levels = levels_by_tests(settled, left, gains)
+    levels = replace(levels, follows=with_set_up(levels.follows, sides, settled))
     return Comparison(
         matching=matching,
         settled=settled,

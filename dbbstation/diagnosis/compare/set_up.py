@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.diagnosis.shapes import Samples
+    from dbbstation.inference.levels import Followed
+    from dbbstation.inference.settled import Settled
     from dbbstation.sources.contract import ErrorSource, Motion
 
 JIG = "jig-position"
@@ -28,6 +31,11 @@ JIG = "jig-position"
 
 JIG_MM = 0.05
 """How far a jig that was put down again lies from where it lay, one standard deviation per axis, and at 100 mm by its turn [mm]."""
+
+OF_THE_READING = frozenset({BALL, BAR, JIG, "angle", "reading", "commanded distance"})
+"""Variables of a difference that follow neither a strut nor a direction of travel: a ball, a bar or a holder has them too."""
+
+ALIKE = "alike in all tests: the set-up's"
 
 NOTHING = 1e-9
 """Answer of a reading to a shift of a ball below which it does not see it: a level bar, and the height."""
@@ -166,3 +174,18 @@ def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
             log_odds=SETUP_ODDS,
         )
     ]
+
+
+def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
+    """Return whether a class of no strut or direction is one curve over the angle in all runs of several tests."""
+    several = len({pair.test for pair in sides.pairs}) > 1
+    if not several or not OF_THE_READING.issuperset(name for names in one.variables for name in names):
+        return False
+    by_run = np.array(sides.by_angle(settled.effect(one.members)))
+    whole = len(by_run) * float(np.sum(np.square(by_run.mean(axis=0))))
+    return whole >= settled.channel.interchangeable * float(np.sum(np.square(by_run))) > 0.0
+
+
+def with_set_up(follows: Sequence[Followed], sides: Sides, settled: Settled) -> tuple[Followed, ...]:
+    """Return classes; one that is alike in all tests is the set-up's."""
+    return tuple(replace(one, where=ALIKE) if alike_in_all(one, sides, settled) else one for one in follows)

@@ -49,6 +49,9 @@ DIAGNOSED = "joint.yaml"
 OTHER_HOLDERS = 1
 """Added to the seed for the session that is diagnosed: its holders, balls and bar are others than those of the ways, which share theirs."""
 
+VOLUME = "--volume=-200,200,-200,200,-1150,-870"
+"""Over which parameters are refitted: most of what the circles of [CAL Table II] take up; its corners are in the travel."""
+
 FASTER = 4
 """LinuxCNC's clock over the real one: two slow cores keep up."""
 
@@ -106,7 +109,7 @@ def run_ways(
         _way(job, "program", _driven(job, machine, "program", plain, "compensated"), seed, programs="compensated")
     )
 
-    answer = job.answer(["control", "parameters", *by, "--out", "genhexkins", "--force"])
+    answer = job.answer(["control", "parameters", *by, VOLUME, "--out", "genhexkins", "--force"])
     given = replace(
         plain,
         offset_mm=plain.offset_mm + np.array(json.loads(answer)["home_mm"]),

@@ -314,7 +314,10 @@ def settings(made: Component, model: MachineModel) -> tuple[tuple[str, ...], tup
     for i in range(STRUTS):
         ini += [f"[JOINT_{i}]", f"MIN_LIMIT = {travel.strut_mm[0]:.10g}", f"MAX_LIMIT = {travel.strut_mm[1]:.10g}"]
         ini += [] if play is None else [f"BACKLASH = {1e-3 * float(play.values[i]):.6f}"]
-    hal = ["loadrt [KINS]KINEMATICS", f"net {name}-enabled motion.motion-enabled => {name}.enabled"]
+    hal = ["loadrt [KINS]KINEMATICS"]
+    hal += [
+        f"net {name}-enabled motion.motion-enabled => {name}.enabled  # or, if that pin has a signal: net SIGNAL => {name}.enabled"
+    ]
     for column in made.thermometers:
         pin = f"{name}.{column.replace('_', '-')}"
         hal += [f"setp {pin}-zero-c DEGC  # reading at the first sample of the fitted session"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import asdict, replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -153,7 +154,8 @@ def parameters(
     own, nominal = identified.model, identified.model.machine
     low, high = _volume(nominal, volume_mm, tilt_deg)
     poses, others = (drawn_poses(low, high, count, seed) for seed, count in ((1, FITTED), (2, TRIED)))
-    for given in (poses, others):
+    corners = np.array(list(product(*zip(low, high, strict=True))))
+    for given in (corners, poses, others):
         check_travel(nominal, given, where="the volume")
     found = refitted(own, poses, others)
     play = next((f.values for f in own.sources if f.source.name == HELD_BY_BACKLASH and len(f.values) == STRUTS), None)

@@ -130,7 +130,7 @@ def installed_component(file: Path) -> Iterator[None]:
         StationError: halcompile refuses it.
     """
     command = ["halcompile", "--install", file.name]
-    with _alone():
+    with alone():
         done = subprocess.run(command, cwd=file.parent, capture_output=True, text=True, check=False)  # noqa: S603 - LinuxCNC's own
     if done.returncode or "warning" in done.stderr:
         raise StationError((done.stdout + done.stderr).strip(), where=" ".join(command))
@@ -192,7 +192,7 @@ def started(
     Args:
         driver: takes the place of `drive.py`.
     """
-    with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, _alone():
+    with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, alone():
         folder = Path(made)
         _configure(folder, mm_s2, faster, kins)
         if driver is not None:
@@ -289,7 +289,7 @@ def _first_point(text: str) -> str:
 
 
 @contextmanager
-def _alone() -> Iterator[None]:
+def alone() -> Iterator[None]:
     """Wait until no other LinuxCNC runs: there is one on a computer at a time."""
     handle = open_to_change(Path(tempfile.gettempdir()) / "dbbstation-planner.lock", create=True)
     try:

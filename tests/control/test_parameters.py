@@ -171,14 +171,26 @@ def test_it_writes_all_files_and_says_what_is_active(model_file: Path, tmp_path:
 
 
 def test_a_volume_outside_the_travel_is_refused(model_file: Path, tmp_path: Path) -> None:
-    for volume in ([-400.0, 400.0, -10.0, 10.0, -1050.0, -950.0], [-10.0, 10.0, -10.0, 10.0, -1300.0, -950.0]):
-        with pytest.raises(TravelError, match="the volume, pose"):
-            parameters(model_file, tmp_path / "out", date=TODAY, known=known_sources(), volume_mm=volume)
+    for volume, why in (
+        ([-400.0, 400.0, -10.0, 10.0, -1050.0, -950.0], "X"),
+        ([-10.0, 10.0, -10.0, 10.0, -1300.0, -950.0], "Z"),
+        ([-210.0, 210.0, -210.0, 210.0, -1208.0, -808.0], "strut"),  # in a corner, inside all axes
+    ):
+        with pytest.raises(TravelError, match=f"the volume, pose .*{why}"):
+            parameters(model_file, tmp_path / "out", date=TODAY, known=known_sources(), volume_mm=volume, tilt_deg=26.0)
     with pytest.raises(StationError, match="the volume has no size"):
         parameters(
             model_file, tmp_path / "out", date=TODAY, known=known_sources(), volume_mm=[1.0, 1.0, 0.0, 1.0, 0.0, 1.0]
         )
     assert not (tmp_path / "out").exists()
+
+
+def test_a_kinematics_says_that_homing_is_repeated(model_file: Path, tmp_path: Path) -> None:
+    result = kinematics(
+        model_file, tmp_path / "dbbkins.comp", date=TODAY, known=known_sources(), left_out=("backlash",)
+    )
+    assert [note for note in result.notes if "home all joints again after the change" in note]
+    assert any("home again" in line for line in result.way_back)
 
 
 def test_models_that_do_not_fit_are_refused(model_file: Path, reference: Machine, tmp_path: Path) -> None:

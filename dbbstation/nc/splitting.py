@@ -65,7 +65,7 @@ ROWS_AT_ONCE = 20_000
 """Rows of a toolpath that are compensated together: thirty to a hundred megabytes, and long enough for arrays to be quick."""
 
 MOST_CELLS = 1_000_000
-"""As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
+"""As many as `rs274.moves.MOST_ROWS`: the path itself is held in memory."""
 
 
 @dataclass(frozen=True, eq=False)

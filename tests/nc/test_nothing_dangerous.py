@@ -19,7 +19,8 @@ from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.rs274.blocks import LONGEST_BYTES
-from dbbstation.nc.rs274.reader import MOST_ROWS, read_program
+from dbbstation.nc.rs274.moves import MOST_ROWS
+from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import (
     SMOOTH_MM,

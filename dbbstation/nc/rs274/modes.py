@@ -1,0 +1,257 @@
+"""Modal state of a control, and the words of a block that change it."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dbbstation.nc.rs274.arc_words import CENTRES
+from dbbstation.nc.rs274.codes import ModalGroup, name
+from dbbstation.nc.rs274.cycles import ModalCycle
+from dbbstation.nc.rs274.flow import Flow
+from dbbstation.nc.rs274.state import AXES, ControlState
+from dbbstation.nc.toolpath import (
+    ALL_AXES,
+    EXACT_STOP_MM,
+    Ending,
+    RowKind,
+    ToolpathBuilder,
+    bits_of,
+)
+from dbbstation.nc.words import number
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.setup import ControlSetup
+
+
+MM_PER_INCH = 25.4
+
+RAPID, LINEAR, CLOCKWISE, COUNTER_CLOCKWISE = 0.0, 1.0, 2.0, 3.0
+ARCS = frozenset({CLOCKWISE, COUNTER_CLOCKWISE})
+DWELL, MACHINE, SET_TOOL = 4.0, 53.0, 61.0
+TAKES_AXES = frozenset({10.0, 28.0, 30.0, 52.0, 92.0})
+"""Codes of one line that take its axis words for themselves."""
+
+POLAR = "@^"
+"""Letters of a radius and an angle in degrees, in place of X and Y."""
+
+TURNS = 0b111000
+"""A, B and C, which no tool changer is taken to move where they were declared."""
+
+
+LAST_OWN = 5000
+"""Parameters behind this are the control's own."""
+
+_SHOWS_VALUES = re.compile(r"(?:debug|print|log),", re.IGNORECASE)
+_SHOWN = re.compile(r"#(?:(\d+)|<([^<>]*)>)")
+
+
+class Feed(NamedTuple):
+    """Meaning of F: speed of the tool tip, or of the angles if only they move."""
+
+    mm_min: float
+    deg_min: float
+
+
+class Modes:
+    """Modal state; begins as LinuxCNC does, in millimetres."""
+
+    def __init__(self, text: str, file: str, start: NDArray[np.float64] | None, setup: ControlSetup) -> None:
+        self.path = ToolpathBuilder(file, start)
+        self.path.ending = Ending.TEXT  # unless a block says otherwise
+        self.path.units_said = False
+        pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64)
+        self._state = ControlState(setup, pose)
+        self.flow = Flow(text, file, self._state.parameter)
+        self._given = not np.isnan(pose).any()
+        self._fixed = bits_of(~np.isnan(pose)) & TURNS
+        self._motion: float | None = None
+        self._speed = Feed(0.0, 0.0)
+        self._per_move = False
+        self._absolute = True
+        self._absolute_centres = False
+        self._plane = 0
+        self._cycle = ModalCycle()
+        self._turning, self._stopped = "", 0
+        self._upright = self._moved = False
+        self._system_said = False
+        self.path.holds = {}
+        self.path.count_from(self._state.offset)
+        if any(self._state.g92):
+            self._hold("G92", self._state.g92)
+
+    def _set(self, block: ProgramBlock, which: int | str, value: float, column: int) -> None:
+        if (isinstance(which, int) and which > LAST_OWN) or (
+            isinstance(which, str) and self._state.parameter(which) is not None
+        ):
+            what = f"#{which if isinstance(which, int) else f'<{which}>'} is the control's own"
+            raise block.place.fault(column, what, "set offsets with G10 L2, and lengths with --tool-length")
+        self.flow.set(which, value)
+
+    def _said(self, block: ProgramBlock) -> None:
+        for comment in block.comments:
+            if comment:
+                self.path.say(RowKind.COMMENT, comment, line=block.place.line)
+        if block.message:
+            self.path.say(RowKind.MESSAGE, self._with_values(block.message), line=block.place.line)
+
+    def _with_values(self, message: str) -> str:
+        """Return a message with the values of its parameters."""
+        if not _SHOWS_VALUES.match(message):
+            return message
+
+        def value(match: re.Match[str]) -> str:
+            known = self.flow.value_of(int(match[1]) if match[1] else match[2].lower())
+            return match[0] if known is None else f"{known:f}"
+
+        return _SHOWN.sub(value, message)
+
+    def _units(self, block: ProgramBlock) -> None:
+        units = block.code(ModalGroup.UNITS)
+        if units is None:
+            return
+        self.path.units_said = True
+        unit_mm = MM_PER_INCH if units == 20.0 else 1.0  # noqa: PLR2004
+        if unit_mm != self._state.unit_mm and "F" in block.words:
+            # LinuxCNC sets the feed before it changes units, so F would still count in the old ones.
+            column, code = block.words["F"].column, name("G", units)
+            what = f"F in the line of {code} counts in the units before it on some controls and after it on others"
+            raise block.place.fault(column, what, f"write {code} in a line before")
+        self._state.unit_mm = unit_mm
+
+    def _feed(self, block: ProgramBlock) -> None:
+        if ModalGroup.FEED_MODE in block.codes:
+            # LinuxCNC forgets F at every G94, even where it was in force already.
+            self._per_move = block.code(ModalGroup.FEED_MODE) == 93.0  # noqa: PLR2004
+            self._speed = Feed(0.0, 0.0)
+        elif self._per_move:
+            self._speed = Feed(0.0, 0.0)  # each move has its own
+        word = block.words.pop("F", None)
+        if word is not None:
+            if word.value < 0.0:
+                raise block.place.fault(word.column, f"the feed is negative (F{word.value:g})", "give a positive feed")
+            # Degrees are degrees in G20 as well: only the speed of the tool tip counts in inches.
+            self._speed = Feed(word.value * self._state.unit_mm, word.value)
+
+    def _functions(self, block: ProgramBlock) -> None:
+        speed, tool = block.words.get("S"), block.words.get("T")
+        if speed is not None and speed.value < 0.0:
+            raise block.place.fault(speed.column, f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4")
+        if tool is not None and (tool.value < 0.0 or tool.value != int(tool.value)):
+            raise block.place.fault(tool.column, f"T{tool.value:g} is no tool", "give a whole number")
+        change, number_set = block.codes.get(ModalGroup.TOOL), None
+        if change is not None and change.value == SET_TOOL:
+            number_set = block.words.pop("Q", None)
+            if number_set is None or number_set.value < 0.0 or number_set.value != int(number_set.value):
+                raise block.place.fault(change.column, "M61 needs Q", "give the number of the tool")
+        said = [block.words.pop("T", None), change, number_set]
+        said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
+        said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
+        text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
+        if text:
+            self.path.say(RowKind.FUNCTION, text, line=block.place.line)
+        if ModalGroup.SPINDLE in block.codes:
+            turning = name("M", block.codes[ModalGroup.SPINDLE].value)
+            self._stopped = len(self.path) if self._turning and turning == "M5" else self._stopped
+            self._turning = "" if turning == "M5" else turning
+        if tool is not None:
+            self._state.tool_selected = int(tool.value)
+        if number_set is not None:
+            self._state.tool = int(number_set.value)
+        elif change is not None:
+            self._state.tool = self._state.tool_selected
+            self._turning = ""
+            # A tool changer may move the machine: what no line names again before the next cut is not to be named either.
+            self.path.unknown |= ALL_AXES & ~self._fixed
+
+    def _shared_words(self, block: ProgramBlock) -> None:
+        """Refuse codes in one line that share a word or cancel each other."""
+        if not block.codes:
+            return
+        users = [self._in_line(block, ModalGroup.ONCE, {DWELL, 10.0}), self._in_line(block, ModalGroup.PATH, {64.0})]
+        users += [self._in_line(block, ModalGroup.MOTION, ARCS) or self._modal_arc(block)]
+        both = [code for code in users if code]
+        if len(both) > 1 and ("P" in block.words or both[0] == name("G", DWELL)):
+            column = block.words["P"].column if "P" in block.words else 1
+            what = f"{' and '.join(both)} both take P"
+            raise block.place.fault(column, what, "write them in separate lines")
+        once = block.code(ModalGroup.ONCE)
+        if once in TAKES_AXES and block.code(ModalGroup.MOTION) not in {None, RAPID, LINEAR}:
+            column = block.codes[ModalGroup.ONCE].column
+            what = f"{name('G', once or 0.0)} and {name('G', block.codes[ModalGroup.MOTION].value)} both take axes"
+            raise block.place.fault(column, what, "write them in separate lines")
+
+    @staticmethod
+    def _in_line(block: ProgramBlock, group: ModalGroup, values: set[float] | frozenset[float]) -> str:
+        value = block.code(group)
+        return name("G", value) if value in values and value is not None else ""
+
+    def _modal_arc(self, block: ProgramBlock) -> str:
+        """Return the arc of a line without its own code; empty if it makes none."""
+        is_arc = self._motion in ARCS and ModalGroup.MOTION not in block.codes
+        return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + CENTRES + POLAR) else ""
+
+    def _dwell_s(self, block: ProgramBlock) -> float:
+        word = block.words.pop("P", None)
+        if word is None or word.value < 0.0:
+            column = block.codes[ModalGroup.ONCE].column
+            raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
+        return word.value
+
+    def _modes(self, block: ProgramBlock) -> None:
+        plane, distance = block.code(ModalGroup.PLANE), block.code(ModalGroup.DISTANCE)
+        centres, back = block.code(ModalGroup.ARC_DISTANCE), block.code(ModalGroup.RETRACT)
+        self._plane = self._plane if plane is None else int(plane) - 17
+        self._absolute = self._absolute if distance is None else distance == 90.0  # noqa: PLR2004
+        self._absolute_centres = self._absolute_centres if centres is None else centres == 90.1  # noqa: PLR2004
+        self._cycle.to_clear = self._cycle.to_clear if back is None else back == 99.0  # noqa: PLR2004
+        if ModalGroup.CYCLE_END in block.codes:
+            self._motion, self._cycle.numbers = None, {}
+        if ModalGroup.PATH in block.codes:
+            self._path_control(block)
+
+    def _path_control(self, block: ProgramBlock) -> None:
+        word = block.codes[ModalGroup.PATH]
+        corner = 0.0 if word.value == 61.0 else EXACT_STOP_MM  # noqa: PLR2004
+        if word.value == 64.0:  # noqa: PLR2004
+            allowed, _ = block.words.pop("P", None), block.words.pop("Q", None)
+            # LinuxCNC takes P0 for no bound, as if P were not there.
+            corner = allowed.value * self._state.unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
+        self.path.corner_mm = corner
+
+    def _tool_length(self, block: ProgramBlock) -> None:
+        word = block.codes.get(ModalGroup.TOOL_LENGTH)
+        if word is None:
+            return
+        if word.value == 49.0:  # noqa: PLR2004
+            said = self._state.length_said
+            self._state.use_length(None, block, word)
+            if said:
+                self._system("G49", block)
+            return
+        if word.value != 43.0:  # noqa: PLR2004 - G43.4, along the tool
+            tilt = self._state.pose[3:5]
+            if np.isnan(tilt).any() or np.abs(tilt).max() > 0.0:
+                what = "G43.4 while A or B is not zero"
+                raise block.place.fault(word.column, what, "post the program for the tip, without G43.4")
+            self._upright = True  # A and B must stay so: G43.4 would tilt the tool length
+        tool = block.words.pop("H", None)
+        which = self._state.use_length(tool, block, word)
+        self._hold(f"H{which}", self._state.length)
+        self._system(f"G43 H{which}", block)
+
+    def _system(self, text: str, block: ProgramBlock) -> None:
+        self.path.say(RowKind.SYSTEM, text, line=block.place.line)
+        self.path.count_from(self._state.offset)
+
+    def _hold(self, what: str, values: tuple[float, ...]) -> None:
+        held = {} if self.path.holds is None else self.path.holds
+        held.setdefault(what, values)
+        self.path.holds = held
+        self.path.count_from(self._state.offset)

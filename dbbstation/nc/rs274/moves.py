@@ -1,0 +1,235 @@
+"""Moves, arcs and cycles of a block."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.nc.rs274.arc_words import CENTRES, arc_of
+from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
+from dbbstation.nc.rs274.cycles import cycle_steps
+from dbbstation.nc.rs274.state import AXES, unknown_place
+from dbbstation.nc.toolpath import (
+    IN_FORCE,
+    LEAST_MM,
+    RowKind,
+    bits_of,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.tokens import BadLine, Word
+
+from dbbstation.nc.rs274.modes import ARCS, CLOCKWISE, LINEAR, MACHINE, POLAR, RAPID, TAKES_AXES, Feed, Modes
+
+MOST_ROWS = 1_000_000
+"""Moves and stops that a program may have once its arcs are chords: 260 full turns of 150 mm, or a path of 50 m in steps
+of 0.05 mm. All of it is inverted at once, for the sake of sources with a history; it takes some gigabytes then."""
+
+FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
+"""No increment may lead farther than this, as no number may be larger."""
+
+LEAST_F = 1e-3
+"""A move of no way under G93 has a feed all the same."""
+
+
+class Moves(Modes):
+    """Adds moves to the toolpath."""
+
+    def _rapid(
+        self, block: ProgramBlock, target: NDArray[np.float64], axes: list[int], *, in_machine: bool = False
+    ) -> None:
+        self._begin_move(block, target)
+        unknown = (self.path.unknown & ~sum(1 << axis for axis in axes)) | bits_of(np.isnan(target))
+        self.path.rapid(target, line=block.place.line, in_machine=in_machine, unknown=unknown)
+        self._state.pose = target
+
+    def _go_to(self, block: ProgramBlock, named: list[str], *, in_machine: bool) -> None:
+        if self._motion is None:
+            what = f"{named[0]} without a motion code"
+            raise block.place.fault(block.first_column, what, "write G0 or G1 before it")
+        target = self._target(block, in_machine=in_machine)
+        if self._motion == RAPID:
+            self._rapid(block, target, [AXES.index(letter) for letter in named], in_machine=in_machine)
+        elif self._motion == LINEAR:
+            way = target - self._state.pose
+            length = float(np.linalg.norm(way[:3])), float(np.linalg.norm(way[3:]))
+            self._cut(block, target[None], length, in_machine=in_machine)
+        else:
+            arc = arc_of(
+                block,
+                self._state,
+                target,
+                clockwise=self._motion == CLOCKWISE,
+                plane=self._plane,
+                absolute=self._absolute_centres,
+            )
+            if len(self.path) + arc.chords > MOST_ROWS:
+                raise too_long(block)
+            self._cut(block, arc.poses(), (arc.length_mm, 0.0), arc=arc.chord)
+        for letter in (*named, *POLAR):
+            block.words.pop(letter, None)
+
+    def _begin_motion(self, motion: float) -> None:
+        if motion in CYCLES and self._motion not in CYCLES:
+            self._cycle.begun_at = float(self._state.pose[2])
+        if motion != self._motion:
+            self._cycle.numbers = {}
+        self._motion = motion
+
+    def _goes_nowhere(self, block: ProgramBlock, motion: float | None, once: float | None) -> bool:
+        """Return whether a line without axes is a move: an arc by its centre; for LinuxCNC also a motion code alone."""
+        if self._motion in ARCS and (motion is not None or any(each in block.words for each in CENTRES)):
+            return True
+        return motion in {RAPID, LINEAR} and not np.isnan(self._state.pose).any() and once not in TAKES_AXES
+
+    def _cut(
+        self,
+        block: ProgramBlock,
+        poses: NDArray[np.float64],
+        length: tuple[float, float],
+        *,
+        in_machine: bool = False,
+        arc: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+    ) -> None:
+        self._check_feed(block, block.first_column)
+        self._begin_move(block, poses[-1])
+        speed = self._speed
+        if self._per_move:  # G93: one over the minutes of the move
+            speed = Feed(*(max(each * self._speed.deg_min, LEAST_F) for each in length))
+        self.path.feed(poses, *speed, line=block.place.line, in_machine=in_machine, arc=arc)
+        self._state.pose = poses[-1]
+
+    def _begin_move(self, block: ProgramBlock, target: NDArray[np.float64]) -> None:
+        if not self._moved:
+            if self._given and self._motion != RAPID:  # the begin of a cut is corrected as well
+                self.path.rapid(self._state.pose, line=block.place.line)
+            if not self._system_said:
+                self._hold(IN_FORCE, self._state.offset_of(1))
+            self._moved = True
+        if self._upright and self._state.length_said and np.abs(target[3:5]).max() > 0.0:
+            what = "A or B turns under G43.4, which would tilt the tool length"
+            raise block.place.fault(block.first_column, what, "post the program for the tip, without G43.4")
+
+    def _check_machine(self, machine: Word, block: ProgramBlock, named: list[str]) -> None:
+        if self._motion not in {RAPID, LINEAR} or not named:
+            raise block.place.fault(machine.column, "G53 goes with G0 and G1 only, and with axes", "remove it")
+        if not self._absolute:
+            raise block.place.fault(
+                machine.column, "G53 goes with absolute distances (G90) only", "write G90 before it"
+            )
+
+    def _check_feed(self, block: ProgramBlock, column: int) -> None:
+        if self._speed.mm_min <= 0.0:
+            raise block.place.fault(
+                column, f"{name('G', self._motion or 0.0)} without a feed", "give F before or in it"
+            )
+
+    def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> NDArray[np.float64]:
+        """Return the pose that a block leads to in machine coordinates, shape (6,)."""
+        target: list[float] = self._state.pose.tolist()  # six numbers are sooner done without arrays
+        offset = (0.0,) * 6 if in_machine else self._state.offset
+        for axis, letter in enumerate(AXES):
+            word = block.words.get(letter)
+            if word is not None:
+                value = word.value * (self._state.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
+                if not self._absolute and math.isnan(target[axis]) and value != 0.0:
+                    raise unknown_place(block, [letter])
+                target[axis] = value + offset[axis] if self._absolute else target[axis] + value
+        if not block.words.keys().isdisjoint(POLAR):
+            target[:2] = self._by_angle(block, target, offset)
+        if self._motion != RAPID and not through:
+            unknown = [letter for letter, value in zip(AXES, target, strict=True) if math.isnan(value)]
+            if unknown:
+                raise unknown_place(block, unknown)
+        known = [value for value in target if not math.isnan(value)]
+        if max(map(abs, known), default=0.0) > FARTHEST_DEG and (
+            max((abs(value) for value in target[:3] if not math.isnan(value)), default=0.0) > FARTHEST_MM
+            or max((abs(value) for value in target[3:] if not math.isnan(value)), default=0.0) > FARTHEST_DEG
+        ):
+            what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
+            raise block.place.fault(block.first_column, what, "check its numbers, and G91 and G20 before it")
+        return np.array(target)
+
+    def _by_angle(self, block: ProgramBlock, pose: list[float], offset: tuple[float, ...]) -> list[float]:
+        """Return X and Y of polar coordinates about the origin, in machine coordinates [mm] [LinuxCNC, Polar Coordinates]."""
+        radius_word, angle_word = (block.words.get(letter) for letter in POLAR)
+        once = block.code(ModalGroup.ONCE)
+        other = self._plane != 0 or ModalGroup.PLANE in block.codes or once in {*TAKES_AXES, MACHINE}
+        if other or block.words.keys() & {"X", "Y"} or any(self._state.length[:2]):
+            what = "polar coordinates (@, ^) go with moves in G17, without G53, X, Y and a tool length in these"
+            raise block.place.fault(block.first_column, what, "write X and Y")
+        x, y = (at - zero for at, zero in zip(pose[:2], offset, strict=False))
+        radius, angle_deg = math.hypot(x, y), math.degrees(math.atan2(y, x))
+        partly = not self._absolute or radius_word is None or angle_word is None
+        if partly and math.isnan(radius):
+            raise unknown_place(block, ["X", "Y"])
+        if partly and radius < LEAST_MM and (radius_word is not None or not self._absolute):
+            raise block.place.fault(block.first_column, "the origin has no angle (@, ^)", "write X and Y")
+        if radius_word is not None:
+            radius = radius_word.value * self._state.unit_mm + (0.0 if self._absolute else radius)
+        if angle_word is not None:
+            angle_deg = angle_word.value + (0.0 if self._absolute else angle_deg)
+        angle = math.radians(angle_deg)
+        return [radius * math.cos(angle) + offset[0], radius * math.sin(angle) + offset[1]]
+
+    def _run_cycle(self, block: ProgramBlock, named: list[str]) -> None:
+        column, code = block.first_column, self._motion or 0.0
+        times = block.words.pop("L", None)
+        if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
+            what = f"{name('G', code)} with {'another plane than G17' if self._plane else 'G93, or A, B, C'}"
+            raise block.place.fault(column, what, "post cycles as single moves")
+        depths = self._cycle.depths(code, block, self._state, column, absolute=self._absolute)
+        self._check_feed(block, column)
+        corner, self.path.corner_mm = self.path.corner_mm, 0.0  # LinuxCNC follows the exact path there
+        for _ in range(1 if times is None else int(times.value)):
+            if self._cycle.begun_at < depths.clear:
+                self._go(block, depth=depths.clear)
+            self._rapid(block, self._target_of_cycle(block), [0, 1])
+            self._go(block, depth=depths.clear)
+            for step in cycle_steps(code, depths):
+                self._cycle_step(block, step.what, step.depth)
+        self.path.corner_mm = corner
+        for letter in (*named, *POLAR):
+            block.words.pop(letter, None)
+
+    def _target_of_cycle(self, block: ProgramBlock) -> NDArray[np.float64]:
+        motion, self._motion = self._motion, RAPID
+        target = self._target(block)
+        self._motion = motion
+        return target
+
+    def _cycle_step(self, block: ProgramBlock, what: str, depth: float) -> None:
+        line = block.place.line
+        if what == "dwell":
+            if self._cycle.numbers.get("P", 0.0) > 0.0:
+                self.path.dwell(self._cycle.numbers["P"], line=line)
+        elif what in {"stop", "turn"}:
+            if self._turning:
+                self.path.say(RowKind.FUNCTION, "M5" if what == "stop" else self._turning, line=line)
+        else:
+            self._go(block, depth=depth, feed=what == "feed")
+
+    def _go(self, block: ProgramBlock, *, depth: float, feed: bool = False) -> None:
+        target = self._state.pose.copy()
+        target[2] = depth
+        if feed:
+            self._cut(block, target[None], (0.0, 0.0))
+        else:
+            self._rapid(block, target, [2])
+
+
+def named_axes(block: ProgramBlock) -> list[str]:
+    """Return the axes that a block names, X and Y by polar coordinates too."""
+    polar = "" if block.words.keys().isdisjoint(POLAR) else "XY"
+    return [letter for letter in AXES if letter in block.words or letter in polar]
+
+
+def too_long(block: ProgramBlock) -> BadLine:
+    """Return the fault of a program with too many moves."""
+    what = f"up to here the program has more than {MOST_ROWS} moves, arcs as chords"
+    return block.place.fault(0, what, "check the turns (P) of its arcs, or compensate it in parts")

@@ -14,9 +14,11 @@ import pytest
 
 from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
+from dbbstation.diagnosis.findings import Shift, SourceFinding, Unexplained
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.levels import DifferenceFound, Differs, Levels
-from dbbstation.results.diagnosis import BeforeAfter, CauseResult, DiagnosisFigures, ParameterShift, UnexplainedResult
+from dbbstation.inference.verdict import Verdict
+from dbbstation.results.diagnosis import BeforeAfter, DiagnosisFigures
 from tests.cli.conftest import Outcome, call
 from tests.once import OF_TABLES, STUDIES, computed_once
 from tests.plant.mechanisms.kinematics import Kinematics
@@ -259,8 +261,8 @@ def test_a_command_exists_with_its_options(command):
 
 
 def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys):
-    source = CauseResult(
-        name="gravity", verdict="identified", probability=1.0, concealed=0.9, gain=9.0, stability=1.0, text=""
+    source = SourceFinding(
+        name="gravity", verdict=Verdict.IDENTIFIED, probability=1.0, concealed=0.9, gain=9.0, stability=1.0, text=""
     )
     both = BeforeAfter(2.0, 1.0)
     print_diagnosis(
@@ -280,8 +282,8 @@ def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys
             locations=(),
             sources=(source,),
             cancelling=None,
-            unexplained=UnexplainedResult(0.0, None, None, "Nothing is left beyond noise.", None),
-            parameter_shift=(ParameterShift("joint", 0.0, 1.0, 1.0, 0.1),),
+            unexplained=Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."),
+            parameter_shift=(Shift("joint", 0.0, 1.0, 1.0, 0.1),),
             second_start_agrees=True,
             next_test=None,
             further_tests=(),

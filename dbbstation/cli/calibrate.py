@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import echo
+from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
 
 if TYPE_CHECKING:
-    from dbbstation.calibration.checks.plan_check import PlanCheck
     from dbbstation.calibration.checks.scatter import ScatterCheck
     from dbbstation.results.calibration import CalibrationResult
 
@@ -19,9 +19,6 @@ IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
 
 IN_MM = frozenset({"cog-shift"})
 """Sources whose lengths are no deviations of the tool."""
-
-NOT_THIS_MACHINE = 10.0
-"""Residual over noise above which the machine file itself is in doubt."""
 
 
 def show(result: CalibrationResult) -> None:
@@ -33,53 +30,13 @@ def show(result: CalibrationResult) -> None:
     echo()
     _print_parameters(result)
     echo()
-    echo(f"{result.parameters_identified} parameters identified")
-    held = "" if result.parameters_prescribed else ", held at nominal"
-    for text in result.directions_lost:
-        echo(f"not visible to these tests{held}: {text}")
-    if result.parameters_prescribed:
-        echo(f"held at nominal instead: {', '.join(result.parameters_prescribed)}")
-    for text in result.directions_regularised:
-        echo(f"not visible to these tests, known by the machine file's joint tolerance only: {text}")
-    for text in result.gaps:
-        echo(f"  {text}")
-    for weak in result.observability.weak_directions[:1]:
-        echo(f"least visible, to {weak.uncertainty:.1f} {weak.unit}: {weak.text}")
-    if not result.plan_check.enough:
-        _print_plan_check(result.plan_check)
-    _print_misfit(result)
+    for text in (*visibility_sentences(result), *fit_sentences(result)):
+        echo(text)
     for check in result.scatter:
         _print_scatter(check, missing_physics=result.misfit.missing_physics)
-    echo(f"nominal machine leaves   {result.nominal_rms_um:8.2f} µm rms")
-    echo(f"model leaves             {result.residual_rms_um:8.2f} µm rms")
-    echo(f"... within each mounting {result.residual_within_mounting_rms_um:8.2f} µm rms")
-    echo(f"noise of one reading     {result.noise_um:8.2f} µm")
+    for text in residual_lines(result):
+        echo(text)
     print_currents(result.motor_currents)
-
-
-def _print_plan_check(check: PlanCheck) -> None:
-    echo(
-        f"{check.tests} tests are too few to reveal a wrong tilt, height or position in the plan: {check.left} degrees "
-        f"of freedom are left to check it, one circle has {check.of_one_test}; a small residual proves nothing here, so "
-        "check the tilts by hand or measure further circles"
-    )
-
-
-def _print_misfit(result: CalibrationResult) -> None:
-    from dbbstation.results.model_warnings import exceeds
-
-    misfit = result.misfit
-    if not misfit.missing_physics:
-        return
-    echo(
-        f"{exceeds(misfit.rms_um, misfit.probability)}: physics is missing from the model; `dbbstation diagnose` looks for it. "
-        "Until then its parameters may be off by many times their u"
-    )
-    if result.residual_within_mounting_rms_um > NOT_THIS_MACHINE * result.noise_um:
-        echo(
-            f"... more than {NOT_THIS_MACHINE:.0f} times the noise: check also that the machine file is this machine's, its "
-            "joints in the order of the struts and the rotation convention that of the control"
-        )
 
 
 def _print_parameters(result: CalibrationResult) -> None:
@@ -131,5 +88,5 @@ calibrate = command(
     show,
     CommandOutput("out", "Write the calibrated model here.", said="model written to {path}"),
     figure(said="figure written to {path}"),
-    remarks=lambda result: (f"outlier, kept out of the fit: {one.text}" for one in result.outliers),
+    remarks=lambda result: map(outlier_sentence, result.outliers),
 )

@@ -9,6 +9,7 @@ import click
 from dbbstation.cli.declared import CommandOutput, command, figure, save
 from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.output import echo
+from dbbstation.results.words import ending_sentences, mismatch_sentence, outlier_sentence
 from dbbstation.tasks.declare import Option
 from dbbstation.tasks.diagnose import diagnose as task
 
@@ -53,7 +54,7 @@ UNPREDICTABLE_UM = 1000.0
 def _print(result: DiagnosisFigures) -> None:
     _print_mismatch(result)
     for outlier in result.outliers:
-        echo(f"outlier, kept out of the fits: {outlier.text}")
+        echo(outlier_sentence(outlier))
     _print_sources(result.sources)
     if result.cancelling:
         echo(f"\n{cancelling_text(result.cancelling)}")
@@ -71,32 +72,16 @@ def _print(result: DiagnosisFigures) -> None:
     echo(result.unexplained.text)
     if result.unexplained.curve:
         _print_curve(result.unexplained.curve)
-    _print_limits(result)
-    _print_next_tests(result)
-
-
-def _print_limits(result: DiagnosisFigures) -> None:
-    """Print reached limits, and whether a second search found another answer."""
-    for limit in result.limits:
-        echo(limit.text)
-    if result.second_start_agrees is False:
-        echo("A second search came to another set of causes: several explain these recordings, take it with care.")
+    for text in ending_sentences(result):
+        echo(text)
 
 
 def _print_mismatch(result: DiagnosisFigures) -> None:
     """Print whether recordings contradict the kinematic model, and first whether findings predict worse."""
-    from dbbstation.results.model_warnings import chance_in_words
-
     if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the kinematic calibration alone.\n")
     echo("\n".join((*result.sentences(), "")))
-    if result.mismatch:
-        echo(
-            f"The recordings differ from the kinematic model by {result.misfit_rms_um:.2f} µm rms beyond noise "
-            f"(probability by chance {chance_in_words(result.probability)})."
-        )
-    else:
-        echo(f"The kinematic model explains these circles (probability {result.probability:.2g}).")
+    echo(mismatch_sentence(result))
     echo()
 
 
@@ -118,22 +103,6 @@ def _print_workspace(elsewhere: WorkspaceError) -> None:
             f"model {known}"
         )
     echo(f"  the common shift is {shift} µm; a program whose zero is set on the part does not feel it")
-
-
-STILL_OPEN = frozenset({"ambiguous", "not-testable"})
-
-
-def _print_next_tests(result: DiagnosisFigures) -> None:
-    """Print proposed tests, or that none helps an open verdict."""
-    if result.next_test:
-        tests = [result.next_test, *result.further_tests]
-        which = "this test" if len(tests) == 1 else f"these {len(tests)} tests"
-        echo(
-            f"measure next: {'; and '.join(test.text for test in tests)}; {which} would bring u of {tests[0].source} "
-            f"to {tests[-1].sigma_after:.2g} instead of {tests[0].sigma_before:.2g} {tests[0].unit}"
-        )
-    elif any(source.verdict in STILL_OPEN and source.gain is not None for source in result.sources):
-        echo("measure next: no proposal; up to three further tests would neither change a verdict nor halve u")
 
 
 MOST_POINTS = 12

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from dbbstation.facts.serialise import as_objects
+from dbbstation.results.words import unseen_sentence, weak_sentence
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
@@ -41,8 +42,8 @@ def quality_of_fit(identified: IdentifiedModel) -> str:
 
 def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
     """Return what a model's recordings could not see, or saw least."""
-    lost = [f"Not visible, held at nominal: {text}." for text in identified.directions_lost]
-    seen = identified.report.get("observability")
-    weak: Any = seen.get("weak_directions", []) if isinstance(seen, Mapping) else []
-    told = [f"Seen least: {one['text']}, ± {one['uncertainty']:.2g} {one['unit']} (u)." for one in weak]
-    return (*lost, *told)
+    seen = as_objects(identified.report.get("observability"))
+    return (
+        *map(unseen_sentence, identified.directions_lost),
+        *map(weak_sentence, getattr(seen, "weak_directions", ())),
+    )

@@ -5,6 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.facts.serialise import as_objects
+from dbbstation.results.words import (
+    ending_sentences,
+    fit_sentences,
+    mismatch_sentence,
+    outlier_sentence,
+    residual_lines,
+    visibility_sentences,
+)
 from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import worst_lines
@@ -22,39 +30,21 @@ def result_lines(step: SessionTask, answer: Mapping[str, object]) -> list[str]:
 
 
 def _calibrated(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
-    yield texts.FITTED.format(
-        count=answer.parameters_identified,
-        nominal=answer.nominal_rms_um,
-        left=answer.residual_rms_um,
-        within=answer.residual_within_mounting_rms_um,
-        noise=answer.noise_um,
-    )
-    if answer.misfit.missing_physics:
-        yield texts.PHYSICS_MISSING.format(rms=answer.misfit.rms_um)
-    for outlier in answer.outliers[:_MOST]:
-        yield texts.OUTLIER.format(text=outlier.text)
-    for text in answer.directions_lost[:_MOST]:
-        yield texts.UNSEEN.format(text=text)
-    for text in answer.gaps[:_MOST]:
-        yield texts.GAP.format(text=text)
-    if not answer.directions_lost:
-        yield texts.ALL_SEEN
-    if not answer.plan_check.enough:
-        yield texts.TOO_FEW.format(tests=answer.plan_check.tests, left=answer.plan_check.left)
+    yield from residual_lines(answer)
+    yield from fit_sentences(answer)
+    yield from (outlier_sentence(one) for one in answer.outliers[:_MOST])
+    yield from visibility_sentences(answer)
 
 
 def _diagnosed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     yield from answer.said
-    form = texts.MISMATCH if answer.mismatch else texts.NO_MISMATCH
-    yield form.format(rms=answer.misfit_rms_um, noise=answer.noise_um)
+    yield mismatch_sentence(answer)
     for verdict, words in texts.VERDICT_WORDS.items():
         names = [cause.name for cause in answer.sources if cause.verdict == verdict]
         if names:
             yield texts.CAUSES.format(verdict=words, names=", ".join(names))
     yield answer.unexplained.text
-    yield from (limit.text for limit in answer.limits)
-    if answer.next_test is not None:
-        yield texts.MEASURE_NEXT.format(text=answer.next_test.text)
+    yield from ending_sentences(answer)
 
 
 def _programmed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects

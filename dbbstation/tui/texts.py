@@ -276,18 +276,6 @@ RESULTS_LEAVE = (
     "A step is being done. End it and go back?\n\nWhat is done already stays.\n\nY  end it      N or Esc  go on"
 )
 
-FITTED = (
-    "{count} parameters are identified. The nominal machine leaves {nominal:.1f} µm rms of the readings, the model {left:.2f} µm, "
-    "within each mounting {within:.2f} µm; one reading has {noise:.2f} µm of noise."
-)
-PHYSICS_MISSING = "What is left exceeds noise and mountings by {rms:.2f} µm rms: physics is missing, 2 looks for it."
-OUTLIER = "Outlier, kept out of the fit: {text}"
-UNSEEN = "The plan could not see: {text}"
-GAP = "What helps: {text}"
-ALL_SEEN = "The plan sees every parameter."
-TOO_FEW = "{tests} tests are too few to check themselves: {left} degrees of freedom are left. A small residual proves nothing."
-MISMATCH = "The recordings differ from the kinematic model by {rms:.2f} µm rms beyond a noise of {noise:.2f} µm."
-NO_MISMATCH = "The recordings agree with the kinematic model; noise {noise:.2f} µm."
 VERDICT_WORDS: Mapping[str, str] = {
     "identified": "Identified causes",
     "happened": "Happened in this session",
@@ -296,7 +284,6 @@ VERDICT_WORDS: Mapping[str, str] = {
     "not-testable": "These tests cannot tell",
 }
 CAUSES = "{verdict}: {names}"
-MEASURE_NEXT = "Measure next: {text}"
 PROGRAMMED = "{count} programs for {dialect}, all within the machine's travel."
 CORRECTED = "The greatest correction is {most:.1f} µm."
 REPORT_VERDICT: Mapping[str, str] = {

@@ -108,7 +108,7 @@ def test_the_report_states_no_uncertainty_of_such_a_parameter(predicted, run, le
     made = run("report", level, "--model", model, "--page", page)
     assert made.code == DONE, made.err
     text = page.read_text(encoding="utf-8")
-    assert "Not visible, held at nominal: all six base joints together along Z" in text
+    assert "not visible to these tests, held at nominal: all six base joints together along Z" in text
     row = text[text.index("joint_1_z_mm") :].partition("</tr>")[0]
     assert re.fullmatch(r"joint_1_z_mm</td><td[^>]*>[-\d.]+</td><td[^>]*>-</td><td>mm</td>", row)
 

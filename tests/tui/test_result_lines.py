@@ -29,13 +29,12 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
 
 def test_a_calibration_says_what_it_left_and_what_the_plan_could_not_see(calibrated: dict[str, object]) -> None:
     lines = result_lines(SessionTask.CALIBRATE, calibrated | {"directions_lost": [], "gaps": [], "outliers": []})
-    assert lines.count(texts.ALL_SEEN) == 1
-    assert f"{calibrated['residual_within_mounting_rms_um']:.1f}" in lines[0]
+    assert not any("not visible" in line for line in lines)
+    assert f"{calibrated['residual_within_mounting_rms_um']:.2f} µm rms" in lines[2]
     blind = calibrated | {"directions_lost": ["the height of the base"], "gaps": ["no tilt beyond 20 degrees"]}
     lines = result_lines(SessionTask.CALIBRATE, blind)
-    assert texts.ALL_SEEN not in lines
-    assert texts.UNSEEN.format(text="the height of the base") in lines
-    assert texts.GAP.format(text="no tilt beyond 20 degrees") in lines
+    assert "not visible to these tests, held at nominal: the height of the base" in lines
+    assert "  no tilt beyond 20 degrees" in lines
 
 
 @pytest.mark.parametrize("missing", [False, True])
@@ -44,33 +43,41 @@ def test_missing_physics_and_too_few_tests_are_said_where_they_are(
     calibrated: dict[str, object], *, missing: bool, enough: bool
 ) -> None:
     answer = calibrated | {
-        "misfit": {"missing_physics": missing, "rms_um": 3.2},
-        "plan_check": {"enough": enough, "tests": 3, "left": 2},
+        "misfit": {"missing_physics": missing, "rms_um": 3.2, "probability": 1e-9},
+        "plan_check": {"enough": enough, "tests": 3, "left": 2, "of_one_test": 7},
     }
-    lines = result_lines(SessionTask.CALIBRATE, answer)
-    assert (texts.PHYSICS_MISSING.format(rms=3.2) in lines) is missing
-    assert (texts.TOO_FEW.format(tests=3, left=2) in lines) is not enough
+    said = "\n".join(result_lines(SessionTask.CALIBRATE, answer))
+    assert ("by 3.20 µm rms (probability by chance 1e-09): physics is missing" in said) is missing
+    assert ("3 tests are too few" in said) is not enough
 
 
 def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
     answer = {
+        "said": ["Measured circles and the kinematic model differ.", "The difference follows strut-force."],
         "mismatch": True,
         "misfit_rms_um": 9.3,
-        "noise_um": 0.3,
-        "sources": [{"name": "gravity", "verdict": "identified"}, {"name": "backlash", "verdict": "ambiguous"}],
+        "probability": 1e-120,
+        "sources": [
+            {"name": "gravity", "verdict": "identified", "gain": 40.0},
+            {"name": "backlash", "verdict": "ambiguous", "gain": 2.0},
+        ],
         "unexplained": {"text": "Nothing is left beyond noise."},
+        "limits": [],
+        "second_start_agrees": True,
         "next_test": None,
     }
     lines = result_lines(SessionTask.DIAGNOSE, answer)
-    assert lines[0] == texts.MISMATCH.format(rms=9.3, noise=0.3)
+    assert lines[:2] == answer["said"]
+    assert "by 9.30 µm rms beyond noise (probability by chance below 1e-99)" in lines[2]
     assert texts.CAUSES.format(verdict=texts.VERDICT_WORDS["identified"], names="gravity") in lines
     assert texts.CAUSES.format(verdict=texts.VERDICT_WORDS["ambiguous"], names="backlash") in lines
-    assert lines[-1] == "Nothing is left beyond noise."
-    more = result_lines(SessionTask.DIAGNOSE, answer | {"mismatch": False, "next_test": {"text": "a circle"}})
-    assert more[0] == texts.NO_MISMATCH.format(rms=9.3, noise=0.3)
-    assert more[-1] == texts.MEASURE_NEXT.format(text="a circle")
-    said = ["Measured circles and the kinematic model differ.", "The difference follows strut-force."]
-    assert result_lines(SessionTask.DIAGNOSE, answer | {"said": said})[:2] == said
+    assert lines[-2] == "Nothing is left beyond noise."
+    assert lines[-1].startswith("measure next: no proposal")
+    proposed = {"text": "a circle", "source": "backlash", "sigma_before": 4.0, "sigma_after": 1.0, "unit": "µm"}
+    found = {"mismatch": False, "probability": 0.4, "next_test": proposed, "further_tests": []}
+    more = result_lines(SessionTask.DIAGNOSE, answer | found)
+    assert more[2] == "The kinematic model explains these circles (probability 0.4)."
+    assert more[-1] == "measure next: a circle; this test would bring u of backlash to 1 instead of 4 µm"
 
 
 def test_the_greatest_correction_of_all_programs_is_told() -> None:

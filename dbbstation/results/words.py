@@ -1,0 +1,102 @@
+"""Sentences of answers, the same on terminal and screen.
+
+They take a result, or its JSON as objects, so that a screen need not load the classes of results.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.results.model_warnings import chance_in_words, exceeds
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+NOT_THIS_MACHINE = 10.0
+"""Residual over noise above which the machine file itself is in doubt."""
+
+STILL_OPEN = frozenset({"ambiguous", "not-testable"})
+
+
+def outlier_sentence(outlier: Any) -> str:  # noqa: ANN401 - a result, or objects
+    """Return why a run or a ball takes no part."""
+    return f"outlier, kept out of the fit: {outlier.text}"
+
+
+def unseen_sentence(text: str, *, nominal: bool = True) -> str:
+    """Return a direction that tests do not determine."""
+    return f"not visible to these tests{', held at nominal' if nominal else ''}: {text}"
+
+
+def weak_sentence(weak: Any) -> str:  # noqa: ANN401 - a result, or objects
+    """Return a direction that tests determine least, with its u."""
+    return f"least visible, to {weak.uncertainty:.1f} {weak.unit}: {weak.text}"
+
+
+def visibility_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
+    """Yield what the tests of a calibration determine, and what they do not."""
+    yield f"{found.parameters_identified} parameters identified"
+    yield from (unseen_sentence(text, nominal=not found.parameters_prescribed) for text in found.directions_lost)
+    if found.parameters_prescribed:
+        yield f"held at nominal instead: {', '.join(found.parameters_prescribed)}"
+    for text in found.directions_regularised:
+        yield f"not visible to these tests, known by the machine file's joint tolerance only: {text}"
+    for text in found.gaps:
+        yield f"  {text}"
+    yield from map(weak_sentence, found.observability.weak_directions[:1])
+
+
+def fit_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
+    """Yield whether a calibration can be trusted."""
+    check, misfit = found.plan_check, found.misfit
+    if not check.enough:
+        yield (
+            f"{check.tests} tests are too few to reveal a wrong tilt, height or position in the plan: {check.left} degrees "
+            f"of freedom are left to check it, one circle has {check.of_one_test}; a small residual proves nothing here, so "
+            "check the tilts by hand or measure further circles"
+        )
+    if not misfit.missing_physics:
+        return
+    yield (
+        f"{exceeds(misfit.rms_um, misfit.probability)}: physics is missing from the model; `dbbstation diagnose` looks for it. "
+        "Until then its parameters may be off by many times their u"
+    )
+    if found.residual_within_mounting_rms_um > NOT_THIS_MACHINE * found.noise_um:
+        yield (
+            f"... more than {NOT_THIS_MACHINE:.0f} times the noise: check also that the machine file is this machine's, its "
+            "joints in the order of the struts and the rotation convention that of the control"
+        )
+
+
+def residual_lines(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
+    """Yield what nominal machine and model leave, beside the noise."""
+    yield f"nominal machine leaves   {found.nominal_rms_um:8.2f} µm rms"
+    yield f"model leaves             {found.residual_rms_um:8.2f} µm rms"
+    yield f"... within each mounting {found.residual_within_mounting_rms_um:8.2f} µm rms"
+    yield f"noise of one reading     {found.noise_um:8.2f} µm"
+
+
+def mismatch_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
+    """Return whether recordings contradict the kinematic model."""
+    if not found.mismatch:
+        return f"The kinematic model explains these circles (probability {found.probability:.2g})."
+    return (
+        f"The recordings differ from the kinematic model by {found.misfit_rms_um:.2f} µm rms beyond noise "
+        f"(probability by chance {chance_in_words(found.probability)})."
+    )
+
+
+def ending_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
+    """Yield what of a diagnosis ended at a limit, whether a second search agrees, and what to measure next."""
+    yield from (limit.text for limit in found.limits)
+    if found.second_start_agrees is False:
+        yield "A second search came to another set of causes: several explain these recordings, take it with care."
+    if found.next_test:
+        tests = [found.next_test, *found.further_tests]
+        which = "this test" if len(tests) == 1 else f"these {len(tests)} tests"
+        yield (
+            f"measure next: {'; and '.join(test.text for test in tests)}; {which} would bring u of {tests[0].source} "
+            f"to {tests[-1].sigma_after:.2g} instead of {tests[0].sigma_before:.2g} {tests[0].unit}"
+        )
+    elif any(source.verdict in STILL_OPEN and source.gain is not None for source in found.sources):
+        yield "measure next: no proposal; up to three further tests would neither change a verdict nor halve u"

@@ -7,13 +7,15 @@ line.
 from __future__ import annotations
 
 import math
+import re
 from io import StringIO
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
@@ -59,8 +61,25 @@ class CannotSayError(StationError):
 class WordDialect(Dialect):
     """A dialect of lines of words; axes and F are written when they change.
 
-    Each method returns one line. It raises `CannotSayError` if not overridden.
+    `words` is the table of what is written. A row without an entry is refused by name. A method is overridden where a table
+    is not enough.
     """
+
+    words: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """Text of `begin`, `rapid` and `feed` ({words}), `in machine` ({move}), `exact`, `exact stop`, `continuous`, `within` ({mm}),
+    `dwell` ({seconds}), `pause`, `pause with text` and `comment` and `message` ({text}), `optional stop`, and the ends `M2`, `M30`, `%`."""
+
+    functions: ClassVar[str] = ""
+    """Pattern of words of spindle, coolant and tools."""
+
+    systems: ClassVar[str] = ""
+    """Pattern of work systems and tool lengths."""
+
+    instead: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """Letters that end a message, and what is written for them."""
+
+    longest_block: ClassVar[int] = 252
+    """Characters of a line."""
 
     axis_words: ClassVar[Sequence[str]] = tuple("XYZABC")
     """What is written before the number of each axis, X, Y, Z [mm], A, B, C [deg]."""
@@ -72,7 +91,10 @@ class WordDialect(Dialect):
             CannotSayError: the dialect has no words for something in it.
         """
         text = StringIO()
-        text.writelines(f"{line}\n" for line in self.lines(toolpath, header))
+        for line in self.lines(toolpath, header):
+            if len(line) > self.longest_block and max(map(len, line.split("\n"))) > self.longest_block:
+                raise self.cannot_say(f"a line of more than {self.longest_block} characters")
+            text.write(f"{line}\n")
         return text.getvalue()
 
     def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
@@ -98,59 +120,78 @@ class WordDialect(Dialect):
 
     def begin(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
         """Return lines that set all modes."""
-        return ()
+        return (self.words["begin"],) if "begin" in self.words else ()
 
     def end(self, toolpath: Toolpath) -> Iterable[str]:
         """Return lines for `toolpath.ending`."""
-        raise self.cannot_say(f"the end of a program by {toolpath.ending.value}")
+        return (self._from_table(toolpath.ending.value, f"the end of a program by {toolpath.ending.value}"),)
 
     def line_number(self, line: int) -> str:
         """Return the number in front of a line."""
         return f"N{line} "
 
-    def rapid(self, words: str) -> str:  # noqa: ARG002
+    def rapid(self, words: str) -> str:
         """Return a rapid to the words of changed axes."""
-        raise self.cannot_say("a rapid")
+        return self._from_table("rapid", "a rapid", words=words).rstrip()
 
-    def feed(self, words: str, feed: float | None) -> str:  # noqa: ARG002
+    def feed(self, words: str, feed: float | None) -> str:
         """Return a move at a feed [mm/min; deg/min if only angles move]; None if unchanged."""
-        raise self.cannot_say("a move at feed")
+        line = self._from_table("feed", "a move at feed", words=words)
+        return line if feed is None else f"{line} F{digits(feed)}"
 
-    def in_machine(self, move: str) -> str:  # noqa: ARG002
+    def in_machine(self, move: str) -> str:
         """Return a move in machine coordinates."""
-        raise self.cannot_say("a move in machine coordinates (G53)")
+        return self._from_table("in machine", "a move in machine coordinates (G53)", move=move)
 
-    def corner(self, corner_mm: float) -> str:  # noqa: ARG002
+    def corner(self, corner_mm: float) -> str:
         """Return the rounding from here on [mm]: 0 exact, infinite unlimited."""
-        raise self.cannot_say("how far corners may be rounded")
+        lacking = "how far corners may be rounded"
+        if corner_mm <= 0.0:
+            return self._from_table("exact" if corner_mm == 0.0 else "exact stop", lacking)
+        if math.isinf(corner_mm):
+            return self._from_table("continuous", lacking)
+        return self._from_table("within", lacking, mm=digits(corner_mm))
 
-    def dwell(self, seconds: float) -> str:  # noqa: ARG002
+    def dwell(self, seconds: float) -> str:
         """Return a timed stop [s]."""
-        raise self.cannot_say("a dwell")
+        return self._from_table("dwell", "a dwell", seconds=digits(seconds))
 
-    def pause(self, text: str) -> str:  # noqa: ARG002
+    def pause(self, text: str) -> str:
         """Return a stop for the operator, with a message if there is a text."""
-        raise self.cannot_say("a stop")
+        return self._from_table("pause with text" if text else "pause", "a stop", text=self.said(text))
 
     def optional_stop(self) -> str:
         """Return an optional stop."""
-        raise self.cannot_say("an optional stop (M1)")
+        return self._from_table("optional stop", "an optional stop (M1)")
 
-    def comment(self, text: str) -> str:  # noqa: ARG002
+    def comment(self, text: str) -> str:
         """Return a comment without effect."""
-        raise self.cannot_say("a comment")
+        return self._from_table("comment", "a comment", text=plain(text)).rstrip()
 
-    def message(self, text: str) -> str:  # noqa: ARG002
+    def message(self, text: str) -> str:
         """Return text that the control shows or logs: keyword, comma, text, as in `MSG, hello`."""
-        raise self.cannot_say("a message without a stop")
+        return self._from_table("message", "a message without a stop", text=text)
 
     def function(self, words: str) -> str:
         """Return words of spindle and coolant that every control has: `S800 M3`."""
-        raise self.cannot_say(words)
+        if not all(re.fullmatch(self.functions, word) for word in words.split()):
+            raise self.cannot_say(words)
+        return words
 
     def system(self, text: str) -> str:
         """Return the words of a `SYSTEM` row: work system, offset or tool length."""
-        raise self.cannot_say(text)
+        if not re.fullmatch(self.systems, text):
+            raise self.cannot_say(text)
+        return text
+
+    def said(self, text: str) -> str:
+        """Return a text in letters that a message may have."""
+        return "".join(self.instead.get(letter, letter) for letter in plain(text))
+
+    def _from_table(self, what: str, lacking: str, **values: str) -> str:
+        if what not in self.words:
+            raise self.cannot_say(lacking)
+        return self.words[what].format(**values)
 
     def guard(self, holds: Mapping[str, Sequence[float]]) -> Iterable[str]:  # noqa: ARG002
         """Return lines that end the program if offsets differ from `Toolpath.holds`; none if the control cannot."""

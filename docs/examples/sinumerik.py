@@ -2,89 +2,55 @@
 
 Words after the programming manual "Fundamentals": G4 F for a dwell in seconds, MSG(...) for messages, G60 and G64 for exact
 stop and continuous path, G641 ADIS= for a bound of rounding, G53 for one line in machine coordinates. What this control should
-not be given (a message without a stop, an end without M2 or M30) has no method, and is refused by name.
+not be given (a message without a stop, an end without M2 or M30) has no entry in the table, and is refused by name.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from types import MappingProxyType
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.nc.dialect import plain
 from dbbstation.nc.toolpath import Ending, RowKind, ToolpathBuilder
-from dbbstation.nc.words import WordDialect, digits
+from dbbstation.nc.words import WordDialect
 
-SYSTEMS = ("G54", "G55", "G56", "G57")
 BEGIN = "G90 G94 G71 G17 G40"
 GUARD = 'MSG("work offset and tool length must be zero: check, then continue")'
 NAMES = re.compile(r'MSG\("(?P<text>[^"]*)"\)')
 
 
 class Sinumerik(WordDialect):
-    """One method for each thing that a program can hold; `read` understands what these write."""
+    """A table of what is written; `read` understands it."""
 
     name = "sinumerik"
     extension = ".mpf"
     what = "Siemens Sinumerik 840D"
-
-    def begin(self, toolpath):  # noqa: ARG002 - the same for every program
-        """Absolute, feed per minute, millimetres, arcs in XY, no cutter compensation."""
-        return (BEGIN,)
-
-    def end(self, toolpath):
-        """M2 or M30."""
-        if toolpath.ending is Ending.TEXT:
-            raise self.cannot_say("an end without M2 or M30")
-        return (toolpath.ending.value,)
-
-    def rapid(self, words):
-        """Return G0."""
-        return f"G0 {words}"
-
-    def feed(self, words, feed):
-        """Return G1, F where it changes."""
-        return f"G1 {words}" if feed is None else f"G1 {words} F{digits(feed)}"
-
-    def in_machine(self, move):
-        """G53, for one line."""
-        return f"G53 {move}"
-
-    def corner(self, corner_mm):
-        """Exact stop, continuous path, or within a bound."""
-        if corner_mm == 0.0:
-            return "G60"
-        return "G64" if math.isinf(corner_mm) else f"G641 ADIS={digits(corner_mm)}"
-
-    def dwell(self, seconds):
-        """Return G4, with the seconds in F."""
-        return f"G4 F{digits(seconds)}"
-
-    def pause(self, text):
-        """M0, with what the operator is to do."""
-        return f'{message(text)}\nM0\nMSG("")' if text else "M0"
-
-    def optional_stop(self):
-        """Return M1."""
-        return "M1"
-
-    def comment(self, text):
-        """Behind a semicolon."""
-        return f"; {plain(text)}".rstrip()
-
-    def function(self, words):
-        """Spindle and coolant; tools are changed by hand."""
-        if re.search("[^SM0-9. ]|M6", words):
-            raise self.cannot_say(words)
-        return words
-
-    def system(self, text):
-        """G54 to G57; what others call G58 and G59 are offsets of another kind here."""
-        if text not in SYSTEMS:
-            raise self.cannot_say(text)
-        return text
+    words = MappingProxyType(
+        {
+            "begin": BEGIN,
+            "rapid": "G0 {words}",
+            "feed": "G1 {words}",
+            "in machine": "G53 {move}",
+            "exact": "G60",
+            "continuous": "G64",
+            "within": "G641 ADIS={mm}",
+            "dwell": "G4 F{seconds}",
+            "pause": "M0",
+            "pause with text": 'MSG("{text}")\nM0\nMSG("")',
+            "optional stop": "M1",
+            "comment": "; {text}",
+            "M2": "M2",
+            "M30": "M30",
+        }
+    )
+    functions = r"S[0-9.]+|M(?!0?6$)[0-9]+"
+    """Spindle and coolant; tools are changed by hand."""
+    systems = "G5[4-7]"
+    """Others call G58 and G59 work systems; here they are offsets of another kind."""
+    instead = MappingProxyType({'"': "'"})
 
     def guard(self, holds):  # noqa: ARG002 - the operator looks at all of them
         """A stop: the operator looks, since the program does not."""
@@ -93,11 +59,6 @@ class Sinumerik(WordDialect):
     def read(self, text, name, *, start=None):
         """Return what a program commands, line by line."""
         return _Reader(name, start).read(text)
-
-
-def message(text):
-    """A text that the control shows."""
-    return f'MSG("{plain(text).replace(chr(34), chr(39))}")'
 
 
 class _Reader:
@@ -130,7 +91,7 @@ class _Reader:
             self.path.ending = Ending(first)
         elif first == "G4":
             self.path.dwell(float(words[0][1:]), line=line)
-        elif first in SYSTEMS:
+        elif re.fullmatch(Sinumerik.systems, first):
             self.path.say(RowKind.SYSTEM, first, line=line)
         elif first in {"G60", "G64", "G641"}:
             self.path.corner_mm = {"G60": 0.0, "G64": math.inf}.get(first) if not words else float(words[0][5:])
@@ -144,7 +105,7 @@ class _Reader:
 
     def stop(self, line):
         """A stop with the message before it, or the guard."""
-        if message(self.shown) != GUARD:
+        if f'MSG("{self.shown}")' != GUARD:
             self.path.say(RowKind.PAUSE, self.shown, line=line)
         self.shown = ""
 

@@ -13,7 +13,9 @@ import pytest
 import dbbstation.nc.dialects
 from dbbstation.errors import InputError, StationError
 from dbbstation.files.own_dialects import dialect_given
+from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.registry import GROUP, dialect_named, dialect_of_file, known_dialects
 from dbbstation.nc.rs274.reader import read_program
@@ -238,6 +240,15 @@ def test_a_dialect_that_says_what_it_has_no_words_for_is_taken(tmp_path, crooked
     path = read_program("G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X1 F100\nM1\nM2\n", "part.ngc")
     with pytest.raises(CannotSayError, match=r"part\.ngc:4: the dialect own has no words for an optional stop \(M1\)"):
         compensated_program(path, dialect, Inverse(crooked))
+
+
+def test_a_line_longer_than_the_control_reads_is_refused(linuxcnc, table2):
+    path = circle_toolpath(table2.tests["a"].circle, "run")
+    longest = max(map(len, linuxcnc.write(path).splitlines()))
+    kinds = [type("Short", (LinuxCNC,), {"longest_block": longest - less}) for less in (0, 1)]
+    assert kinds[0]().write(path) == linuxcnc.write(path)
+    with pytest.raises(CannotSayError, match=f"a line of more than {longest - 1} characters"):
+        kinds[1]().write(path)
 
 
 def test_a_stop_with_its_message_may_be_read_as_two_rows(tmp_path):

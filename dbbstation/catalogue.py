@@ -173,7 +173,6 @@ def looked_up(
     """Return the thing with this name.
 
     Args:
-        called: kind in words.
         how_to_add: what may be missing, without a full stop.
 
     Raises:

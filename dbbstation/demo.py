@@ -216,7 +216,6 @@ _PROGRAM = python_module("dbbstation")
 
 
 def _short(argument: str) -> str:
-    """Return the last part of a shipped path."""
     return argument.rpartition("/")[2] if argument.endswith(".yaml") else argument
 
 

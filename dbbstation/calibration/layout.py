@@ -54,7 +54,6 @@ class Layout:
     """Terms of a fit with priors.
 
     Attributes:
-        terms: in column order.
         known: priors about `nominal`, and scales.
         nominal: values of unseen columns, shape (k,): zero for amplitudes, usual for shapes such as time constants.
     """
@@ -156,7 +155,6 @@ _Stated: TypeAlias = "NDArray[np.float64] | ModelError | None"
 
 
 def _sets(sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> list[dict[str, _Stated]]:
-    """Return each source's sets in run order, with stated sizes, one run at a time to save memory."""
     found: list[dict[str, _Stated]] = [{} for _ in sources]
     driven = [observation.raw.motor_current_a is not None for observation in observations]
     for motion, has_currents in zip(Motions(observations), driven, strict=True):

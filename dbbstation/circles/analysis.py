@@ -52,7 +52,6 @@ class CircleAnalysis:
         closure: end less begin of the turn; None for too few samples.
         passes: None without overlap.
         feed_mm_min: by the overlap, with standard uncertainty; or None.
-        lost: missing samples.
         residual_um: from the least-squares circle, unfiltered, in time order, shape (n,).
     """
 

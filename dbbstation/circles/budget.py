@@ -66,8 +66,6 @@ class Budget:
 
     Attributes:
         u_um: standard uncertainty; None if a cause of unknown size counts.
-        terms_um: known standard uncertainties by cause.
-        missing: unstated causes.
         value_um: without noise's contribution.
     """
 
@@ -258,7 +256,6 @@ class _Draft:
 
 
 def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _Draft:
-    """Return terms of bar and ball height for in-plane or bar lengths."""
     draft = _Draft()
     for cause, size in ((BudgetTerm.BAR, known.u_bar_um), (BudgetTerm.TEMPERATURE, known.u_temperature_um)):
         if size is None:

@@ -161,7 +161,6 @@ def _filtered(form_um: NDArray[np.float64], chosen: Filter) -> NDArray[np.float6
 
 
 def _hysteresis(pair: PairAnalysis) -> Estimate:
-    """Return H by the paths' difference, a series with own form and noise."""
     paths = [path_of(one.raw) for one in (pair.one, pair.other)]
     theta_deg = np.sort(paths[0].theta_deg)
     radii = [np.interp(theta_deg, p.theta_deg, p.about_ball_mm, period=FULL_TURN_DEG) for p in paths]

@@ -70,7 +70,6 @@ class CirclePath:
     A raised bar's circle is horizontal with radius R cos e: bar lengths become distances from the ball's vertical.
 
     Attributes:
-        radius_mm: nominal, R cos e.
         theta_deg: about the ball, from +X towards +Y, shape (n,).
     """
 

@@ -68,7 +68,6 @@ class Symptom:
         place: end or axis; empty for both.
         value: None if undetermined.
         below: 95 % bound if not seen, else None.
-        seen: exceeds four times its uncertainty.
     """
 
     signature: Signature
@@ -168,7 +167,6 @@ def _turn(one: CircleAnalysis) -> _Turn:
 
 
 def _fits(turns: Sequence[_Turn], waves: Sequence[NDArray[np.float64]] = ()) -> list[_Fit]:
-    """Return fits by spike length, refined about the likeliest."""
     found = [_fitted(turns, spike_deg, waves) for spike_deg in SPIKES_DEG]
     for finer in FINER:
         middle = _best(found).spike_deg
@@ -228,7 +226,6 @@ def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
 
 
 def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
-    """Return white noise per sample of equal effect as the residual."""
     ends = np.cumsum([len(turn.theta_deg) for turn in turns])[:-1]
     found = misfit(
         np.split(fit.left_um, ends),

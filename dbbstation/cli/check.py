@@ -223,7 +223,6 @@ def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
 
 
 def _sound(results: Sequence[Checked], kind: str) -> list[Path]:
-    """Return files of a format without faults."""
     return [one.path for one in results if one.kind.partition("/")[0] == kind and not one.problems]
 
 

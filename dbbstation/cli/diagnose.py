@@ -132,7 +132,6 @@ def _print_curve(curve: Curve) -> None:
 
 
 def _print_gain(result: DiagnosisFigures) -> None:
-    """Print residual and prediction of held-out tests before and after."""
     residual, held_out = result.residual_rms_um, result.held_out_rms_um
     echo(f"\nresidual within mountings {residual.before:.2f} -> {residual.after:.2f} µm rms")
     normalised = result.held_out_normalised

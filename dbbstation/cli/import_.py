@@ -247,7 +247,6 @@ def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str
 
 
 def _unknown(told: SessionOptions) -> list[str]:
-    """Return unknown conditions, by command line or Enter."""
     has_bar = told.bar_file is not None or told.bar_length_mm is not None
     known = (told.ambient_temp_c is not None, bool(told.operator), bool(told.job), has_bar)
     return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]

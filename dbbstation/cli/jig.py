@@ -37,7 +37,6 @@ _COLUMN = click.option(
 
 
 def _as_written(function: Callable[..., None]) -> Callable[..., None]:
-    """Give a command `decimal`, `separator` and `encoding`."""
     for option in reversed(AS_WRITTEN):
         function = option(function)
     return function
@@ -237,7 +236,6 @@ def holders(
 
 
 def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
-    """Write a jig file with new values of its holders."""
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.jig import HolderSchema, checked_jig, jig_text, read_jig

@@ -130,7 +130,6 @@ def _print_first(result: MismatchResult) -> None:
 
 
 def _print_whether(result: MismatchResult) -> None:
-    """Print existence, size, noise and leading variable of a mismatch."""
     unit, noise, rms = result.unit, result.noise, result.residual_rms
     offset = result.offset
     if offset and offset.significant:

@@ -154,7 +154,6 @@ def _print(found: Settings) -> None:
 
 
 def _template() -> str:
-    """Return the format's example with every value commented out."""
     from dbbstation.files.formats.settings_schema import SettingsFile
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.files.yaml.schema import format_of

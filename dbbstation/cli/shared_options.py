@@ -19,8 +19,6 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
 def _as_options(declared: Callable[..., None]) -> Callable[[_Function], _Function]:
-    """Return a decorator that gives a command these parameters as options."""
-
     def give(function: _Function) -> _Function:
         for one in reversed(options_of(declared).values()):
             function = click.option(cls=lambda _names, one=one: _checked(one))(function)  # type: ignore[arg-type]

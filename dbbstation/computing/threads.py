@@ -76,7 +76,6 @@ def _set(library: LibController, count: int) -> None:
 
 @cache
 def _libraries() -> list[LibController]:
-    """Return the BLAS libraries of this process: those of NumPy and SciPy."""
     import numpy as np  # noqa: F401, PLC0415 - loaded here, so that both are found
     import scipy.linalg  # noqa: F401, PLC0415
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - whoever only asks for help does not wait for it

@@ -59,8 +59,6 @@ class Component:
 
     Attributes:
         mathematics: its part without LinuxCNC, for a compiler alone.
-        parts: sources inside, by name.
-        left_out: sources left out, by name.
     """
 
     name: str

@@ -100,11 +100,7 @@ class LeftOfModel:
 
 @dataclass(frozen=True)
 class SourceLeft:
-    """Errors of the tool by one source alone, without and with parameters and tables [µm rms].
-
-    Attributes:
-        in_table: whether tables hold it.
-    """
+    """Errors of the tool by one source alone, without and with parameters and tables [µm rms]."""
 
     name: str
     rms_um: float

@@ -60,8 +60,6 @@ class CircleChannel:
     """All that a diagnosis compares.
 
     Attributes:
-        calibration: base fit with thinned runs.
-        readings: predicted by the base fit.
         set_up: balls and bars far off, a variant each.
         sources: candidates, laws of one cause under one name; runs must give their needs.
     """

@@ -126,7 +126,6 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
 
 
 def _cancelling(explained: Explained) -> Cancelling | None:
-    """Return named causes whose effects cancel."""
     settled, samples = explained.settled, explained.channel.columns.samples
     values = settled.comparison.estimates(settled.best.members).values if settled.best.members else np.zeros(0)
     effects = {}

@@ -63,14 +63,11 @@ class CauseEffect:
 
     Attributes:
         cause: source, or `geometry` for all kinematic parameters.
-        sources: removed with it.
         verdict: empty for geometry or without diagnosis.
-        g_um: mean, of the cause alone.
         g_u_um: standard uncertainty; None if unknown.
         centre_u_um: standard uncertainty; None if unknown.
         workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
         workspace_u_um: standard uncertainty; None if unknown.
-        measured_g_um: mean circular deviation.
     """
 
     cause: str
@@ -259,7 +256,6 @@ def _u_of_mean_g(
     spread: Sequence[NDArray[np.float64] | None],
     circles: Sequence[CuredCircle],
 ) -> float | None:
-    """Return the mean circular deviation's standard uncertainty by directions."""
     changes = []
     for observation, effect, answers, circle in zip(observations, effects, spread, circles, strict=True):
         if answers is None:
@@ -275,7 +271,6 @@ def _u_of_centres(
     spread: Sequence[NDArray[np.float64] | None],
     centres: Sequence[NDArray[np.float64]],
 ) -> float | None:
-    """Return the mean shift's standard uncertainty by first harmonics."""
     changes = []
     for observation, effect, answers, centre in zip(observations, effects, spread, centres, strict=True):
         if answers is None:

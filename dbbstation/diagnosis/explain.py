@@ -100,7 +100,6 @@ def _with_set_up(
     outliers: tuple[Outlier, ...],
     settle: Callable[[Calibration], tuple[CircleChannel, SettledCircles]],
 ) -> Explained:
-    """Compare, free certain set-up faults one by one, and compare again."""
     while True:
         channel, settled = settle(before)
         explained = Explained(before, outliers, channel, misfit_of(before, settled.noise), settled)
@@ -157,7 +156,6 @@ class _Settling:
         return replace(_fitted_as_named(self._channel, settled), stopped=stopped)
 
     def _compared(self) -> SettledCircles:
-        """Compare sets about the last fit."""
         channel, unmodelled = self._channel, self._unmodelled
         channel.give_back()
         target = channel.target(self._fit)
@@ -220,7 +218,6 @@ class _Settling:
 
 
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
-    """Return named members with their best replacements."""
     best, named = settled.best, [cause for cause in settled.causes if cause.named]
     pairs = [(member, member) for member in settled.members]
     return pairs + [
@@ -257,7 +254,6 @@ def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
 
 
 def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
-    """Return significantly negative causes of a joint fit, with reasons."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     found = {}
     for term in fit.layout.terms:
@@ -316,7 +312,6 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
 
 
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
-    """Return the best hypothesis, or an equal one already fitted."""
     top = posterior.best.log_posterior
     for hypothesis in posterior.hypotheses:
         if hypothesis.log_posterior < top - AS_PROBABLE:
@@ -387,7 +382,6 @@ def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _refine(channel: CircleChannel, fit: Calibration, named: Collection[tuple[str, str]]) -> None:
-    """Lay out named causes by law at fitted values."""
     for name, law in sorted(named):
         channel.refine(name, law, _values_in(fit, name), fit)
 

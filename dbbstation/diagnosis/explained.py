@@ -31,9 +31,7 @@ class SettledCircles:
     Attributes:
         after: joint fit of base and named causes.
         posterior: about that fit.
-        unmodelled: unnamed members.
         noise: beside all causes.
-        refused: impossible causes with reasons.
         scatter: of balls in stated sizes.
         stopped: interrupted.
     """

@@ -44,11 +44,7 @@ class SourceFinding:
 
     Attributes:
         verdict: see docs/verdicts.md.
-        ambiguous_with: causes of about equal explanation.
         concealed: share of squares absorbed by machine parameters.
-        signature_rms_um: its effect on readings.
-        unconcealed_rms_um: part beyond kinematic parameters.
-        gain: log Bayes factor.
         stability: selection frequency over seven tenths of tests; None if not tried.
         probability: given the catalogue; of its class if any.
         equivalent: with itself; `class` in JSON.
@@ -126,7 +122,6 @@ class Curve:
         period: of a wave, in the variable's unit; else None.
         direction: of strongest motion, 3 to 6 numbers by `convention`; empty for a scalar.
         convention: removed part that fitted parameters can make.
-        readings_um: rms effect on readings.
         unconcealed_um: beyond fitted machine parameters.
         points: rising; straight or a wave between.
     """
@@ -157,11 +152,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """The unmodelled residual.
-
-    Attributes:
-        rms_um: beyond noise, low harmonics.
-    """
+    """The unmodelled residual."""
 
     rms_um: float
     strut: int | None
@@ -183,7 +174,6 @@ class Shift:
 
     Attributes:
         before_um: without found sources.
-        shift_um: before less after.
     """
 
     parameter: str
@@ -222,17 +212,13 @@ class Diagnosis:
     """Everything found.
 
     Attributes:
-        mismatch: beyond noise.
-        left: of the joint model.
         before: base fit.
         held_out: prediction errors before and after [mm].
         chosen_anew: without each group; None without causes or for few tests.
         levels: existence, variables and cause of a difference [µm].
         workspace: the calibration's error away from the tests; None without findings.
-        locations: largest share first.
         second_start_agrees: None if interrupted.
         cancelling: [mm], or None.
-        limits: of search, parameters, joint fit.
     """
 
     mismatch: bool

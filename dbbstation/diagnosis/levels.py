@@ -84,7 +84,6 @@ def outcome_of(explained: Explained) -> Settled:
 
 
 def _law(explained: Explained, cause: Cause) -> Law:
-    """Return a cause with its variables and existing columns."""
     settled, circles, variant = explained.settled, explained.channel, cause.variants[0]
     member = next((m for m in settled.best.members if m.cause.name == cause.name), None)
     variant = variant if member is None else member.variant

@@ -28,8 +28,6 @@ class Trace:
 
     Attributes:
         theta_deg: from +X towards +Y.
-        before_um: by the base.
-        after_um: by the joint model.
     """
 
     direction: Direction

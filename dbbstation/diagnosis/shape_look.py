@@ -99,7 +99,6 @@ class TemplateScan:
 
     Args:
         jacobian: shape (n, k) each, used once.
-        held: at nominal.
     """
 
     def __init__(
@@ -333,7 +332,6 @@ def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArr
 def _waves_of_time(
     strut: int | None, moves: str, sums: DirectionalSums, low: float, width: float, extent: float
 ) -> list[Shape]:
-    """Return waves over time by Fourier transform."""
     place = np.floor((sums.at - low) / width).astype(np.int64)
     size = next_fast_len(2 * (int(place.max()) + 1), real=True)
     first, last = max(1, int(np.floor(0.5 * size * width / extent))), size // 4

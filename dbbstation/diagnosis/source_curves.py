@@ -61,7 +61,6 @@ class Branch:
         model_um: mean error by the source.
         before_um: strut error that explains the base residual; NaN if hardly measured.
         after_um: the model's plus the joint residual's; NaN if hardly measured.
-        sigma_um: by noise beside fitted parameters.
     """
 
     sense: str

@@ -192,7 +192,6 @@ def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float
 def _over(
     runs: Sequence[Samples], shape: Shape, line: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
-    """Return points, the matrix from amplitudes of one direction, and their axis."""
     form = shape.form
     if isinstance(form, Plane | PlaneStep):
         flat = form.across if isinstance(form, PlaneStep) else line[: form.coordinates]
@@ -216,7 +215,6 @@ def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> 
 
 
 def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
-    """Return the variable's values in a run."""
     return shape.followed(run.values[shape.variable])
 
 

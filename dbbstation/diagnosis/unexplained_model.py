@@ -41,7 +41,6 @@ class JointFitWithCurve:
     """A joint fit of names and the nameless curve.
 
     Attributes:
-        fit: on the curve's struts only.
         to_all: from fitted to all parameters, shape (p, f).
     """
 

@@ -194,7 +194,6 @@ class _CircleJudge(CauseJudge):
         }
 
     def _fitted(self, name: str) -> dict[str, Value]:
-        """Return a cause's values in the joint fit, with its formula's inaccuracy in their uncertainty."""
         after = self._joint.after
         variance = uncertainties(after, unseen(after)) ** 2 + after.layout.formula_variance(after.x)
         values: dict[str, Value] = {}

@@ -37,7 +37,6 @@ class HeldTolerance:
     Attributes:
         conformity: `exceeded` if one circle exceeds it, else `cannot tell` if one is within U; None without circles.
         within: whether no circle exceeds it or is undecided.
-        undecided: number of circles within U.
         worst: circle with the largest figure, or None.
     """
 

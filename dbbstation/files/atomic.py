@@ -176,7 +176,6 @@ def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
 
 
 def _refuse_input(path: Path) -> None:
-    """Refuse to overwrite an input of this command."""
     if was_read(path):
         what = "this file was read just now: the result would take its place"
         raise OutputError(what, where=str(path), remedy="name another file")

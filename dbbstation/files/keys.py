@@ -23,7 +23,6 @@ def key_of(request: Mapping[str, Any], inputs: Iterable[tuple[str, str]] = ()) -
     """Return a SHA-256 over request, inputs and program.
 
     Args:
-        request: task and options.
         inputs: name and SHA-256 of each file, in any order.
     """
     what = {"request": request, "inputs": sorted(inputs), "program": program_identity()}

@@ -47,7 +47,6 @@ class SessionFigures:
     Attributes:
         name: folder relative to the history's.
         machine: serial number, or the name in its file.
-        runs: accepted, with a circle.
         programs: hash over NC programs run instead of the plan's circles, or empty.
         anchor: link of the log's last event, else end of the chain of runs; empty without a seal.
     """

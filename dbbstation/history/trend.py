@@ -98,7 +98,6 @@ class MachineHistory:
     """Sessions and trends of one machine.
 
     Attributes:
-        machine: serial number or name.
         sessions: in time order.
         chart: limits for each quantity; None without any.
         expected: false alarms expected over this history.
@@ -219,7 +218,6 @@ def _parameter_series(sessions: Sequence[SessionFigures], models: Mapping[str, M
 
 
 def _labels(subjects: Sequence[Subject]) -> dict[Subject, str]:
-    """Return distinct names, with circle or sources only if needed."""
     short = {s: f"{s.of} {s.figure}" if s.is_parameter else f"{s.figure} {s.test} {s.direction}" for s in subjects}
     count = Counter(short.values())
     return {s: name if count[name] == 1 else f"{name} ({_apart(s)})" for s, name in short.items()}

@@ -53,7 +53,6 @@ class Watched:
     """One quantity over all sessions; arrays have shape (n,).
 
     Attributes:
-        events: in time order.
         z: standard normal without change; NaN if not compared.
         high: CUSUM upwards, NaN as above.
         level: from a change to the next, by each stretch's latest value.
@@ -199,7 +198,6 @@ def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[T
 def _change(
     since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]
 ) -> TrendEvent:
-    """Return a change with all its values."""
     before, these = at[at < since], slice(since, found + 1)
     level, u_level = _mean(values[before], u[before])
     after, u_after = _mean(values[these], u[these])

@@ -128,7 +128,6 @@ class _Border:
     Attributes:
         order: shape (m + f,).
         place: of each column, shape (k,); -1 for others.
-        alone: untouched random effects.
     """
 
     order: NDArray[np.int64]
@@ -219,7 +218,6 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
 def _tied(
     blocks: Sequence[Block], which: NDArray[np.int64], touched: NDArray[np.int64], own: NDArray[np.bool_]
 ) -> list[tuple[list[int], NDArray[np.int64]]]:
-    """Return blocks tied by shared random effects."""
     number, total = len(blocks), len(own)
     touches = own[touched]
     edges = (np.ones(int(touches.sum())), (which[touches], number + touched[touches]))

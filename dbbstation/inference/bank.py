@@ -76,7 +76,6 @@ class Bank:
         spread: relative noise of each kept row, shape (m,).
         tails: Student's t degrees of innovations; infinite if Gaussian.
         measures_beside_members: `measure` uses the hypothesis's residual, not everything's.
-        long_tails: innovations may follow Student's t.
         grows_with: variable of the variance; may be empty.
         nameless: causes that do not count as the name of an effect.
     """
@@ -192,7 +191,6 @@ class Bank:
 
         Args:
             members: None: all laws and patterns; picked ones only if worth their odds, since chance peaks absorb noise.
-            white: assume white noise.
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches

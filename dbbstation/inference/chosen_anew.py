@@ -92,7 +92,6 @@ def chosen_anew(
     """Choose anew without each part, and predict it.
 
     Args:
-        of_all: causes over all rows.
         choose: most probable members, starting from all rows' choice.
         kind_of: from a cause to its kind.
         classes: effects of a class are left out together.

@@ -90,7 +90,6 @@ class Coloured:
         Args:
             share: of the process in the variance, 0 to 1.
             decay: correlation of neighbours, or of the envelope.
-            turn_rad: oscillation phase per row.
         """
         lags = np.arange(LONGEST + 1)
         correlation = np.where(lags == 0, 1.0, share * decay**lags * np.cos(turn_rad * lags))

@@ -150,11 +150,7 @@ class VariableProbabilities:
 
 @dataclass(frozen=True)
 class VariableClass:
-    """Variables of the same members.
-
-    Attributes:
-        others: indistinguishable variables.
-    """
+    """Variables of the same members."""
 
     each: tuple[tuple[str, ...], ...]
     others: tuple[str, ...]

@@ -40,10 +40,8 @@ class Misfit:
     """The residual beyond noise.
 
     Attributes:
-        probability: that noise alone gives this.
         noise: white noise per sample of equal low-harmonic power.
         rms: beyond noise in low harmonics, at least zero.
-        ratio: low-harmonic power over noise's.
     """
 
     probability: float
@@ -104,7 +102,6 @@ def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
 def _sums(
     values: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
 ) -> list[NDArray[np.complex128]]:
-    """Return sums of values times exp(i k phase), k to `highest`, without a basis."""
     total = np.zeros((len(values), highest // AT_ONCE + 1, min(AT_ONCE, highest + 1)), dtype=np.complex128)
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
@@ -114,7 +111,6 @@ def _sums(
 
 
 def _stretches(samples: int) -> Iterator[slice]:
-    """Yield cache-sized stretches of samples, twice as fast."""
     for start in range(0, samples, STRETCH):
         yield slice(start, start + STRETCH)
 

@@ -81,7 +81,6 @@ def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[
 
 
 def _left(blocks: Sequence[Block], known: Columns, x: NDArray[np.float64], noise: float) -> float:
-    """Return blocks' remaining squares with settled random effects."""
     random = np.flatnonzero(known.random)
     whole, target = np.hsplit(spread(blocks, len(known.prior)), [-1])
     fixed = x.copy()

@@ -79,7 +79,6 @@ class Hypothesis:
 
     Attributes:
         members: with best variants and sizes.
-        log_posterior: over the base.
         log_factors: Bayes factor of each member beside others, averaged.
     """
 
@@ -111,7 +110,6 @@ class Posterior:
     """Probabilities over sets of causes.
 
     Attributes:
-        hypotheses: examined, most probable first.
         weights: log posterior of every relevant scored set.
         at_limit: a larger set would be better; common members stay certain.
     """
@@ -221,7 +219,6 @@ class _Search:
             self._challenge(best)
 
     def _expand(self, hypothesis: Hypothesis) -> None:
-        """Examine neighbours: addition, removal, exchange."""
         around = self._around(hypothesis)
         self._try_more(hypothesis.members, hypothesis.log_posterior, around.without(())[0])
         for member, factor in zip(hypothesis.members, hypothesis.log_factors, strict=True):
@@ -277,7 +274,6 @@ class _Search:
         self._room = max(MOST_SCORES, 2 * len(self._scored))
 
     def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
-        """Examine the best pairs, which may show only together."""
         hidden = {
             c.name for c, factor in zip(scan.causes, scan.log_factor, strict=True) if factor + c.log_prior_odds <= 0.0
         }

@@ -36,7 +36,6 @@ class ResidualTest:
 
     Attributes:
         name: `sum of squares`, `wave in time`, `runs of sign`, `blocks`, or a variable.
-        probability: by noise.
         rms: beyond noise, in the residual's unit.
     """
 
@@ -48,11 +47,7 @@ class ResidualTest:
 
 @dataclass(frozen=True)
 class LeftOver:
-    """Whether something is left beyond noise.
-
-    Attributes:
-        probability: by noise in any test.
-    """
+    """Whether something is left beyond noise."""
 
     is_noise: bool
     probability: float
@@ -123,7 +118,6 @@ def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) 
 
 
 def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> ResidualTest:
-    """Return means over equal pieces of a variable."""
     values = variable.values
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))

@@ -53,9 +53,7 @@ class Detectable:
     """Smallest detectable effect.
 
     Attributes:
-        follows: variable or cause.
         size: rms found in nine of ten cases, in the residual's unit; None if absorbed at any size.
-        concealed: absorbed share of squares.
         confirm: what shows it; absent for variables.
     """
 
@@ -111,7 +109,6 @@ class LawForm:
     Attributes:
         name: None if open.
         not_worse: causes as good as it or the best, with equivalents.
-        scored: best first.
         together: laws each named in its own place, if a sum is best.
     """
 
@@ -135,7 +132,6 @@ class Followed:
         or_variables: indistinguishable ones.
         ways: probability by value, direction, lateness, time.
         rms: fitted sum, in the residual's unit.
-        members: of the most probable set.
         before: held-out error without them; None if not tested.
         gain: held-out log density, with minus without; None if not tested.
         consequence: the variable results from the simulation, as stated, and is no cause.

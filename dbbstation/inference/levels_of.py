@@ -169,7 +169,6 @@ def _followed(
 
 
 def _found_anew(settled: Settled, one: VariableClass, held_out: HeldOutError | ChosenAnew) -> list[str]:
-    """Return members whose kind gains in held-out parts when chosen without each."""
     return [name for name in one.members if held_out.gains_of({settled.bank.kind_of(name)}).predicts]
 
 

@@ -12,7 +12,6 @@ class LimitReached:
     Attributes:
         what: `search`, `parameter`, `fit` or `stopped`.
         name: source and parameter, such as `play shaking_n`; may be empty.
-        text: one or two sentences.
     """
 
     what: str

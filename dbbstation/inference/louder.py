@@ -22,11 +22,7 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class Louder:
-    """Mean squares in some stretches against those elsewhere.
-
-    Attributes:
-        probability: for random stretches.
-    """
+    """Mean squares in some stretches against those elsewhere."""
 
     probability: float
     rms: float

@@ -82,7 +82,6 @@ class Cause:
     Attributes:
         variants: weights sum to one.
         named: physical; else unmodelled or a set-up fault.
-        setup: a set-up fault.
     """
 
     name: str
@@ -98,7 +97,6 @@ class Member:
 
     Attributes:
         scale: prior standard deviation in plausible amplitudes.
-        slack_share: of the stated slack.
     """
 
     cause: Cause
@@ -448,7 +446,6 @@ class ModelComparison:
 
 
 def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray[np.float64]]) -> Scan:
-    """Scan all forms at all sizes."""
     factors = np.empty((len(forms.weights), len(SCALES)))
     for (numbers, own, plausible, _), products in zip(forms.groups, left, strict=True):
         seen, axes = np.linalg.eigh(plausible[:, :, None] * products * plausible[:, None, :])

@@ -87,7 +87,6 @@ class Pattern:
     """One effect without physics.
 
     Attributes:
-        variables: none for blocks.
         samples: of amplitudes, all rows, shape (n, p), at most about one.
         form: over the first variable or row number; None for a product.
         units: of amplitudes, shape (p,); empty: the channel's.
@@ -201,7 +200,6 @@ def _over(variable: Variable) -> list[Pattern]:
 
 
 def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
-    """Return patterns odd in direction of travel."""
     sign = variable.directions(blocks)
     if not (sign > 0.0).any() or not (sign < 0.0).any():
         return []
@@ -213,7 +211,6 @@ def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
 
 
 def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: NDArray[np.float64]) -> Pattern:
-    """Return hysteresis, immediate or over a way as play."""
     widths = [share * variable.extent for share in TRANSITS]
     # A row at which it turns may belong to either way: as it came there, or as it goes on.
     arriving = variable.arriving(blocks)

@@ -135,11 +135,7 @@ class Fitting:
 
 
 class LeftBesideOthers:
-    """A fit's residual beside columns but one; repeated parts are cached.
-
-    Args:
-        fitting: of everything else.
-    """
+    """A fit's residual beside columns but one; repeated parts are cached."""
 
     def __init__(
         self,

@@ -284,7 +284,6 @@ class CauseJudge:
         return Verdict.AMBIGUOUS, others, text
 
     def _instead_of(self, name: str) -> frozenset[str]:
-        """Return members that a named law replaces."""
         return frozenset() if self._levels is None or name in self._members else self._levels.instead_of(name)
 
     def _alike(self, name: str) -> str:
@@ -303,7 +302,6 @@ class CauseJudge:
         return Verdict.IDENTIFIED, (), ""
 
     def _equal(self, name: str) -> tuple[str, ...]:
-        """Return a cause and its equivalents."""
         return (self._levels is not None and self._levels.equivalent(name)) or self._classes.get(name, (name,))
 
     def _impossible_in_place(self, cause: Cause) -> str:

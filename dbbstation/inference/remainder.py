@@ -27,7 +27,6 @@ class Largest:
     """The largest of many features.
 
     Attributes:
-        probability: by noise among all.
         place: harmonic, or run from 0.
         rms: beyond noise, in the channel's unit.
     """
@@ -111,7 +110,6 @@ def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int,
 def _stretches(
     residual: NDArray[np.float64], phase_rad: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-    """Return means and counts of narrow stretches, and the worst."""
     place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * PULSES).astype(np.int64) % PULSES
     counts = np.bincount(place, minlength=PULSES)
     means = np.bincount(place, residual, minlength=PULSES) / np.maximum(counts, 1)

@@ -95,7 +95,6 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
 
 
 def _in_time(left: Left, channel: Channel, size: float) -> list[Pattern]:
-    """Return outstanding stretches in time, also odd in direction."""
     by = None
     if channel.time is not None and channel.direction is not None:
         by = (Variable("time", channel.time_unit, Kind.TIME, channel.time), channel.direction)

@@ -67,7 +67,6 @@ def settle(
     Args:
         look: search waves, bumps, steps and pulses.
         static: include patterns that need no search.
-        most_expanded: hypotheses expanded per search.
         most_looks: successive searches of the residual.
         in_time: search steps and pulses in time; False if blocks have own curves.
         thorough: several starts and a final look; False: one fast search.
@@ -128,7 +127,6 @@ def _from(
     progress: Callable[[str], None],
     known: Sequence[Settled],
 ) -> Settled:
-    """Return the outcome of one start, or a known one if met."""
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
     settled = _settled(bank, options, progress, members, refused, known)
     if any(settled is one for one in known):
@@ -137,12 +135,10 @@ def _from(
 
 
 def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
-    """Return another start's outcome if met."""
     return next((one for one in known if _meets(settled, one)), settled)
 
 
 def _meets(one: Settled, other: Settled) -> bool:
-    """Return whether two comparisons have equal causes and noise."""
     kinds = [sorted(each.bank.kind_of(name) for name in each.best.names) for each in (one, other)]
     if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
         return False
@@ -182,7 +178,6 @@ def _settled(
     impossible: Mapping[str, str] | None = None,
     known: Sequence[Settled] = (),
 ) -> Settled:
-    """Look, compare and refine until stable."""
     channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
@@ -264,7 +259,6 @@ def _looked(
     *,
     in_time: bool = True,
 ) -> tuple[Member, ...]:
-    """Look repeatedly, adding worthy patterns."""
     before = log_probability(bank, members)
     for number in range(most_looks):
         known = set(bank.patterns)
@@ -355,7 +349,6 @@ def _grown_in(bank: Bank) -> tuple[Member, ...]:
 
 
 def _laws_of(settled: Settled) -> list[Member]:
-    """Return the best hypothesis's laws and best replacements."""
     best, laws = settled.best, settled.bank.laws
     found = [m for m in best.members if m.cause.name in laws]
     rivals = [cause for cause in settled.causes if cause.name in laws]

@@ -41,9 +41,7 @@ class Settled:
     """The outcome of a comparison.
 
     Attributes:
-        refused: impossible laws with reasons.
         log_probability: of noise and best hypothesis, up to a constant.
-        others: most probable first.
         stopped: the search reached its limit of work; the best so far is returned.
     """
 

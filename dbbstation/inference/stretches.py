@@ -143,7 +143,6 @@ def _pattern(
     factor: NDArray[np.float64],
     tried: float,
 ) -> Pattern:
-    """Return stretches of one kind: one, two and more, best first."""
     form = Stretches(tuple(a for a, _ in found), tuple(b for _, b in found), clock.response)
     width = len(found)
     # A pattern of k stretches is one of tried**k / k! [k places, in whatever order].
@@ -258,7 +257,6 @@ class _Look:
         return self._worth(self._total[others] - self._total[edge], own)
 
     def _worth(self, along: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return log Bayes factors less the cost of the choice."""
         information = np.maximum(own, 0.0) + 1.0 / self._size**2
         occam = 0.5 * np.log(information * self._size**2)
         return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
@@ -294,7 +292,6 @@ class _Look:
         return begins, ends
 
     def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the best edges, central among equals."""
         # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once, where it is not zero.
         rings, reach = self._left.coloured.order, self._clock.reach
         moving = begins if begins[0] < begins[-1] else ends

@@ -128,7 +128,6 @@ def _central(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _signs(
     variable: Variable, blocks: Sequence[slice], change_of: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Return signs by row, kept while constant."""
     found = np.zeros(len(variable.values))
     for rows in blocks:
         change = change_of(variable.travel(rows))

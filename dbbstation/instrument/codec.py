@@ -29,7 +29,6 @@ class Garbage:
     Attributes:
         why: fault, or empty if they do not fit the grammar.
         joining: rest of a frame from before listening, which is no fault.
-        reason: one word for counting.
     """
 
     raw: bytes
@@ -185,7 +184,6 @@ class Decoder:
         return heard
 
     def _next_head(self, after: int, end: int) -> int:
-        """Return the next possible begin of a frame, at most `end`."""
         if not all(self._heads):
             return after
         places = [self._pending.find(head, after, end + len(head) - 1) for head in self._heads]

@@ -73,7 +73,6 @@ class Piece:
     """A reading without time and losses, with its bytes.
 
     Attributes:
-        after: later bytes of its chunk.
         written: its number; None without decimal digits.
     """
 

@@ -42,7 +42,6 @@ class Instrument:
     """A length instrument on a serial line; a `with` block starts and closes it.
 
     Args:
-        baud: if not the usual rate.
         clock: monotonic, for readings [s]; scaled for virtual instruments, while patience is in real seconds.
         log: log of all bytes; the caller closes it.
         timeout_s: real seconds until a silent line is an error; None: the protocol's.
@@ -199,7 +198,6 @@ class Instrument:
         return open_link(port, protocol.line, baud=self._baud, log=self._log, text=protocol.is_text)
 
     def _begin(self, link: Link) -> bytes:
-        """Send the start sequence and return bytes behind its last answer."""
         after = b""
         for step in self.protocol.ask.start:
             after = _command(link, step, self._timeout_s)
@@ -277,7 +275,6 @@ class Instrument:
 
 
 def _command(link: Link, step: LineCommand, patience_s: float) -> bytes:
-    """Send a command, wait for its answer and return bytes behind it."""
     link.write(step.send)
     came = b""
     deadline_s = time.monotonic() + patience_s

@@ -33,11 +33,7 @@ counter is out of order."""
 
 
 class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: most garbled bytes end here)
-    """Bytes that contradict the grammar.
-
-    Args:
-        reason: one word for counting.
-    """
+    """Bytes that contradict the grammar."""
 
     def __init__(self, what: str, reason: Reason = "bytes") -> None:
         self.reason: Reason = reason
@@ -74,7 +70,6 @@ class FrameParts:
         sign: 1 or -1.
         unit: None: the protocol's.
         status, said, remedy: the worst status that a part reported.
-        text: the device's words.
         digits: before and behind the point of the length; None if not decimal.
     """
 

@@ -115,7 +115,6 @@ def read_protocol(path: Path, profile: str | None = None) -> Protocol:
 
 
 def _read(path: Path) -> dict[str, Protocol]:
-    """Return every checked variant by profile, the usual one first."""
     faults: list[Problem] = []
     document = load_yaml(path, faults)
     file = validate(document, ProtocolFile, faults) if document is not None else None

@@ -204,7 +204,6 @@ def _is_pseudo_terminal(port: str) -> bool:
 
 
 def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
-    """Return the error in words, from `errno` or pyserial."""
     number = getattr(error, "errno", None)
     words = str(error).lower()
     if "://" in port:

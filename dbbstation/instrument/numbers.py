@@ -27,7 +27,6 @@ class Number(Schema):
     Attributes:
         modulus: of a counter.
         scale: of one on the wire, in the length's unit; 0.0001 for four implicit decimals.
-        specials: contents that are no number.
     """
 
     of: Literal["length", "counter"] = "length"

@@ -109,7 +109,6 @@ def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protoco
 
 
 def _merged(document: YamlDocument, name: str) -> YamlDocument:
-    """Return the document with a profile's keys in place, without profiles."""
     data = {key: value for key, value in document.data.items() if key != "profiles"}
     values, keys = dict(document.value_places), dict(document.key_places)
     if name:

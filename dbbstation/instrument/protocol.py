@@ -221,7 +221,6 @@ class Protocol(Schema):
         name: what it is called on the command line; the file's name without `.yaml`.
         profile: which variant of the device this is; empty where the file has no variants.
         setup: what the operator sets on the device.
-        references: manual pages.
         features: what the virtual instrument has switched on, of the features that optional parts name.
     """
 

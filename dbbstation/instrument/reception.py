@@ -26,9 +26,7 @@ class Tally:
     """Counts since `start`.
 
     Attributes:
-        lost: missing or rejected samples.
         rejected: frames and stretches of bytes, by reason.
-        reconnected: reopenings of the line.
     """
 
     readings: int = 0
@@ -52,7 +50,6 @@ class Reception:
     """A line being read.
 
     Attributes:
-        where: port.
         clock: of readings [s].
         timeout_s: patience with a silent line, in real seconds.
         memory_s: how long a stream's quickest arrival counts, by the clock.

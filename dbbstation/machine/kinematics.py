@@ -170,7 +170,6 @@ def bar_sensitivity(
     -u R dP.
 
     Args:
-        hexapod: actual.
         tool_ball_mm: platform frame, shape (3,) or (n, 3); default: the tool tip.
 
     Raises:

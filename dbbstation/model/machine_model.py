@@ -40,7 +40,6 @@ class MachineModel:
     """Nominal geometry plus error sources.
 
     Attributes:
-        machine: as the controller believes.
         sources: of every owner; each acts on motions of its set.
     """
 

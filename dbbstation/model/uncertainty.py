@@ -136,8 +136,6 @@ class PoseErrors:
     """Position errors of predicted poses, with their uncertainty.
 
     Attributes:
-        greatest_error_um: from the commanded position.
-        error_rms_um: of distances.
         common_shift_um: mean error, X, Y, Z.
         error_about_mean_rms_um: without common shift.
         greatest_uncertainty_um: standard, over all axes; None if unknown.

@@ -89,7 +89,6 @@ def _check_near(
     circle: Circle,
     phi_deg: NDArray[np.float64],
 ) -> None:
-    """Refuse the program of another test or direction."""
     off = poses - circle.poses(circle.theta_deg(phi_deg))
     off_mm = np.linalg.norm(off[:, :3], axis=1)
     off_deg = np.abs(off[:, 3:]).max(axis=1)

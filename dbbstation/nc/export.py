@@ -72,7 +72,6 @@ class Program:
         why_unknown: empty if known.
         tilt_left_um: tilt correction left out, 100 mm from the tip; None in a nominal program.
         feed_s: computed time at feed; None in a nominal program, or for an unknown look-ahead.
-        remarks: unmet requests, in words.
     """
 
     name: str

@@ -33,7 +33,6 @@ def longest(
 
 @compiled
 def _distance_mm(way: NDArray[np.float64], curve: NDArray[np.float64], start: int, end: int) -> float:
-    """Return the greatest distance of intermediate places from the straight piece."""
     worst = 0.0
     length = way[end] - way[start]
     for k in range(start + 1, end):

@@ -96,7 +96,6 @@ class Toolpath:
         in_machine: moves in machine coordinates (G53), shape (n,).
         holds: offsets and tool lengths for which the poses are valid, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape
             (6,); a control may check them before it moves. None: not stated.
-            that can checks them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those written together, from 1.

@@ -88,7 +88,6 @@ def _faults_of_mark(dialect: Dialect) -> list[str]:
 
 
 def _curve(path: ToolpathBuilder) -> None:
-    """Return forty moves of all axes, enough for a mark."""
     turns = np.linspace(0.0, 6.0, 41)[:, None] + np.arange(3.0)
     poses = FIRST + np.hstack([20.0 * np.sin(turns), 3.0 * np.cos(turns)])
     path.rapid(poses[0])
@@ -219,7 +218,6 @@ def _with_messages(path: Toolpath) -> dict[int, str | None]:
 
 
 def _rows(path: Toolpath) -> Iterator[_Row]:
-    """Return rows that act on a machine, with modal changes."""
     feeds, corner, texts = path.feed, np.nan, _with_messages(path)
     for row, kind in enumerate(path.kind.tolist()):
         text = texts.get(row, "")

@@ -32,7 +32,6 @@ class Bar:
     """The bar; recorded readings are never changed.
 
     Attributes:
-        calibrated_length_mm: between ball centres.
         expansion_um_m_k: [µm/(m K)]; None if not noted.
         stroke_mm: of its gauge, either way; None if not noted.
         temp_uncertainty_k: standard, of a bar temperature; None if not noted.

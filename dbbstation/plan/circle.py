@@ -41,9 +41,7 @@ class Circle:
         centre_mm: as programmed, machine frame (x, y, z).
         bar_mm: nominal ball distance R.
         tilt_deg: constant (A, B, C).
-        feed_mm_min: along the path.
         start_deg: of the full turn, from +X towards +Y.
-        overshoot_deg: before and after the turn.
         feed_in_mm: begin outside the circle, along the bar.
     """
 
@@ -82,11 +80,7 @@ class Circle:
         return np.mod(self.direction.sign * (theta_deg - self.start_deg), FULL_TURN_DEG)
 
     def poses(self, theta_deg: NDArray[np.float64], outside_mm: float = 0.0) -> NDArray[np.float64]:
-        """Return commanded poses at angles, shape (n, 6) [mm, deg].
-
-        Args:
-            outside_mm: along the bar.
-        """
+        """Return commanded poses at angles, shape (n, 6) [mm, deg]."""
         theta, elevation = np.radians(theta_deg), np.radians(self.elevation_deg)
         radius = self.radius_mm + outside_mm * np.cos(elevation)
         x, y, z = self.centre_mm

@@ -79,7 +79,6 @@ class Plan:
 
     Attributes:
         repeat_at_end: tests measured again, to separate drift and height.
-        largest_loss_percent: of a run's samples.
     """
 
     name: str

@@ -51,7 +51,6 @@ class HolderResult:
 
     Attributes:
         repeatability_um: standard deviation per axis, as in a jig file.
-        level: probability of the intervals.
         rms_distance_um: from the mean place; estimates sigma sqrt(number of axes).
         mean_distance_um: corrected for the estimated mean place.
         p_axes_alike: probability of so large a ratio of variances for equal axes.

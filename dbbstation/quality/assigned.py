@@ -130,7 +130,6 @@ class Assigned:
 
     @property
     def _cost(self) -> float:
-        """Return the cost of one mistake."""
         return MISTAKE + float(np.log(len(self.circles)))
 
     @cached_property

@@ -188,7 +188,6 @@ class SessionRuns:
         )
 
     def _opposite(self, one: Seen) -> Seen | None:
-        """Return the other direction, preferably of the same mounting, then of the same repeat."""
         found = [
             other
             for other in self._of_test.get(one.run.test, ())

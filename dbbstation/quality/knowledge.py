@@ -114,7 +114,6 @@ class Run:
 
     Attributes:
         mounting: its runs share the ball's place.
-        largest_loss_percent: of samples.
         started_s: on the session's clock; None if not noted.
         usual: expectation by usual causes if `expected` is by a model; else None.
         bar_stated: whether a calibrated bar length is stated.
@@ -144,7 +143,6 @@ class Seen:
 
     Attributes:
         analysis: None without circle.
-        lost: missing on the turn.
         unusable: recorded, but unusable, of these.
         feed_mm_min: by the overlap, with standard uncertainty; or None.
         longer_s: excess over the programmed time from feed-in to feed-out; None without both edges or with recorded angles.
@@ -222,7 +220,6 @@ def coefficients_um(raw: RawCircle) -> NDArray[np.float64]:
 
 
 def _orthonormal(found: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return coefficients of a form's harmonics: mean, cosines, sines."""
     waves = found[1:] / np.sqrt(2.0)
     return np.concatenate([found[:1].real, waves.real, -waves.imag])
 
@@ -263,7 +260,6 @@ class Others:
     """A session's other runs, and related ones.
 
     Attributes:
-        longer_s: excess time of each.
         directions_um: rms difference of other circles' directions.
         directions_stated: the same in stated standard deviations.
         across_um: the same off the axis through the start.

@@ -63,11 +63,7 @@ def scaled_length_quantile(freedom: float) -> float:
 
 
 def ratio_quantile(above: float, below: float) -> float:
-    """Return the ratio of two variance estimates that chance passes with probability SHARE [Fisher].
-
-    Args:
-        above: freedom of the numerator.
-    """
+    """Return the ratio of two variance estimates that chance passes with probability SHARE [Fisher]."""
     return float(fdtri(above, below, 1.0 - SHARE))
 
 

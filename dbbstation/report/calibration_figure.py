@@ -157,7 +157,6 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
 
 
 def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
-    """Draw balls off their stated places, with circles of two standard deviations."""
     axes.set_title("balls off their stated places, bars ±2σ")
     if not balls:
         axes.text(0.5, 0.5, "no ball of known place", ha="center", va="center", transform=axes.transAxes)

@@ -76,7 +76,6 @@ def when_measured(runs: Iterable[RunEntry]) -> str:
 
 
 def _instrument(session: SessionFolder) -> str:
-    """Return the instruments of counted circles."""
     read = [run.instrument for run in session.in_state(RunState.ACCEPTED)]
     told = dict.fromkeys(
         "virtual: " * one.virtual + one.text for one in read or [session.instrument] if one is not None
@@ -130,7 +129,6 @@ def _degc(value: float | None) -> str:
 
 
 def _logged(circles: Sequence[MeasuredCircle]) -> str:
-    """Return every thermometer's range over accepted runs."""
     ranges: dict[str, tuple[float, float]] = {}
     for one in circles:
         logged = {} if one.analysis is None else one.analysis.raw.temperature_degc

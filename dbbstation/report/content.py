@@ -207,7 +207,6 @@ def _polars(reported: Reported) -> list[TitledPolar]:
 
 
 def _findings(found: Circled) -> ShownFindings:
-    """Return wrong findings by run, and undecided ones by kind."""
     wrong, undecided, good = [], dict[tuple[str, str], list[str]](), 0
     for one in found.circles:
         for finding in () if one.judgement is None else one.judgement.findings:

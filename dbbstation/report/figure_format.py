@@ -64,7 +64,6 @@ def in_format(figure: Figure, wanted: Wanted) -> Any:  # noqa: ANN401 - bytes or
 
 
 def _metadata(provenance: Provenance, kind: FigureFormat) -> dict[str, object]:
-    """Return program, command and inputs by each format's names."""
     names = {
         FigureFormat.SVG: ("Creator", "Description"),  # Dublin Core, in RDF
         FigureFormat.PNG: ("Software", "Description"),  # text chunks of the PNG specification

@@ -28,8 +28,6 @@ class MachineRow:
 
     Attributes:
         session: shown one: the last done, or a failed one.
-        marks: places of like scores.
-        marked: places of unlike scores.
     """
 
     name: str

@@ -50,12 +50,7 @@ class TrendMark:
 
 @dataclass(frozen=True)
 class Drawing:
-    """One quantity over time for SVG.
-
-    Attributes:
-        points: short round strokes.
-        limits: heights within the field.
-    """
+    """One quantity over time for SVG."""
 
     name: str
     ident: str

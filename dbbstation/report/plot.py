@@ -176,7 +176,6 @@ def _grid(
 
 
 def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
-    """Draw test by test: sessions' polar traces to one scale, and last runs over the angle."""
     tests = {panel.test: [other for other in panels if other.test == panel.test] for panel in panels}
     columns = max(len(of) for of in tests.values())
     width_in = NARROW_IN if columns <= 2 else WIDE_IN  # noqa: PLR2004 - two stand side by side upright

@@ -161,7 +161,6 @@ def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
 
 
 def _figures(drawn: Sequence[Drawn]) -> str:
-    """Return G of each direction's last run, in words."""
     last = [one for one, thin in drawn if not thin and one.analysis is not None]
     return ", ".join(
         f"{budget_of(one.analysis, BudgetQuantity.G, one.known).value_um:.1f} {str(one.entry.direction).upper()}"

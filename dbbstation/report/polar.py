@@ -157,7 +157,6 @@ def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple
 
 
 def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], scale: float) -> str:
-    """Return a turn's closed path, Y inverted for SVG."""
     angle_deg, deviation = thinned(theta_deg, deviation_um)
     theta, radius = np.radians(angle_deg), CIRCLE + scale * deviation
     middle = SIZE / 2

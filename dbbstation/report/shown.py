@@ -64,8 +64,6 @@ class ReportContent:
 
     Attributes:
         number: of the report, by program, command and inputs.
-        virtual: names of virtual sessions.
-        reasons_shown: on the first page.
         before_name: earlier session; may be empty.
         files: name and SHA-256 of every underlying file.
     """

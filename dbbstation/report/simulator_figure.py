@@ -47,7 +47,6 @@ def _over_time(axes: Axes, answer: SimulatorComparison) -> None:
 
 
 def _over_signal(axes: Axes, answer: SimulatorComparison) -> None:
-    """Draw over the first term's signal, or the simulated value."""
     name, values = "simulated value", answer.work.measured - answer.as_simulated * answer.work.scale
     if answer.terms and answer.terms[0].signals:
         term = answer.terms[0]

@@ -40,11 +40,7 @@ class ShownFeed:
 
 @dataclass(frozen=True)
 class NoiseFigures:
-    """Noise of a recording [µm].
-
-    Attributes:
-        step_of_readings: least difference of two readings.
-    """
+    """Noise of a recording [µm]."""
 
     of_slow_figures: float | None
     of_a_reading: float | None
@@ -72,7 +68,6 @@ class CircleFiguresResult:
         g_um: circular deviation G, minimum zone.
         g_least_squares_um: circular deviation about the least-squares centre.
         f_um: radial deviations F about the least-squares centre.
-        centre_um: least-squares less commanded centre.
         drift_um_per_turn: None without a second pass.
     """
 

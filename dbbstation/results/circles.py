@@ -183,7 +183,6 @@ def _pair(pair: MeasuredPair) -> PairFigures:
 
 
 def _quick_looks(found: Circled) -> list[QuickLookResult]:
-    """Return signatures of serial axes in every circle, directions grouped."""
     partner = {id(pair.one): pair.other for pair in found.pairs}
     second = {id(pair.other) for pair in found.pairs}
     looks = []

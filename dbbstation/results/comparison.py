@@ -22,7 +22,6 @@ class ComparedRun:
     """A run of B minus that of A.
 
     Attributes:
-        number: in this test and direction.
         differs: whether the found effects are certain in this run.
         circularity_um: range of the difference about its centre.
         peak_um: with sign.
@@ -154,7 +153,6 @@ class ComparisonResult(Framed):
     Attributes:
         held_out_worse: whether predictions get worse; None if not tested.
         held_out_rms_um: errors of tests that took no part.
-        runs: largest difference first.
         unlike: other differences; `notes` in JSON.
         levels: existence, variables and cause of a difference.
     """

@@ -11,11 +11,8 @@ class KinematicsResult:
 
     Attributes:
         model_sha256: of the model file; the component's pin `model` has its first 32 bits.
-        parts: sources that the component corrects.
-        left_out: sources that it does not.
         thermometers: columns whose pins must be connected.
         machine_file: machine file for use with the component; it states the control's corrections.
-        way_back: how to undo it.
     """
 
     file: str
@@ -60,7 +57,6 @@ class ParametersResult:
     Attributes:
         low: of the volume, X, Y, Z [mm], A, B, C [deg].
         home_mm: added to HOME and HOME_OFFSET of each joint.
-        way_back: how to undo it.
     """
 
     folder: str

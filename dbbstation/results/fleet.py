@@ -21,7 +21,6 @@ class FleetValue:
     """One number of a machine.
 
     Attributes:
-        uncertainty: standard uncertainty.
         logarithmic: whether ratios of a positive size are compared.
     """
 

@@ -33,7 +33,6 @@ class Framed:
 
     Attributes:
         drawing: draws by file extension, a panel, or with None a figure; None without figure.
-        notes: printed on standard error.
     """
 
     drawing: Annotated[Callable[[object], Any] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)

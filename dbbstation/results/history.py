@@ -17,7 +17,6 @@ class HistorySession:
     """One session of a history.
 
     Attributes:
-        name: folder relative to the history's.
         started: first accepted run, ISO 8601.
     """
 
@@ -62,7 +61,6 @@ class HistoryEvent:
 
     Attributes:
         verdict: `changed` or `stands out`.
-        found: session that showed it.
         decided_by: `stated-uncertainty` or `control-chart`.
     """
 
@@ -104,7 +102,6 @@ class QuantityHistory:
         conformity: of the last value [ISO 14253-1].
         exceeded_sessions: beyond it by more than U.
         scatter_in_u: of the last stretch, in stated uncertainties.
-        sessions_lacking: before the next comparison.
         decided_by: `stated-uncertainty` or `control-chart`, or None.
     """
 
@@ -143,9 +140,7 @@ class MachineHistoryResult:
     """Sessions and quantities of one machine.
 
     Attributes:
-        machine: serial number or name.
         false_alarms_expected: over this history without change.
-        quantities: circles by test, then parameters.
     """
 
     machine: str

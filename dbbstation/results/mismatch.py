@@ -103,14 +103,11 @@ class EffectResult:
     """What was found of one effect.
 
     Attributes:
-        verdict: see docs/verdicts.md.
         persists: a single event that other parts confirm.
         form: family; None for own physics.
-        sigmas: norm over standard deviation.
         confounded: R² on the parameters.
         rows: first and last of a single event.
         blocks: size in each run, by name.
-        equivalent: effects indistinguishable by these rows.
     """
 
     name: str
@@ -150,9 +147,7 @@ class MismatchResult(Framed):
 
     Attributes:
         levels: existence, variables and law of a difference.
-        mismatch: whether it exceeds noise.
         offset: mean difference; None if not allowed.
-        left: whether anything exceeds noise.
         not_asked: own physics not tested, with reasons by name.
         table: columns by name, with corrected simulation and residual.
     """

@@ -50,7 +50,6 @@ def chance_in_words(probability: float) -> str:
 
 
 def _undecided(report: Mapping[str, Any]) -> list[str]:
-    """Return undecided causes, findings that predict worse, and limits that the diagnosis reached."""
     said = report.get("diagnosis")
     if not isinstance(said, Mapping):
         return []

@@ -29,7 +29,6 @@ class PredictionResult(Framed):
         error_about_mean_rms_um: without the common shift.
         greatest_uncertainty_um: standard, of a position; None if unknown.
         greatest_uncertainty_by_axis_um: the same of X, Y and Z each.
-        directions_lost: undetermined by the model's recordings.
         uncertainty_mm: standard, of X, Y and Z, shape (n, 3); NaN if unknown.
     """
 

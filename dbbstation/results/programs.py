@@ -25,13 +25,11 @@ class WrittenProgram:
     """One program.
 
     Attributes:
-        points: moves at feed.
         greatest_correction_um: None in a nominal program.
         chord_error_um: largest distance between a move and its path.
         model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None if unknown.
         tilt_left_um: tilt correction left out, 100 mm from the tip.
         feed_s: computed time at feed; None for an unknown look-ahead.
-        remarks: unmet requests, in words.
     """
 
     file: str

@@ -76,7 +76,6 @@ def _reason(held: Held, coverage_factor: float) -> str:
 
 
 def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
-    """Return runs to repeat before repairing the machine."""
     told = []
     for one in circles:
         wrong = () if one.judgement is None else one.judgement.wrong

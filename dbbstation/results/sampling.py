@@ -11,7 +11,6 @@ class SampledCircle:
 
     Attributes:
         spacing_deg: between readings.
-        enough: whether figures can be computed.
     """
 
     test: str

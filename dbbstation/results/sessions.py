@@ -32,11 +32,7 @@ class ListedRun:
 
 @dataclass(frozen=True)
 class ListedSession:
-    """The runs of a session.
-
-    Attributes:
-        missing: planned circles without accepted run.
-    """
+    """The runs of a session."""
 
     session: str
     runs: tuple[ListedRun, ...]

@@ -81,12 +81,9 @@ class PortTerm:
     """What was found of one term.
 
     Attributes:
-        verdict: see docs/verdicts.md.
-        form: how it follows its signals.
         sigmas: norm of its effect over the standard deviation.
         confounded: R² of its effect on the parameters.
         linear_and_true_differ_by: distance of linear and simulated answer; None if unknown.
-        equivalent: terms indistinguishable by these recordings.
     """
 
     name: str

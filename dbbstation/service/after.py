@@ -55,7 +55,6 @@ class After:
 
     Attributes:
         former: session compared by an acceptance, or None.
-        kept: copies of its models.
     """
 
     def __init__(

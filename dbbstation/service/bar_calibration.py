@@ -56,7 +56,6 @@ class BarCalibration:
 
     Attributes:
         latest: None before a reading.
-        done: readings averaged so far.
     """
 
     def __init__(self, line: HeldLine, count: int = USUAL_READINGS) -> None:

@@ -83,7 +83,6 @@ class Board:
         last: its circles in the session before, by direction; may be empty.
         difference: of the directions; None before both are complete.
         running: direction on its circle, or None.
-        reasons: of rejections, by name.
         completed: run awaiting its verdict, or the last one.
         doubted: accepted runs that contradict the others, by name.
         temperature_due: whether a run began since the last temperature.

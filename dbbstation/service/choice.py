@@ -65,7 +65,6 @@ class Limits:
     Attributes:
         largest_bar_age_h: beyond which a calibration is stale.
         largest_loss_percent: of a run's samples; None: the plan's.
-        loss_over_plan: whether it overrides the plan.
     """
 
     largest_bar_age_h: float = USUAL_AGE_H
@@ -82,7 +81,6 @@ class Choice:
         bar_waiver: reason for no bar file; may be empty.
         programs: folder; None: plain nominal circles.
         ambient_temp_c: now; None: not read. An existing session gets a note.
-        gate: repeated at the end.
     """
 
     folder: Path | None = None
@@ -122,8 +120,6 @@ class Prepared:
     """A choice, read and checked.
 
     Attributes:
-        runs: left to measure.
-        mountings: set-ups of balls for them.
         height_and_drift: correlation of test height with a steady drift, 0 to 1.
     """
 

@@ -25,7 +25,6 @@ class InForce:
     """The programs of a session's accepted circles.
 
     Attributes:
-        compensated: number of compensated runs.
         programs: folder of program copies; None for plain circles.
         models: found model files of the programs.
         lost: SHA-256 of missing models.
@@ -40,11 +39,7 @@ class InForce:
 
 @dataclass(frozen=True)
 class Former:
-    """A session measured before.
-
-    Attributes:
-        measured: last accepted run.
-    """
+    """A session measured before."""
 
     folder: Path
     measured: datetime

@@ -143,7 +143,6 @@ class Derived:
 
     Attributes:
         deviation_um: shape (n,); NaN breaks the line.
-        largest_um: absolute.
     """
 
     view: View

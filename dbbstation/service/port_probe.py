@@ -24,7 +24,6 @@ class ProbeOutcome:
     """What came from a port.
 
     Attributes:
-        answers: whether the protocol understood readings.
         text: reading, status, or fault with remedy.
     """
 

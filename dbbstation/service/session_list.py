@@ -25,9 +25,7 @@ class SessionLine:
     """One session.
 
     Attributes:
-        changed: last writing of its file.
         accepted: planned runs with accepted recording.
-        unjudged: runs without verdict.
         left_s: time of the remaining circles.
     """
 

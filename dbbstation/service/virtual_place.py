@@ -82,9 +82,6 @@ def virtual_place(
 ) -> Iterator[VirtualPlace]:
     """Start a machine with random errors and an instrument on it.
 
-    Args:
-        time_scale: speed relative to real time.
-
     Raises:
         TravelError: a circle leaves the travel.
     """

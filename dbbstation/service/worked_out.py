@@ -98,7 +98,6 @@ def _kept(file: Path) -> _File | None:
 
 
 def _is_result(folder: Path, name: str, step: DoneStep) -> bool:
-    """Return whether a step is known and its file is in the results folder."""
     path = folder / step.path
     return name in set(SessionTask) and path.exists() and real_path(path).is_relative_to(real_path(folder))
 

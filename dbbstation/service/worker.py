@@ -109,7 +109,6 @@ def _fitted(job: SessionJob) -> object:
 
 
 def _programs(job: SessionJob, settings: Settings) -> object:
-    """Write the circles' NC programs in the shop's dialect."""
     from dbbstation.tasks.circle_programs import program  # noqa: PLC0415 - the same
 
     plan, machine = _needed(job.plan, "plan"), _needed(job.machine, "machine")

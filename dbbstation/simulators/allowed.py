@@ -55,7 +55,6 @@ def require_allowed(path: Path, settings: Collection[str], *, allow: bool) -> st
     Args:
         path: of `model.yaml`; nothing of it is run here.
         settings: hashes that the user's settings allow.
-        allow: allow it from now on.
 
     Raises:
         StationError: it is not allowed.

@@ -33,11 +33,7 @@ RUNS_AWAY = 1e12
 
 
 class ExchangedSimulator(Simulator):
-    """A simulator whose inputs are the terms at its ports.
-
-    Args:
-        ports: signal names by port.
-    """
+    """A simulator whose inputs are the terms at its ports."""
 
     def __init__(self, ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...]) -> None:
         self._ports, self._outputs = dict(ports), outputs

@@ -49,8 +49,6 @@ class FmuSimulator(ExchangedSimulator):
 
     Args:
         variables: FMU names by ours; signals are `port.signal` or `signal`.
-        ports: signal names by port.
-        limit_s: per simulation.
     """
 
     def __init__(

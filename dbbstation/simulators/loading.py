@@ -46,7 +46,6 @@ class LoadedSimulator:
 
     Attributes:
         source: Python file, or runner of a program or FMU.
-        own: own physics at ports.
     """
 
     path: Path

@@ -39,7 +39,6 @@ class ProgramSimulator(ExchangedSimulator):
 
     Args:
         command: with whole paths of files beside the model file.
-        limit_s: per simulation.
     """
 
     def __init__(

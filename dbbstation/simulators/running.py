@@ -105,7 +105,6 @@ class Runs:
         return [self._known[ask] for ask in asks]
 
     def _refuse_beyond(self, more: int) -> None:
-        """Refuse more simulations than allowed by number or time."""
         if self._by_time:
             if not more or self.seconds < MOST_SECONDS:
                 return
@@ -182,7 +181,6 @@ STARTING_S = 20.0
 def _several(
     source: Path | ExchangedSimulator, own_files: tuple[Path, ...], model: Model, asks: bytes
 ) -> list[SimulationOutcome]:
-    """Run simulations in a process that knows the user's classes."""
     know(own_files)
     return [_one(source, model, ask) for ask in pickle.loads(asks)]  # noqa: S301 - what the process above made
 

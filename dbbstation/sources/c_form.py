@@ -22,7 +22,6 @@ class CForm:
     zero.
 
     Attributes:
-        body: statements.
         by_pose: False if it uses only lengths of `at`, so that the pose need not be solved for.
         constants: further constants by name, a number or an array.
         thermometers: columns without their unit.

@@ -93,7 +93,6 @@ class Setup:
     Runs that share a name share that error, over all sessions of a fit.
 
     Attributes:
-        ball: entry of the CMM sheet.
         fixed_ball_mm: centre by CMM, machine frame, shape (3,).
         mounting_repeatability_mm: one standard deviation, common or per axis, shape (3,).
         ball_uncertainty_mm: of the CMM, one standard deviation per axis.
@@ -137,7 +136,6 @@ class Motion(WithLogged):
         poses: commanded [X, Y, Z, A, B, C], shape (n, 6) [mm, deg].
         is_path: rows are successive; otherwise poses without history.
         straight: straight between rows, as a program; otherwise samples of a smooth path.
-        kept: the rows that count.
         time_s: since the session's first sample, shape (n,); None if unknown.
         logged: by column, shape (n,) each; see `temperature_degc` and `motor_current_a`.
         load_n: axial forces of the motors, positive if the platform pulls, shape (n, 6); None: by the machine file's
@@ -226,7 +224,6 @@ class Parameter:
     Attributes:
         name: unique in the source, ending with its unit.
         plausible: usual size, one standard deviation, in that unit.
-        meaning: one line with the sign.
         grid: search values of a nonlinear parameter (time constant, phase); empty for an amplitude.
         tolerance: the machine file's standard deviation, used as prior; or None.
         newer: True if older models lack it, where it is zero.

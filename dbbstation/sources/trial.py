@@ -155,7 +155,6 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
 
 
 def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> list[str]:
-    """Check that a program in two stretches has the effect of the whole."""
     if source.looks_ahead or not source.has_history:
         return []
     motion = replace(motion, straight=True)
@@ -177,7 +176,6 @@ def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: N
 
 
 def _of_other_laws(source: ErrorSource, parameters: Sequence[Parameter], machine: Machine) -> list[str]:
-    """Check its forms by temperature and other laws."""
     form = source.by_temperature()
     if form is not None:
         if (form.name, form.belongs_to) != (source.name, source.belongs_to) or form.varies_with == source.varies_with:
@@ -275,7 +273,6 @@ def _of_needs(source: ErrorSource, motion: Motion) -> list[str]:
 
 
 def _circle(machine: Machine) -> Motion:
-    """Return one turn about mid-travel with all data."""
     theta = np.linspace(0.0, 2.0 * np.pi, 181)
     centre = middle(machine).position_mm[0]
     poses = np.zeros((len(theta), 6))
@@ -316,7 +313,6 @@ def _of_derivative(
     parameters: Sequence[Parameter],
     values: NDArray[np.float64],
 ) -> list[str]:
-    """Compare the derivative with central differences."""
     derivative = source.derivative(motion, machine, values)
     faults = []
     for k, parameter in enumerate(parameters):

@@ -44,7 +44,6 @@ class Job:
 
     Attributes:
         plan: jig inlined.
-        folder: made, or continued.
         details: for a new session; an existing one keeps its own.
         programs: by test and direction; empty: plain nominal circles.
         time_scale: speed of that time; other than 1 only for a virtual machine.

@@ -100,7 +100,6 @@ class Station:
                 observer(event)
 
     def _tell_of(self, error: StationError) -> None:
-        """Report a failure to all observers, even if one of them caused it."""
         for event in self._sequencer.fail(error):
             for observer in self._observers:
                 try:

@@ -135,7 +135,6 @@ class RunCompleted:
     """The recording has ended.
 
     Attributes:
-        lost: samples lost by the line.
         problem: why it is unusable; empty if usable.
         doubtful: possibly damaged samples, kept but unused.
         to_come: circles of the plan that are still to be measured.

@@ -60,9 +60,7 @@ class RunRecord:
 
     Attributes:
         fed_in_s: feed-in edge since the first sample; None before.
-        lost: anywhere in the run.
         lost_on_turn: from feed-in to feed-out, with doubtful ones.
-        doubtful: possibly damaged samples anywhere.
         held: duration of the standstill on the turn, with noise from earlier runs.
     """
 

@@ -79,7 +79,6 @@ class Sequencer:
     order.
 
     Args:
-        recorded: returns the complete current run.
         waiting: recorded runs without verdict, oldest first; judged before measuring.
         doubted: accepted runs that the run just judged puts in doubt.
     """
@@ -268,7 +267,6 @@ class Sequencer:
             self.schedule.go_to(run.test, run.direction)
 
     def _reorder(self, command: GoTo | Judge) -> None:
-        """Obey a command about the order or a verdict, or refuse it."""
         try:
             if isinstance(command, GoTo):
                 self.schedule.go_to(command.test, command.direction)

@@ -89,7 +89,6 @@ def sync_folder(folder: Path) -> None:
 
 
 def _made_writable(path: Path, error: OSError) -> bool:
-    """Make a read-only file replaceable, as Windows requires."""
     if getattr(error, "winerror", None) not in _HELD or not path.is_file():
         return False
     if path.stat().st_mode & stat.S_IWUSR:
@@ -99,7 +98,6 @@ def _made_writable(path: Path, error: OSError) -> bool:
 
 
 def _patiently(act: Callable[[], object]) -> None:
-    """Try again while another program holds the file."""
     until_s = time.monotonic() + PATIENCE_S
     while True:
         try:

@@ -212,7 +212,6 @@ def _volume(
 
 
 def _table(joints: Sequence[str]) -> str:
-    """Return joints as a table for any control: what, and its value in mm."""
     rows = [line.removeprefix("setp genhexkins.").rsplit(" ", 1) for line in joints]
     return "joint,value_mm\n" + "".join(f"{name},{value}\n" for name, value in rows)
 

@@ -49,10 +49,7 @@ class Option:
         help: one or two sentences, the unit in brackets; for a flag that is True by default, the meaning of its
             absence.
         kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
-        setting: key in the shop's settings.
         least: `most`, `above`: range of a number.
-        only_with: parameter that it needs.
-        not_with: parameters that it excludes.
         objects: scripts may give other objects than paths.
     """
 
@@ -179,7 +176,6 @@ class Declared:
     """A task as declared.
 
     Attributes:
-        label: beside its progress bar.
         stages: of its work and the passed share of time as each begins [%]; a function of the arguments; None: counted.
     """
 

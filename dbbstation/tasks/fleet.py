@@ -195,7 +195,6 @@ def _read(name: str, folder: Path) -> _Named:
 
 
 def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
-    """Return each session once, without copies, under distinct names."""
     first: dict[str, _Named] = {}
     names: dict[str, int] = {}
     kept = []

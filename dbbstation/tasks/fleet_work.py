@@ -75,11 +75,7 @@ class FleetPiece:
 
 @dataclass(frozen=True)
 class Worked:
-    """Result of a piece of work.
-
-    Attributes:
-        found: comparable results as plain numbers.
-    """
+    """Result of a piece of work."""
 
     problem: str = ""
     found: Mapping[str, Any] = field(default_factory=dict)
@@ -219,7 +215,6 @@ def _parameters(model: IdentifiedModel) -> tuple[FleetValue, ...]:
 
 
 def _numbers(model: IdentifiedModel) -> list[tuple[str, str, str, float, float | None]]:
-    """Return source, quantity, unit, value and uncertainty of the machine's free parameters."""
     return [
         (one.source, f"{one.source}: {one.name}", one.unit, one.value, one.u)
         for one in machine_parameters(model)

@@ -227,7 +227,6 @@ def _processes_for(sessions: Sequence[Path]) -> int:
 
 
 def _session_data(path: Path) -> SessionFigures | _Unreadable:
-    """Return the kept facts of a session, or its fault."""
     from dbbstation.tasks.session_figures import session_figures
 
     try:

@@ -39,8 +39,6 @@ class Recorded:
 
     Attributes:
         machine: nominal, equal in all sessions but for its name (the first's).
-        observations: accepted runs in recording order.
-        warnings: harmless findings, and omitted runs.
     """
 
     machine: Machine

@@ -52,7 +52,6 @@ class TableOptions:
         time: column of time, `ROWS` for row order; None: guess.
         numbers: notation; None: decimal point and the header's most frequent separator.
         known: prior standard uncertainty of parameters, by name.
-        free: parameters without prior.
     """
 
     measured: str

@@ -23,7 +23,6 @@ class RawCircle(WithLogged):
     Attributes:
         t_s: since the recording's first sample.
         phi_deg: along the turn, 0 to 360.
-        logged: by column.
         start_uncertainty_deg: of the turn's begin, one standard deviation; zero with recorded angles.
     """
 

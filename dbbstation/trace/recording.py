@@ -23,7 +23,6 @@ class Recording(WithLogged):
         t_s: host time since the first sample, strictly rising.
         length_mm: between ball centres, raw.
         theta_deg: commanded, from +X towards +Y, of a cut recording; None: find the circle in the trace.
-        logged: by column.
         usable: False for bad and doubtful samples, which stay.
     """
 

@@ -113,7 +113,6 @@ class RunScreen(BoardScreen):
 
     @property
     def _undecided(self) -> bool:
-        """Return whether the run's word is CANNOT TELL and no earlier run is in doubt."""
         board = self.desk.board
         if Accept not in board.allowed or board.completed is None or board.doubted:
             return False

@@ -259,7 +259,6 @@ def _decided(board: Board, completed: RunCompleted) -> Content:
 
 
 def _signs(board: Board) -> dict[str, list[tuple[Task, Mark]]]:
-    """Return the marks of each test's runs, repeats at the plan's end last."""
     marks: dict[str, list[tuple[Task, Mark]]] = {}
     for task, mark in zip(board.tasks, board.marks, strict=True):
         marks.setdefault(task.test, []).append((task, mark))

@@ -98,7 +98,6 @@ class ControlKins:
     """A kinematics in place of none: joints are recorded then.
 
     Attributes:
-        name: of the module.
         home_mm: joints at which the machine is switched on, shape (6,).
         offset_mm: added to HOME and HOME_OFFSET, shape (6,).
         home_z_mm: height at which it is switched on, upright over the middle: where LinuxCNC begins to look for its pose.

@@ -23,11 +23,6 @@ class PlanCheck:
     """Redundancy of the tests.
 
     Directions determined by single circles, minus those used by the fit, can contradict the plan.
-
-    Attributes:
-        determined: by single tests, summed.
-        identified: by all tests together.
-        of_one_test: by the strongest test.
     """
 
     tests: int

@@ -40,7 +40,6 @@ class MountingOffset:
         shift_mm: best prediction, machine axes, shape (3,) [mm].
         spread_mm2: its covariance, shape (3, 3) [mm²].
         square: of determined coordinates in units of their expected scatter, summed.
-        freedom: determined coordinates.
     """
 
     mounting: str

@@ -42,7 +42,6 @@ class MotorFindings:
         noise: of each motor's reading, or sector mean in long runs; None without readings.
         residual_a: rms per motor; NaN without readings.
         fine_a: noise from differences of neighbours, free of slow misfit; NaN without readings.
-        samples: used readings per motor.
         held: undetermined parameters of the drives.
         alone: centre of gravity by channel (`circles`, `currents`) and parameter, with standard deviation [mm]; None if
             undetermined alone. Empty without cog-shift.

@@ -82,7 +82,6 @@ class Calibration:
     Attributes:
         x: all columns, shape (k,).
         solution: covariance, directions and held rows of all columns.
-        noise: of a reading.
         machine_residual_mm: per run, beyond the machine's sources.
         residual_mm: per run, beyond the measurement's effects too.
         blocks: information about x: one per circle, then motor currents.
@@ -334,7 +333,6 @@ def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> li
 
 
 def _motions_of(runs: Sequence[Observation | RunNodes]) -> MotionOf:
-    """Return a function for the motion of a run, cached for short runs."""
     if _usual_length(runs) * len(runs) > MOST_KEPT:
         return Observation.motion
     short = {id(run.coarse if isinstance(run, RunNodes) else run) for run in runs}

@@ -110,7 +110,6 @@ def _strut_axes(layout: Layout) -> NDArray[np.float64]:
 
 
 def _largest_parts(row: NDArray[np.float64], names: list[tuple[str, str, str]]) -> str:
-    """Describe a direction by its largest parts, or by its only parameter."""
     largest = np.argsort(-np.abs(row))[:3]
     called = [f"{names[k][0]} {names[k][2].removesuffix('_mm').replace('_', ' ')}" for k in largest]
     if np.abs(row[largest[0]]) > 1.0 - ALONE:

@@ -32,7 +32,6 @@ def calibrate_robust(
     """Fit, and fit again without the outliers.
 
     Args:
-        balls: look for displaced balls too.
         begun: earlier result without balls, to continue.
 
     Raises:

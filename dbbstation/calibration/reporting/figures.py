@@ -74,7 +74,6 @@ class CalibrationFigures:
     """All figures of a fit, and its outliers.
 
     Attributes:
-        nominal_rms_um: measured less nominally predicted length.
         noise_um: of a reading, from neighbours.
         misfit: beyond noise and mountings.
         gaps: remaining knowledge of them, in words.

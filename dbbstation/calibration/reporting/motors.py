@@ -29,7 +29,6 @@ class Motor:
 
     Attributes:
         motor: 1 to 6.
-        gain_a_kn: current per strut force.
         force_per_current: of the strut [N/A].
         torque_per_current: at the screw [Nm/A]; None without its lead.
     """

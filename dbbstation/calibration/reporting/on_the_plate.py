@@ -61,7 +61,6 @@ class BallShift:
     """The fit's displacement of a ball.
 
     Attributes:
-        stated_um: standard deviation per axis.
         shift_um: found less stated place in X and Y, shape (2,).
     """
 

@@ -136,7 +136,6 @@ class Change:
 
     @property
     def _proportional(self) -> bool:
-        """Return whether effects are proportional: those without history."""
         return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
 
     def _values(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,7 +166,6 @@ class Change:
 
     @cached_property
     def _whens(self) -> tuple[When, ...]:
-        """Return visible ways of acting."""
         point = tuple(p.grid[len(p.grid) // 2] for p in self._parameters if p.grid)
         of_a, of_b = self._of(0, point), self._of(1, point)
         size = max(float(np.linalg.norm(of_a)), float(np.linalg.norm(of_b)), 1e-300)
@@ -175,7 +173,6 @@ class Change:
         return (CHANGED,) if apart <= HARDLY_DIFFERENT else (IN_B, IN_A, IN_BOTH)
 
     def _grid(self, k: int, parameter: Parameter) -> tuple[float, ...]:
-        """Return visible values of a nonlinear parameter, rising."""
         middle = [p.grid[len(p.grid) // 2] for p in self._parameters if p.grid]
         values = tuple(sorted(parameter.grid))
         shown = tuple(v for v in values if self.source.shows(self.sides.motions[1], [*middle[:k], v, *middle[k + 1 :]]))

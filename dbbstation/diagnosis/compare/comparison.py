@@ -60,9 +60,7 @@ class RunDifference:
         noise_mm: rms noise of the smooth difference.
         found_mm: by found causes, shape (s,).
         centre_sigma_mm: standard deviation by noise and stated balls.
-        radial_mm: change of mean length.
         radial_sigma_mm: by noise, stated bars, and balls of raised bars.
-        circularity_mm: range without mean and centre.
     """
 
     pair: Pair
@@ -102,7 +100,6 @@ class Comparison:
         held_out: predictions with the stated set-up, and with findings [mm].
         effects: of the best set, largest first, by name.
         noticed_mm: detectable change of any strut's length.
-        lacking: sources not tested, with reasons.
         levels: existence, variables and cause of a difference [µm].
     """
 
@@ -185,7 +182,6 @@ def compare(
 
     Args:
         sources: candidates whose needs both sessions meet.
-        lacking: sources not tested, with reasons.
         hold_out: choose anew without each group of tests.
 
     Raises:

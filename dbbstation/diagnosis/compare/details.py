@@ -33,7 +33,6 @@ class EffectOfCause:
         share: of the total chi-square reduction, alone.
         taken_up: share of squares that a kinematic calibration of B absorbs.
         opposite: share of squares odd in direction, over tests run both ways.
-        test: of the largest effect.
         theta_deg: arc of at least half its peak, from and to.
     """
 

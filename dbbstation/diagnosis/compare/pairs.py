@@ -188,7 +188,6 @@ def _mean(runs: Sequence[Observation], sectors: int) -> NDArray[np.float64]:
 
 
 def _by_run(runs: Sequence[Observation]) -> dict[tuple[str, str], list[Observation]]:
-    """Return runs by test and direction, in order."""
     found: dict[tuple[str, str], list[Observation]] = {}
     for run in runs:
         found.setdefault((run.test, str(run.raw.circle.direction)), []).append(run)

@@ -83,11 +83,7 @@ def drive_channel(
     base: Sequence[str] = (MASS, VISCOUS),
     refused: Collection[str] = (),
 ) -> DriveChannel:
-    """Make the channel of recordings.
-
-    Args:
-        base: parameters refitted with every hypothesis.
-    """
+    """Make the channel of recordings."""
     variables = _variables(recordings)
     motion = recordings.motion[:, [(MASS, VISCOUS).index(name) for name in base]]
     simple = [form for source in sources for form in source.forms(recordings.scale) if not form.shapes]
@@ -211,7 +207,6 @@ def _departure(effect: NDArray[np.float64], along: NDArray[np.float64]) -> NDArr
 
 
 def _curves(recordings: Recordings) -> Iterator[Pattern]:
-    """Return unmodelled forces: smooth curves, also by direction."""
     scale = recordings.scale
     starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
     travels = recordings.at(lambda s: s.since_reversal_m)
@@ -266,7 +261,6 @@ def _curve_over(
     values: Callable[[Signals], NDArray[np.float64]],
     factor: Callable[[Signals], NDArray[np.float64]] | None,
 ) -> Iterator[Pattern]:
-    """Return a curve's visible functions over a variable."""
     samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
     norms = np.linalg.norm(samples, axis=0)
     seen = samples[:, norms > SAME * norms.max()]

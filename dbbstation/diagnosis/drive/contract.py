@@ -27,9 +27,7 @@ class Scale:
 
     Attributes:
         mean_m: position at compared samples.
-        cutoff_hz: of the band.
         reverses: some recording changes direction.
-        both_ways: enough samples each way.
         waves_per_m: strongest residual waves over position [1/m].
     """
 
@@ -59,7 +57,6 @@ class DriveParameter:
     Attributes:
         plausible: one standard deviation, in the name's unit.
         meaning: one line with the sign.
-        positive: cannot be negative.
     """
 
     name: str
@@ -75,7 +72,6 @@ class DriveForm:
 
     Attributes:
         columns: force per amplitude, shape (n, p), at values of `shapes`.
-        shapes: nonlinear numbers.
         grids: start values, rising.
         tried: independent forms of the choice.
     """

@@ -55,10 +55,7 @@ class DriveFinding:
     """Finding on one cause.
 
     Attributes:
-        ambiguous_with: causes of about equal explanation.
         concealed: share of squares that mass and viscous friction absorb.
-        unconcealed_rms_n: beyond them.
-        probability: of it or an equivalent.
         gain: log Bayes factor beside the others.
         parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
         parts: waves, pulses or forms if several.
@@ -92,7 +89,6 @@ class UnexplainedForce:
 
     Attributes:
         text: such as `curve over speed`.
-        rms_n: beside mass and viscous friction.
         low, high: range of the variable with at least half of the largest effect; `from` and `to` in JSON.
     """
 
@@ -131,7 +127,6 @@ class ModelStep:
 
     Attributes:
         relative_force_error: |F - F_model| / |F| on the stretch.
-        parameters: without the stretch.
     """
 
     added: str | None
@@ -150,13 +145,7 @@ class ForceErrors:
 
 @dataclass(frozen=True)
 class HeldBack:
-    """Prediction errors on a held-back stretch.
-
-    Attributes:
-        relative_force_error: |F - F_model| / |F|.
-        steps: from base to last model.
-        not_in_model: fitted but undecided causes.
-    """
+    """Prediction errors on a held-back stretch."""
 
     t_s: tuple[float, float]
     relative_force_error: ForceErrors
@@ -178,12 +167,7 @@ class ParameterBias:
 
 @dataclass(frozen=True)
 class UnexplainedForces:
-    """The unmodelled residual.
-
-    Attributes:
-        probability: by noise.
-        effects: unnamed, largest first.
-    """
+    """The unmodelled residual."""
 
     rms_n: float
     probability: float
@@ -217,7 +201,6 @@ class RecordedSignals:
     """What was recorded.
 
     Attributes:
-        cutoff_hz: of the band.
         shortest_wave_mm: visible over position, or None.
     """
 
@@ -252,14 +235,10 @@ class DriveFindings:
 
     Attributes:
         mismatch: present beyond mass and viscous friction.
-        misfit_rms_n: beyond noise.
         parameters: base first.
-        parameter_shift: bias by missing physics.
         friction: Coulomb and viscous by direction; may be empty.
         held_out_rms_n: None if not tested.
         noticed: `notes` in JSON.
-        table: compared samples by column.
-        before: base parameters.
         chosen: causes of the last model by force.
         levels: existence, variables and cause of a difference [N].
     """

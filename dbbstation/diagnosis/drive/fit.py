@@ -170,7 +170,6 @@ def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.floa
 def _solved(
     rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return values and covariance of rows, target last, under priors."""
     rows = triangle_of(rows)  # which says the same in as many rows as columns
     norm = np.linalg.norm(rows[:, :-1], axis=0)
     norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere: its prior alone says what it is

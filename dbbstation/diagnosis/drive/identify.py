@@ -245,7 +245,6 @@ def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.flo
 def _numbers(
     explained: ExplainedDrive, values: dict[str, Value], known: dict[str, bool], limits: DriveLimits
 ) -> dict[str, DriveValue]:
-    """Return base parameters, and shifts of both directions."""
     nothing = {name: Value(float("nan"), float("inf"), unit) for name, unit in BASE_UNITS.items()}
     numbers = {name: _number((nothing | values)[name], is_known=known[name]) for name in (MASS, VISCOUS)}
     after = explained.after
@@ -286,7 +285,6 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
 
 
 def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[ModelStep]:
-    """Return models by step, fitted without the held-back stretch."""
     drive, settled = explained.drive, explained.settled
     by_name = {member.cause.name: member for member in settled.best.members}
     predicting = verdicts.predicting

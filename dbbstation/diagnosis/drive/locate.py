@@ -55,7 +55,6 @@ def locate(
 
 
 def _stretches(marked: NDArray[np.bool_], direction: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Return marked stretches, bridged over short gaps, split at reversals."""
     rows = np.flatnonzero(marked)
     if not len(rows):
         return []

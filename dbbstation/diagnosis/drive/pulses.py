@@ -175,6 +175,5 @@ def _peak(
 
 
 def _distinct(times: NDArray[np.float64], apart: float) -> list[float]:
-    """Return rising times with inseparable ones averaged."""
     rising = np.sort(times)
     return [float(part.mean()) for part in np.split(rising, np.flatnonzero(np.diff(rising) > apart) + 1)]

@@ -83,10 +83,8 @@ class Signals:
 
     Attributes:
         position_m: by a local parabola.
-        speed_m_s: its slope.
         acceleration_m_s2: of the low-passed position.
         cutoff_hz: of the band.
-        acceleration_noise_m_s2: rms by position noise.
         standing_m_s: speed of standstill.
         way: direction between turning points, +1 or -1, shape (n,).
         weight: zero for unknown forces, shape (n,).

@@ -315,7 +315,6 @@ class Verdicts:
         return ""
 
     def _no_cogging(self, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
-        """Return that no wave exists within the band."""
         scale, shortest = self._drive.scale, self._drive.shortest_wave_mm
         if not np.isfinite(shortest):
             return Verdict.NOT_TESTABLE, f"Within {scale.cutoff_hz:.3g} Hz no wave fits three times into the travel."

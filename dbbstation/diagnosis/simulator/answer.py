@@ -51,12 +51,8 @@ class RefittedOfSimulator:
     """A parameter of the simulator.
 
     Attributes:
-        stated: in the model file.
-        refitted: without terms.
-        corrected: with the found terms.
         shift_over_u: in standard uncertainties of the first; None if unknown.
         confounded: R² on the found terms; zero without.
-        not_told_apart_from: indistinguishable parameters.
     """
 
     name: str
@@ -265,7 +261,6 @@ is put in is not what these answers are about, and no term beside it is sure."""
 
 
 def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:
-    """Return departures from linearity per standard uncertainty, by term."""
     weigh, sigma = noise_of(found.settled)
     fitted, first, apart = found.node.fitted, len(work.model.parameters), {}
     known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in work.model.parameters])

@@ -48,7 +48,6 @@ class Candidate:
 
     Attributes:
         term: zero amplitude, mid-grid.
-        positive: amplitudes that cannot be negative.
         tried: sizes for forms that replace a signal; else empty.
         driven: signals that result from the simulation.
     """
@@ -220,7 +219,6 @@ def inner_quantiles(values: NDArray[np.float64], count: int) -> tuple[float, ...
 def _curve(
     port: SimulatorPort, values: NDArray[np.float64]
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
-    """Return a spline's names, units and knots by quantiles."""
     low, high = float(values.min()), float(values.max())
     room = 0.05 * (high - low)
     inner = inner_quantiles(values, INNER)

@@ -50,8 +50,6 @@ class SimulatorFit:
     Attributes:
         columns: per fitted number, shape (n, m).
         curved: difference of two doses, shape (m,).
-        squares: weighted, with priors.
-        starts: squares of other starts.
     """
 
     state: FittedState

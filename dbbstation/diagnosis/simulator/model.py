@@ -121,7 +121,6 @@ class SimulationRequest:
     """One simulation.
 
     Attributes:
-        records: return port signals.
         trial: other inputs, or None.
     """
 

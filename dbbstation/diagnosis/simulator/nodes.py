@@ -205,9 +205,7 @@ class Nodes:
     """Visited nodes by terms.
 
     Attributes:
-        begun: starts already used.
         bettered: terms with a later better minimum.
-        challenges: of the current search.
     """
 
     work: SimulationRuns
@@ -263,7 +261,6 @@ class Nodes:
         """Return a node with other terms; None if it runs away.
 
         Args:
-            settled: its comparison.
             beside: inserted members; None: the best hypothesis's.
         """
         beside = settled.best.members if beside is None else beside

@@ -48,7 +48,6 @@ class SearchOutcome:
 
     Attributes:
         is_settled: all moves are below a tenth of the uncertainty, and no further term is wanted.
-        refuted: rejected terms with reasons.
         withstood: curves replaced by names.
     """
 
@@ -202,7 +201,6 @@ def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], 
 
 
 def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidate]:
-    """Return possible replacements by linear comparison, best first."""
     members = [member for member in settled.best.members if member.cause.name in node.names]
     outside = {one.name: one for one in node.outside}
     causes = [cause for cause in settled.causes if cause.name in outside]

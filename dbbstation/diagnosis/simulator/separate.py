@@ -34,8 +34,6 @@ class SeparatingInput:
     """A recording that would distinguish two terms.
 
     Attributes:
-        part: stretch of largest difference.
-        sigmas: difference there in standard deviations.
         repeats: of that stretch until distinguished.
         input: best input in words; None if no tried input beats the recorded one.
         input_sigmas: difference under it, for equal length.
@@ -90,7 +88,6 @@ def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding
 
 
 def _wanted(found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> list[tuple[str, str]]:
-    """Return pairs with an inserted term first."""
     laws = {cause.name for cause in found.settled.causes}
     wanted: list[tuple[str, str]] = []
     for one in findings:

@@ -36,10 +36,7 @@ class Table:
         simulated: shape (n,).
         derivatives: of the simulated value by parameter name, shape (n,).
         columns: numeric, by name, shape (n,).
-        blocks: rows of each.
-        in_row_order: measured in row order.
         known: prior standard uncertainty by name.
-        has_offset: a constant difference is allowed.
     """
 
     measured: NDArray[np.float64]

@@ -185,7 +185,6 @@ def find_mismatch(
 
     Args:
         hold_out: repeat for each held-out part; takes most of the time.
-        lacking: physics not tested, with reasons.
         matters: size of interest, in the table's unit; None: the refitted residual.
 
     Raises:
@@ -275,7 +274,6 @@ def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:
-    """Return base parameters alone and beside findings, uncertainties as `read_off`."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
     alone = channel.fitted(channel.target, _noise_alone(channel))

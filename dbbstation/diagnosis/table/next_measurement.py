@@ -66,7 +66,6 @@ def _denser(found: Mismatch) -> Iterator[Next]:
 
 
 def _rest_of_turns(found: Mismatch) -> Iterator[Next]:
-    """Return followed angles without full turns."""
     led = {name for finding in found.there for name in finding.variables}
     for variable in found.settled.channel.variables:
         if variable.name in led and variable.period is not None and variable.extent < WHOLE * variable.period:

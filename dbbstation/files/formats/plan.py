@@ -328,7 +328,6 @@ def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: li
 
 
 def _check_tilt_unit(document: YamlDocument, faults: list[Problem]) -> None:
-    """Refuse a plan whose tilts are all in radians."""
     tilts = [
         ((*location, key), test[key])
         for location, test in document.entries("tests")

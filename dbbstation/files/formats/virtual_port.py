@@ -10,11 +10,7 @@ _NAMED = re.compile(rf"{_NAME}(?:, ([0-9]+(?:\.[0-9]+)?) times faster)?")
 
 
 def virtual_port(time_scale: float = 1.0) -> str:
-    """Return the port name of a virtual machine.
-
-    Args:
-        time_scale: speed relative to real time.
-    """
+    """Return the port name of a virtual machine."""
     return _NAME if time_scale == 1.0 else f"{_NAME}, {time_scale:g} times faster"
 
 

@@ -36,7 +36,6 @@ class DriveFile:
     """A drive's recording file.
 
     Attributes:
-        line: number of the header line.
         numbers: known columns by name, each of shape (n,), in the unit of the name.
         others: texts of further columns by name.
         warnings: findings that do not invalidate it.

@@ -67,7 +67,6 @@ class EventLog:
     Attributes:
         events: up to the first damaged line.
         end: bytes of these lines.
-        size: bytes of the file.
     """
 
     path: Path

@@ -55,7 +55,6 @@ class ForeignTable:
     Attributes:
         units: below the column names, by name; else empty.
         comments: `key: value` lines above the names, keys in small letters.
-        data: the whole file.
     """
 
     table: TableFile
@@ -155,7 +154,6 @@ def _without_last_separator(lines: list[str], separator: str) -> list[str]:
 
 
 def _heads_taken_out(body: list[str], names: int, language: NumberLanguage) -> tuple[list[str], tuple[int, ...]]:
-    """Return a table's lines without repeated heads, and where these are."""
     head = body[names].strip()
     again = [k for k in range(names + 1, len(body)) if body[k].strip() == head]
     kept = list(body)

@@ -142,7 +142,6 @@ def make_session_folder(
 
 
 def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
-    """Check a session's notes against format and plan before writing."""
     faults: list[Problem] = []
     document = parse_yaml(text, str(folder / SESSION_FILE), faults)
     session = None if document is None else validate(document, SessionFile, faults)

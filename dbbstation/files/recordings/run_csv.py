@@ -116,7 +116,6 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     """Parse the bytes of a run file into a checked recording.
 
     Args:
-        sha256: stored in the result.
         partial: return the good lines and warn of the others.
 
     Raises:

@@ -50,7 +50,6 @@ class Seal:
         files: SHA-256 by path as the session file names it.
         chain_sha256: last link; empty if there is none.
         events: number in the event log; zero without one.
-        anchor: link of the last event.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)

@@ -49,9 +49,7 @@ class Sealing:
     Attributes:
         chained: text with hashes and chain, and the old seal.
         files: run files that get a hash.
-        linked: runs that join the chain.
         logged: whether the session has an event log.
-        copies: damaged or missing copies.
     """
 
     path: Path
@@ -125,7 +123,6 @@ def _copies(seal: Seal) -> dict[str, str]:
 
 
 def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return the text with missing hashes added, and the files that got one."""
     faults: list[Problem] = []
     additions: list[tuple[int, str]] = []
     named = []
@@ -191,7 +188,6 @@ def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, t
 
 
 def _with_seal(text: str, seal: Seal) -> str:
-    """Return the text with the seal above the runs."""
     root = YAML(typ="safe", pure=True).compose(text)
     starts = {name.value: name.start_mark.index for name, _ in root.value}
     begin = starts.get("seal", starts.get("set_up_errors", starts["runs"]))

@@ -19,7 +19,6 @@ class SessionDetails:
     Attributes:
         bar_waiver: why the bar has no fresh calibration; empty if it has.
         set_up_errors: micrometer readings of balls under the spindle.
-        notes: oldest first.
         instrument: at the beginning; None: not noted.
     """
 

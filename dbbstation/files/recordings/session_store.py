@@ -74,7 +74,6 @@ def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict
 
 
 def _with_mark(data: Mapping[str, Any], state: Mapping[str, Any], events: int, sha256: str) -> dict[str, object]:
-    """Return data with the state's seal and the log's position: event count and last link."""
     return {**data, "seal": {**state["seal"], "log": {"events": events, "sha256": sha256}}}
 
 

@@ -98,9 +98,6 @@ class SessionWriter:
 
         A damaged session file is written anew from the log.
 
-        Args:
-            patience_s: waiting time for another writer.
-
         Raises:
             InputError: every fault of the session.
             OutputError: another process writes into it, or it cannot be written.

@@ -35,7 +35,6 @@ class TableFile:
     """One file of columns.
 
     Attributes:
-        header: number of the header line.
         names: in order.
         lines: number of each row's line, shape (n,).
         cells: texts by column, n each, with a decimal point.

@@ -102,7 +102,6 @@ def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) ->
 
 
 def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails) -> Problem:
-    """Put a pydantic complaint into plain words at its place."""
     location = _known_part(document, detail["loc"])
     kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == "missing":

@@ -30,7 +30,6 @@ class ProgramBlock:
 
     Attributes:
         codes: G and M codes by group.
-        comments: those without effect.
         message: a comment that LinuxCNC acts on; empty if none.
     """
 

@@ -42,7 +42,6 @@ class Depths(NamedTuple):
     Attributes:
         clear: R.
         bottom: Z, not above R.
-        back: where it ends.
         peck: Q; 0 without pecks.
     """
 

@@ -314,7 +314,6 @@ class Flow:
         return self._find(word, place, ("endwhile", "endrepeat", "while"))
 
     def _find(self, word: OLine, place: Place, keywords: tuple[str, ...]) -> OLine:
-        """Return the next O-word of this label with one of the keywords."""
         for each in self._labels[word.label]:
             if each.line > word.line and each.keyword in keywords:
                 return each

@@ -27,7 +27,6 @@ class ControlState:
     """Pose in machine coordinates, and offsets added to numbers.
 
     Attributes:
-        unit_mm: of lengths.
         system: number of the work system, from 1.
         g92: in force, shape (6,) [mm, deg].
         length: of the tool in force, shape (6,) [mm, deg].

@@ -171,9 +171,8 @@ def _ranking(reported: Reported) -> ShownCauses | None:
     ranked = reported.ranked
     if ranked is None:
         return None
-    return ShownCauses(
-        ranked.session, ranked.why_not, cause_rows(ranked, reported.coverage_factor), cured_polars(ranked), ranked.said
-    )
+    rows = cause_rows(ranked, reported.coverage_factor)
+    return ShownCauses(ranked.session, ranked.why_not, rows, cured_polars(ranked), ranked.said, ranked.picture)
 
 
 def _notes_before(reported: Reported) -> list[str]:

@@ -17,6 +17,7 @@ from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, ShownFigure, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.report.unexplained_panel import draw_unexplained
+from dbbstation.results.levels_text import place_of
 from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.diagnosis.per_test import GainOfTest
+    from dbbstation.inference.levels import Followed
     from dbbstation.diagnosis.source_curves import Branch, SourceCurves
 
 WIDTH_IN = 11.0
@@ -48,6 +50,7 @@ def diagnosis_figure(diagnosis: Diagnosis, wanted: Wanted = FigureFormat.SVG) ->
                 {
                     "residual": partial(draw, values=[one.residual_um for one in gains]),
                     "circularity": partial(draw, values=[one.circularity_um for one in gains]),
+                    "levels": partial(_levels, classes=_tested(diagnosis)),
                 }
             )
         return in_format(draw_diagnosis(diagnosis), wanted)
@@ -57,18 +60,39 @@ def draw_diagnosis(diagnosis: Diagnosis) -> ShownFigure:
     """Draw all non-empty parts, one below the other."""
     found = diagnosis.after is not diagnosis.before
     curves, gains, unnamed = source_curves(diagnosis), gains_by_test(diagnosis), diagnosis.unexplained.curve
-    heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), *([2.1] if unnamed else []), 4.6, 2.4]
+    classes = _tested(diagnosis)
+    own = [1.0 + 2.0 * ROW_IN * len(classes)] if classes else []
+    heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), *([2.1] if unnamed else []), 4.6, 2.4, *own]
     figure = ShownFigure(figsize=(WIDTH_IN, sum(heights) + 0.4), layout="constrained")
     figure.suptitle(_headline(diagnosis), fontsize=11, fontweight="bold")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, hspace=0.03)
     _maps(parts[0], diagnosis, found=found)
     for part, one in zip(parts[1:], curves, strict=False):
         _curves(part, one, None if one.source else diagnosis.unexplained.strut, found=found)
+    if classes:
+        _levels(parts[-1].subplots(), classes)
+        parts = parts[:-1]
     if unnamed is not None:
         draw_unexplained(parts[-3], unnamed)
     _traces(parts[-2], gains, found=found)
     _bars(parts[-1], diagnosis, gains, found=found)
     return figure
+
+
+def _tested(diagnosis: Diagnosis) -> list[Followed]:
+    return [one for one in diagnosis.levels.follows if one.before is not None and one.after is not None]
+
+
+def _levels(axes: Axes, classes: Sequence[Followed]) -> None:
+    """Draw each class's error in held-out tests before and after, by what it follows and where."""
+    place = np.arange(len(classes))
+    for off, colour, label in ((-0.2, BEFORE, "before"), (0.2, AFTER, "after")):
+        axes.barh(place + off, [getattr(one, label) for one in classes], 0.4, color=colour, label=label)
+    axes.set_yticks(place, [place_of(one) for one in classes])
+    axes.invert_yaxis()
+    axes.set_xlabel("error in tests left out, µm rms")
+    axes.set_title("what the difference follows, and where", loc="left")
+    axes.legend(loc="lower right")
 
 
 def _headline(diagnosis: Diagnosis) -> str:

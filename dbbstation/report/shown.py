@@ -36,6 +36,7 @@ class ShownCauses:
     rows: Sequence[CauseRow]
     polars: Sequence[TitledPolar]
     said: Sequence[str] = ()
+    picture: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,9 @@ LIKELY = 0.5
 MOST_LISTED = 4
 """Variables or laws that are listed by name, at the most."""
 
+BAR = 24
+"""Characters of the longest bar: a screen of 80 columns has as many for what it means."""
+
 WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in_time": "in time"}
 
 
@@ -51,6 +54,23 @@ def short_sentences(levels: Levels, unit: str, what: str) -> tuple[str, ...]:
         return (first,)
     told = [sentence.strip() for sentence in _followed(largest, unit, {}, "tests")]
     return (first, " ".join(told[:2] if told[1:] and told[1].startswith("Correcting") else told[:1]))
+
+
+def bars(levels: Levels, unit: str) -> list[str]:
+    """Return a picture in text: the error in held-out tests before and after, by what it follows and where."""
+    classes = [one for one in levels.follows if one.before is not None and one.after is not None]
+    sizes = [(word, size, one) for one in classes for word, size in (("before", one.before), ("after", one.after))]
+    per = BAR / max((size for _, size, _ in sizes if size), default=1.0)
+    return [
+        f"{'█' * max(round(per * (size or 0.0)), 1):{BAR}} {size:.2g} {unit} {word}: {place_of(one)}"
+        for word, size, one in sizes
+    ]
+
+
+def place_of(one: Followed) -> str:
+    """Return what a class follows, and its strut, also from its JSON."""
+    variables = " and ".join(" or ".join(names) for names in one.variables)
+    return ", ".join(text for text in (variables, getattr(one, "where", None)) if text)
 
 
 def no_correction(levels: Levels) -> str:
@@ -94,7 +114,7 @@ def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]
     ways = [WAYS[way] for way, probability in one.ways.items() if probability >= LIKELY]
     how = f"probability {one.probability:.3f}{''.join(f', {way}' for way in ways)}, {_size(one.rms, unit)} rms"
     also = f" These {rows} cannot tell it from {_listed(one.or_variables)}." if one.or_variables else ""
-    name = f"{one.name}, {one.where}" if one.where else one.name
+    name = place_of(one)
     happened = "Something happened in time" if one.name == TIME else f"It happened once: {name}"
     what = {
         FollowsAnswer.FOLLOWS: f"The difference follows {name}",

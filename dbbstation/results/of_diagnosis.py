@@ -12,6 +12,7 @@ from dbbstation.facts.by_name import ByName
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.results.diagnosis import BeforeAfter, CircularityLeft, DiagnosisFigures, DiagnosisResult
+from dbbstation.results.levels_text import bars
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -79,6 +80,7 @@ def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
         "ambiguous": list(groups.values()),
         "held_out_worse": figures.held_out_worse,
         "said": list(figures.said),
+        "picture": bars(figures.levels, "µm"),
         "verdicts": {one.name: one.verdict for one in figures.sources},
         "limits": [limit.text for limit in figures.limits],
     }

@@ -18,12 +18,14 @@ class Ranked:
     Attributes:
         why_not: reason if there are no causes; else empty.
         said: the model's diagnosis in two sentences; may be empty.
+        picture: its errors in held-out tests as lines of a picture; may be empty.
     """
 
     session: str = ""
     effects: tuple[CauseEffect, ...] = ()
     why_not: str = ""
     said: tuple[str, ...] = ()
+    picture: tuple[str, ...] = ()
 
 
 def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:

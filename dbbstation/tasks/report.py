@@ -201,7 +201,7 @@ def _ranked(
         return Ranked(why_not="The model has no cause that acts on these circles.")
     said = identified.report.get("diagnosis")
     said = said if isinstance(said, Mapping) else {}
-    told = tuple(str(one) for one in said.get("said", ()))
+    told, picture = (tuple(str(one) for one in said.get(name, ())) for name in ("said", "picture"))
     verdicts = said.get("verdicts", {})
     effects = tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in found)
-    return Ranked(", ".join(dict.fromkeys(names)), effects, said=told)
+    return Ranked(", ".join(dict.fromkeys(names)), effects, said=told, picture=picture)

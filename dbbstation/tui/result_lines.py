@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.facts.serialise import as_objects
+from dbbstation.results.levels_text import bars
 from dbbstation.results.words import (
     ending_sentences,
     fit_sentences,
@@ -38,6 +39,7 @@ def _calibrated(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as obj
 
 def _diagnosed(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
     yield from answer.said
+    yield from bars(answer.levels, "µm")
     yield mismatch_sentence(answer)
     for verdict, words in texts.VERDICT_WORDS.items():
         names = [cause.name for cause in answer.sources if cause.verdict == verdict]

@@ -66,7 +66,10 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         outliers=(),
         workspace=None,
         locations=(),
-        sources=tuple(SourceFinding(s.name, Verdict.IDENTIFIED, (), 9.0, 0.5, 2.0, 1.0, {}, "", 1.0) for s in sources)
+        sources=tuple(
+            SourceFinding(name=s.name, verdict=Verdict.IDENTIFIED, gain=9.0, concealed=0.5, probability=1.0, text="")
+            for s in sources
+        )
         if after is not before
         else (),
         unexplained=unexplained or Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."),

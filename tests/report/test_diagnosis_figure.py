@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -11,8 +12,10 @@ from matplotlib.figure import Figure
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint, Unexplained
 from dbbstation.diagnosis.shapes import READING, Follows
+from dbbstation.inference.levels import Followed, FollowsAnswer
 from dbbstation.report.diagnosis_figure import diagnosis_figure
 from dbbstation.report.unexplained_panel import draw_unexplained
+from dbbstation.results.panel import OnePanel
 from tests.diagnosis.joint_fits import joint_fit
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -46,6 +49,20 @@ def test_all_parts_of_what_was_found(drawn):
     assert {"residual of each test within its mounting", "circularity left of each test", "noise"} <= set(said)
     assert b"NaN" not in drawn
     assert b"nan" not in drawn
+
+
+def test_what_it_follows_where_and_what_tests_left_out_gain(found):
+    """Two classes, of which one was tested: two bars of the lengths that are given, and its name and strut."""
+    tested = Followed(
+        (("strut-speed-sign",),), (), FollowsAnswer.FOLLOWS, 1.0, {}, 3.0, ("backlash",), 4.0, 1.5, where="strut 3"
+    )
+    happened = Followed((("time",),), (), FollowsAnswer.HAPPENED, 1.0, {}, 1.0, ("bar-drift",))
+    one = replace(found, levels=replace(found.levels, follows=(tested, happened)))
+    said = texts(diagnosis_figure(one))
+    assert {"what the difference follows, and where", "strut-speed-sign, strut 3"} <= set(said)
+    axes = Figure().subplots()
+    diagnosis_figure(one, OnePanel(axes, "levels"))
+    assert [bar.get_width() for bar in axes.patches] == [4.0, 1.5]
 
 
 def test_same_diagnosis_same_bytes(found, drawn):

@@ -65,6 +65,7 @@ def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
         "limits": [],
         "second_start_agrees": True,
         "next_test": None,
+        "levels": {"follows": []},
     }
     lines = result_lines(SessionTask.DIAGNOSE, answer)
     assert lines[:2] == answer["said"]
@@ -78,6 +79,11 @@ def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
     more = result_lines(SessionTask.DIAGNOSE, answer | found)
     assert more[2] == "The kinematic model explains these circles (probability 0.4)."
     assert more[-1] == "measure next: a circle; this test would bring u of backlash to 1 instead of 4 µm"
+    followed = {"variables": [["strut-force"]], "where": "strut 2", "before": 4.0, "after": 1.0}
+    in_time = {"variables": [["time"]], "before": None, "after": None}  # it happened: no held-out test
+    lines = result_lines(SessionTask.DIAGNOSE, answer | {"levels": {"follows": [followed, in_time]}})
+    assert lines[2:4] == [f"{'█' * 24} 4 µm before: strut-force, strut 2", f"{'█' * 6:24} 1 µm after: strut-force, strut 2"]
+    assert "by 9.30 µm rms beyond noise" in lines[4]
 
 
 def test_the_greatest_correction_of_all_programs_is_told() -> None:

@@ -82,7 +82,10 @@ def test_a_diagnosis_lists_causes_by_what_is_known_of_them() -> None:
     followed = {"variables": [["strut-force"]], "where": "strut 2", "before": 4.0, "after": 1.0}
     in_time = {"variables": [["time"]], "before": None, "after": None}  # it happened: no held-out test
     lines = result_lines(SessionTask.DIAGNOSE, answer | {"levels": {"follows": [followed, in_time]}})
-    assert lines[2:4] == [f"{'█' * 24} 4 µm before: strut-force, strut 2", f"{'█' * 6:24} 1 µm after: strut-force, strut 2"]
+    assert lines[2:4] == [
+        f"{'█' * 24} 4 µm before: strut-force, strut 2",
+        f"{'█' * 6:24} 1 µm after: strut-force, strut 2",
+    ]
     assert "by 9.30 µm rms beyond noise" in lines[4]
 
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.diagnosis.per_test import GainOfTest
-    from dbbstation.inference.levels import Followed
     from dbbstation.diagnosis.source_curves import Branch, SourceCurves
+    from dbbstation.inference.levels import Followed
 
 WIDTH_IN = 11.0
 TRACES = 4

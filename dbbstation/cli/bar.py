@@ -28,7 +28,12 @@ if TYPE_CHECKING:
 @click.option(
     "--calibrator-mm", type=Finite(20, 2000), required=True, help="Its length on the certificate, at 20 degC."
 )
-@click.option("--calibrator-u-um", type=Finite(0, 100), required=True, help="Standard uncertainty of that: half of U.")
+@click.option(
+    "--calibrator-u-um",
+    type=Finite(0, 100),
+    required=True,
+    help="Standard uncertainty u of the calibrator's length (U/2).",
+)
 @click.option("--certified", required=True, metavar="YYYY-MM-DD", help="Date of the certificate.")
 @click.option("--certificate", default="", help="Number of the certificate, and who issued it.")
 @click.option("--temp-c", type=Finite(-30, 80), required=True, help="Temperature of the bar [degC].")
@@ -80,8 +85,7 @@ def bar(
     """Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
 
     Put the bar on the calibrator, a block of known length such as of Zerodur, and wait until it has the temperature of the
-    shop. The readings are averaged. What the bar reads too long or too short is noted and never taken off a recording. The fit of
-    `calibrate` knows it, with its uncertainty, and with what the bar grows by until it measures.
+    shop. The readings are averaged. The bar's error is noted; recordings are never corrected. `calibrate` accounts for this error, its uncertainty and the bar's growth since.
 
     \b
     Examples:

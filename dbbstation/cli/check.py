@@ -34,15 +34,13 @@ def _anchor(_context: click.Context, _option: click.Parameter, given: str | None
 @source_file_option
 @chosen_tests_options
 @circle_options
-@click.option(
-    "--instrument", metavar="NAME", help="Say what this instrument sees of the plans' circles at their feeds."
-)
+@click.option("--instrument", metavar="NAME", help="State the points per turn of this instrument at the plans' feeds.")
 @click.option("--profile", metavar="NAME", help="Variant of that instrument.")
 @click.option(
     "--anchor",
     metavar="HASH",
     callback=_anchor,
-    help="Say whether the sessions still hold what they did when this was noted.",
+    help="State whether the sessions were changed since this anchor was noted.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option(
@@ -75,10 +73,9 @@ def check(
     is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
 
     The summary of a session ends with its anchor, the link of the last event of its log. Note it elsewhere, as reports do: with
-    --anchor HASH, sixteen digits or more of it, a session is told whether anything was changed that stood there then.
+    --anchor HASH, sixteen digits or more of it, the command reports later changes.
 
-    With --instrument, each plan is told how many points per turn that instrument brings at the plan's feeds, and what is not
-    seen with them.
+    With --instrument, the command states the points per turn at each plan's feeds, and which figures they do not resolve.
 
     \b
     Examples:

@@ -46,7 +46,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     help="Start of the program after the session's start [s], for models that depend on time.",
 )
 @largest_correction_option
-@click.option("--machine", type=_FILE, help="Machine file: refuse if it says that the control corrects already.")
+@click.option("--machine", type=_FILE, help="Machine file; refused if its control already corrects.")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def compensate(
@@ -72,7 +72,7 @@ def compensate(
     force: bool,
     as_json: bool,
 ) -> None:
-    r"""Compensate an NC program: what it writes takes the real machine where PROGRAM means to go.
+    r"""Compensate an NC program, so that the real machine follows PROGRAM.
 
     Moves at feed are split into the longest pieces that keep the chord error. If the control is slower in such pieces, the
     output states about how much. --strict refuses the program instead.

@@ -37,7 +37,7 @@ _LOOK_S = 0.2
 @click.option(
     "--rate-hz",
     type=Finite(0.1, 100000.0),
-    help="Sampling rate [1/s], where it is not the instrument's usual one.",
+    help="Sampling rate [1/s], if it is not the usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
 @click.option(
@@ -90,8 +90,7 @@ def emulate(
     r"""Run a virtual hexapod with a ball bar, as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.
 
     Prints the port, and a control address on this computer that starts circles: one line of text per command, one line
-    of JSON per answer. Without --truth the machine has random kinematic errors of 0.1 mm. Its mountings, ball
-    coordinates, bar and readings scatter as plan and options say.
+    of JSON per answer. Without --truth the machine has random kinematic errors of 0.1 mm. Its mountings, ball coordinates, bar and readings scatter as stated in plan and options.
 
     \b
     Commands at the control address:

@@ -29,7 +29,7 @@ ONLY_OF = {
 
 @click.command()
 @click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
-@click.option("--task", "task", required=True, type=click.Choice(TASKS), help="What to do of every session.")
+@click.option("--task", "task", required=True, type=click.Choice(TASKS), help="Task for every session.")
 @click.option("--sources", metavar="A,B,...", help="Error sources, as `calibrate` and `diagnose` take them.")
 @source_file_option
 @click.option("--law-over-time", is_flag=True, help="As `calibrate` takes it.")
@@ -54,7 +54,7 @@ ONLY_OF = {
     type=click.Path(path_type=Path, file_okay=False),
     default=Path("fleet"),
     show_default=True,
-    help="Folder of the results; made where it is not there.",
+    help="Folder of the results; created if missing.",
 )
 @click.option(
     "--table",
@@ -66,7 +66,7 @@ ONLY_OF = {
 @click.option(
     "--scheduler", metavar="ADDRESS", default="", help="Dask scheduler that does it, such as tcp://server:8786."
 )
-@click.option("--apart", is_flag=True, help="Count each session without a serial number as a machine of its own.")
+@click.option("--apart", is_flag=True, help="Count each session without a serial number as a separate machine.")
 @click.option("--anew", is_flag=True, help="Work out again what is up to date.")
 @click.option("--force", is_flag=True, help="Replace an existing --table.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -95,8 +95,7 @@ def fleet(
 
     Writes into --out one table, TASK.csv, one page with a row for each machine, TASK.html, and what each session gave:
     everything as JSON, the model or the report. A session that fails is named and the others are done; the exit code is 1
-    then. What has the same inputs, options and program as before is not worked out again, so that work that was
-    interrupted goes on where it stopped.
+    then. Results with the same inputs, options and program are reused, so that interrupted work continues.
 
     \b
     Examples:

@@ -44,13 +44,13 @@ CONDITIONS = ("temperature", "operator", "job", "bar")
     "named",
     multiple=True,
     metavar="FILE=TEST-DIRECTION,...",
-    help="Which run a file is, such as old1.csv=a-ccw or old1.csv=a-ccw-2, where the file does not say it; of several, in order.",
+    help="Run of a file that does not state it, such as old1.csv=a-ccw or old1.csv=a-ccw-2; several in order.",
 )
 @click.option(
     "--started",
     multiple=True,
     metavar="[FILE=]TIME",
-    help="When the first run of a file was taken, such as 2026-11-20T08:04+01:00, where the file does not say it.",
+    help="Start of a file's first run, such as 2026-11-20T08:04+01:00, if the file does not state it.",
 )
 @click.option(
     "--trust",
@@ -63,10 +63,10 @@ CONDITIONS = ("temperature", "operator", "job", "bar")
     "--not-known",
     multiple=True,
     type=click.Choice(CONDITIONS),
-    help="A condition that nobody knows any more; the session notes that. May be given more than once.",
+    help="A condition that is unknown; the session notes this. May be given more than once.",
 )
 @click.option("--yes", is_flag=True, help="Write without asking.")
-@click.option("--dry-run", is_flag=True, help="Show what would be written, try it out, and write nothing.")
+@click.option("--dry-run", is_flag=True, help="Try the import and show the result without writing it.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def import_(
     files: tuple[Path, ...],
@@ -85,9 +85,7 @@ def import_(
 ) -> None:
     r"""Take recordings that another program made into a sealed session.
 
-    Tables with angle or time, and deviation or length. What the columns mean is guessed from their names, shown, and kept in the
-    file of --mapping for the next time. What the files do not say is asked for on a terminal; in a pipe it has to be given. What is
-    computed, such as times from angles at the plan's feed, is said and noted in the session. The files as they came, the mapping
+    Tables with angle or time, and deviation or length. The program guesses the columns' meanings from their names, shows them, and keeps them in the file of --mapping. Missing facts are asked for on a terminal; in a pipe they must be given. Computed values, such as times from angles at the plan's feed, are reported and noted in the session. The files as they came, the mapping
     and all statements stay in the session's folder `imported`.
 
     \b

@@ -40,7 +40,7 @@ def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
         click.option(
             "--zero-mm",
             type=Finite(20.0, 2000.0),
-            help="Distance between the ball centres at which an instrument that has no room for it shows zero [mm].",
+            help="Distance between the ball centres at zero of a short display [mm].",
         ),
     )
 
@@ -59,7 +59,7 @@ def instrument_options(*, required: bool) -> Callable[[_Function], _Function]:
             "--baud",
             setting="baud",
             type=click.IntRange(min=1),
-            help="Baud rate, where the instrument is not set to the usual one.",
+            help="Baud rate, if the instrument is not set to the usual one.",
         ),
     )
     return lambda function: of_protocol(of_line(function))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("name", required=False)
-@click.option("--profile", metavar="NAME", help="Variant of the instrument; the usual one where none is named.")
+@click.option("--profile", metavar="NAME", help="Variant of the instrument; by default the usual one.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None:
     """List the instruments that are known, or show one: NAME, or a protocol file.

@@ -72,9 +72,7 @@ def jig() -> None:
 @click.option(
     "--coverage", "coverage", type=Finite(0.5, 5), help="Coverage factor of the sheet's uncertainties, 2 for U (k = 2)."
 )
-@click.option(
-    "--u-um", type=Finite(0.01, 1000), help="Standard uncertainty of a coordinate where the sheet states none [µm]."
-)
+@click.option("--u-um", type=Finite(0.01, 1000), help="Standard uncertainty of coordinates without a stated one [µm].")
 @click.option("--cmm-temp-c", type=Finite(-30, 80), help="Temperature of the plate while it was measured [degC].")
 @click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Jig file to write.")
 @_FORCE
@@ -99,7 +97,7 @@ def sheet(
 ) -> None:
     """Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
 
-    Coordinates are in the jig's frame. Plate and holders are those of --before. Uncertainties of three axes become one, their root mean
+    Coordinates are in the jig's frame. Plate and holders come from --before. Uncertainties of three axes become one, their root mean
     square: a jig file has one per ball. Each ball is shown with its change against the jig before.
 
     \b
@@ -162,7 +160,7 @@ def sheet(
 @_COLUMN
 @_as_written
 @_UNIT
-@click.option("--holder", help="Holder that all rows are of, where the table does not say it.")
+@click.option("--holder", help="Holder of all rows, if the table does not state it.")
 @click.option(
     "--cmm-repeatability-um",
     type=Finite(0, 100),

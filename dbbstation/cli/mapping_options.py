@@ -34,7 +34,7 @@ AS_WRITTEN = (
         "--separator",
         type=click.Choice([*SIGNS, *SIGNS.values()]),
         metavar="[comma|semicolon|tab]",
-        help="What stands between columns  [likewise].",
+        help="Separator of columns  [likewise].",
     ),
     click.option(
         "--encoding",
@@ -49,18 +49,16 @@ _OPTIONS = (
         "--mapping",
         "mapping_file",
         type=click.Path(path_type=Path, dir_okay=False),
-        help="What the columns mean: read where the file exists, written there for the next time where it does not.",
+        help="Meaning of the columns: read if the file exists, else written for the next time.",
     ),
     click.option(
         "--columns",
         "columns",
         multiple=True,
         metavar="NAME=MEANING:UNIT",
-        help="What a column is, such as Winkel=angle:deg, Abw=deviation:µm, T1=bar_temp_c:degC or Nr=ignored.",
+        help="Meaning of a column, such as Winkel=angle:deg, Abw=deviation:µm, T1=bar_temp_c:degC or Nr=ignored.",
     ),
-    click.option(
-        "--angle-zero-deg", type=Finite(-720, 720), help="Angle in the machine, from +X to +Y, where the files have 0."
-    ),
+    click.option("--angle-zero-deg", type=Finite(-720, 720), help="Machine's angle, from +X to +Y, at the files' 0."),
     click.option(
         "--angle-grows",
         type=click.Choice(["ccw", "cw", "travel"]),
@@ -69,7 +67,7 @@ _OPTIONS = (
     click.option(
         "--angle-span-deg",
         type=Finite(300, 3600),
-        help="What the angles of a run span, where that is neither a turn nor the plan's path; one turn of it counts.",
+        help="Span of a run's angles, if it is neither a turn nor the plan's path; one turn of it counts.",
     ),
     click.option(
         "--trace",
@@ -82,10 +80,10 @@ _OPTIONS = (
         help="Several runs in a file: parted by gaps (pauses, times that begin anew, empty lines), or where the angles turn round.",
     ),
     click.option(
-        "--zone", metavar="ZONE", help="Time zone of dates that have none, such as +01:00  [default: this computer's]."
+        "--zone", metavar="ZONE", help="Time zone of dates without one, such as +01:00  [default: this computer's]."
     ),
     click.option("--zero-mm", type=Finite(20, 2000), help="Length of the bar at which the deviation is 0 [mm]."),
-    click.option("--file-name", metavar="PATTERN", help="What names of files say, such as '{test}_{direction}'."),
+    click.option("--file-name", metavar="PATTERN", help="Pattern of file names, such as '{test}_{direction}'."),
     *AS_WRITTEN,
 )
 

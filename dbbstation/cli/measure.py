@@ -57,7 +57,7 @@ _AUTO_PATIENCE_S = 60.0
 @click.option(
     "--rate-hz",
     type=Finite(0.1, 100000.0),
-    help="Sampling rate [1/s], where it is not the instrument's usual one.",
+    help="Sampling rate [1/s], if it is not the usual one.",
 )
 @programs_option
 @spy_option

@@ -29,7 +29,7 @@ _GATE = click.option(
     type=click.Choice(GATES),
     default="plan",
     show_default=True,
-    help="What is repeated at the end to show drift, where the plan names nothing: the first test, or that of each holder.",
+    help="Test repeated at the end to show drift, if the plan names none: the first one, or the first of each holder.",
 )
 
 

@@ -14,9 +14,7 @@ KINDS = ("polar", "deviation", "spectrum", "map", "compare")
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option(
-    "--kind", type=click.Choice(KINDS), default="polar", show_default=True, help="What to show of the circles."
-)
+@click.option("--kind", type=click.Choice(KINDS), default="polar", show_default=True, help="Kind of figure.")
 @filter_option
 @chosen_tests_options
 @figure_option("Write the figure here", "--out", required=True)
@@ -35,7 +33,7 @@ def plot(
 ) -> None:
     r"""Draw measured circles: one figure with a title block, as SVG, PNG or PDF.
 
-    Both directions of a test stand in one picture, repeats as thin lines. The title block has machine, plan, dates of the
+    Both directions of a test share a picture, repeats as thin lines. The title block has machine, plan, dates of the
     runs, bar, operator, filter and program.
 
     \b

@@ -33,8 +33,7 @@ def predict(
     r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
     Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
-    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that hangs on what the
-    calibration could not determine is left empty, and u_not_known_because says why; joint_tolerance_mm in the machine file
+    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that depends on undetermined parameters is left empty, with the reason in u_not_known_because; joint_tolerance_mm in the machine file
     of the calibration bounds it.
 
     \b

@@ -20,7 +20,7 @@ from dbbstation.cli.output import echo
     "--zero-mm",
     type=Finite(20.0, 2000.0),
     default=None,
-    help="Length at which an instrument that has no room for it shows zero [mm]; without, lengths count from there.",
+    help="Length at zero of a short display [mm]; without it, lengths count from zero.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: float | None, as_json: bool) -> None:

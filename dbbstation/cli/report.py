@@ -16,17 +16,13 @@ from dbbstation.cli.shared_options import chosen_tests_options, source_file_opti
 @click.option(
     "--model", type=click.Path(path_type=Path), help="Model file of `calibrate` or `diagnose`, to put beside."
 )
-@click.option(
-    "--job", default="", help="What was measured for, where the session does not say it or says something else."
-)
+@click.option("--job", default="", help="Job or reason of the measurement, in place of the session's.")
 @click.option(
     "--place",
     default="",
-    help="Where it was measured: a certificate names it  [on a terminal it is asked for with --certificate].",
+    help="Place of the measurement, which a certificate needs  [with --certificate a terminal asks for it].",
 )
-@click.option(
-    "--certificate", is_flag=True, help="Refuse to write where something that a certificate needs is not known."
-)
+@click.option("--certificate", is_flag=True, help="Refuse to write if a certificate lacks a fact.")
 @source_file_option
 @chosen_tests_options
 @click.option(
@@ -59,9 +55,9 @@ def report(
 ) -> None:
     r"""Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
 
-    Its first page holds the circles against the tolerances of the shop's settings and says what to do. Then come
+    Its first page compares the circles with the tolerances of the shop's settings and states what to do. Then come
     conditions, polar traces, figures with U, findings of every run, with --model what it leaves and could not see, and all
-    files with their SHA-256. With --before both sessions stand side by side as measured. The figures are those of
+    files with their SHA-256. With --before both sessions are shown side by side as measured. The figures are those of
     `circles` and `evaluate`.
 
     \b

@@ -89,7 +89,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
 @session.command()
 @_FOLDER
 @_RUN
-@click.option("--reason", help="Why, where the run cannot be used as it is; it stands in the session file and its log.")
+@click.option("--reason", help="Reason; required for runs with lost samples or no circle.")
 @_JSON
 def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None:
     """Accept a run that was rejected or not judged, such as a-cw-2.
@@ -108,7 +108,7 @@ def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None
 @session.command()
 @_FOLDER
 @_RUN
-@click.option("--reason", required=True, help="Why, in a few words; it stands in the session file.")
+@click.option("--reason", required=True, help="Reason, for the session file.")
 @_JSON
 def reject(folder: Path, run: str, *, reason: str, as_json: bool) -> None:
     """Reject a run, such as a-cw-2, and note why. Its recording is kept; no command uses it any more.
@@ -154,17 +154,15 @@ def take_in(folder: Path, *, as_json: bool) -> None:
 
 @session.command()
 @_FOLDER
-@click.option("--reason", required=True, help="Why, in a few words; it stands in the session file.")
+@click.option("--reason", required=True, help="Reason, for the session file.")
 @click.option("--plan", type=click.Path(path_type=Path), help="Plan that takes the place of the session's.")
 @click.option("--machine", type=click.Path(path_type=Path), help="Machine that takes the place of the session's.")
 @_JSON
 def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None, as_json: bool) -> None:
     """Change what was sealed on purpose, and note why.
 
-    Plan and machine of a session are sealed when it is made: a change without a note is refused by every command. This takes the
-    session as it stands now, with another plan or machine where they are given. The file as it was stays in the folder
-    `sealed`. The session file says what was changed, when and why, with both hashes; `dbbstation check` shows it. A list of runs
-    that was changed by hand is taken as it stands in the same way.
+    Plan and machine of a session are sealed when it is made: a change without a note is refused by every command. This accepts the session as it is, with another plan or machine if given. The file as it was stays in the folder
+    `sealed`. The session file says what was changed, when and why, with both hashes; `dbbstation check` shows it. A list of runs that was changed by hand is accepted in the same way.
 
     \b
     Examples:
@@ -193,13 +191,12 @@ def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None,
 
 @session.command()
 @_FOLDER
-@click.option("--dry-run", is_flag=True, help="Say which runs would get a hash, and write nothing.")
+@click.option("--dry-run", is_flag=True, help="List the runs that would get a hash, without writing.")
 @_JSON
 def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
     """Seal a session that was recorded elsewhere.
 
-    A session file written by hand needs no hashes. This adds one for each run that has none, for machine, plan and jig, and a
-    chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
+    A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
     `sealed`. From then on a changed recording or plan is noticed, and runs that were taken out or exchanged.
 
     \b
@@ -281,7 +278,7 @@ def log(folder: Path, *, as_json: bool) -> None:
 def rebuild(folder: Path, *, as_json: bool) -> None:
     """Write the session file anew, as the event log has it.
 
-    For a session file that was spoilt, is gone, or was edited by mistake. What stands there now is kept in the folder `sealed`.
+    For a session file that was spoilt, is gone, or was edited by mistake. The present file is kept in the folder `sealed`.
     The recordings are not touched.
 
     \b

@@ -44,10 +44,8 @@ SHIPPED = "shipped"
 def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
     r"""Show the shop's settings: every key, its value, and the file and line that it comes from.
 
-    Settings are looked for in `dbbstation-settings.yaml` beside SESSION, in the folder that holds it, or in the working
-    folder where a command takes no session. Then in `settings.yaml` in the user's configuration folder. The first file
-    that has a key decides. `dbbstation --settings FILE` reads that file alone. An option on the command line holds over
-    all of them, and each command says which options it took from settings.
+    Settings are looked for in `dbbstation-settings.yaml` beside SESSION, in the folder that holds it, or in the working folder if a command takes no session. Then in `settings.yaml` in the user's configuration folder. The first file
+    that has a key decides. `dbbstation --settings FILE` reads that file alone. An option on the command line overrides them, and each command reports the options that it took from settings.
 
     \b
     Examples:

@@ -30,8 +30,7 @@ WIDTH = 110
 def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[Path, ...], as_json: bool) -> None:
     r"""List the causes of error that are known, or show one: NAME.
 
-    Each says what it is, how it shows in the recordings, how to confirm and to cure it, its equation and where that
-    comes from, what it needs, and how exactly real machines follow its formula.
+    Each has a description, its symptoms in recordings, a way to confirm and to cure it, its equation with source, its needs, and how exactly real machines follow its formula.
 
     \b
     Examples:

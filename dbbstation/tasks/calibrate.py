@@ -37,7 +37,7 @@ def calibrate(
     ] = None,
     source_files: o.SourceFiles = (),
     law_over_time: Annotated[
-        bool, Option("Fit thermal growth as a function of time, even where temperatures were logged.")
+        bool, Option("Fit thermal growth as a function of time, even if temperatures were logged.")
     ] = False,
     method: Annotated[
         Literal["jig", "conv-a", "conv-b"],

@@ -28,7 +28,7 @@ def circles(
     filter: o.Filter = "none",  # noqa: A002 - the standard's word
     findings: Annotated[bool, Option("Judge every run too: number, limit, verdict.")] = False,
     model: Annotated[
-        o.Model | None, o.model("Expect circles where this model has them; with --findings.", only_with="findings")
+        o.Model | None, o.model("Model that predicts the circles; with --findings.", only_with="findings")
     ] = None,
     quick_look: Annotated[
         bool, Option("Look for the classical signatures of serial axes: symptoms, no causes here.")

@@ -36,8 +36,7 @@ def compare(
 ) -> ComparisonResult:
     r"""Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
 
-    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. What is
-    stated of noise, mountings, CMM sheets and bars is no difference. Error sources that may have changed, balls and bars that
+    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. Stated noise, scatter of mountings, and uncertainty of CMM sheets and bars do not count as a difference. Error sources that may have changed, balls and bars that
     sit elsewhere, and effects without a name compete by their probability, as in `diagnose`.
 
     \b

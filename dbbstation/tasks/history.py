@@ -29,19 +29,19 @@ def history(
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     source_files: o.SourceFiles = (),
-    anew: Annotated[bool, Option("Read every session anew, whatever the index knows.")] = False,
+    anew: Annotated[bool, Option("Ignore the index and read every session again.")] = False,
     tolerances: Sequence[Tolerance] = (),
     coverage_factor: float = 2.0,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> HistoryResult:
-    r"""Show what the sessions of a folder say over time, machine by machine, and what changed beyond uncertainty.
+    r"""Show the figures of a folder of sessions over time, machine by machine, and changes beyond uncertainty.
 
     Of every test and direction G, centre X and Y, mean radial error R and centre distance C; parameters of models that lie in
-    the folder and come from one of its sessions. Limits are those of the shop's settings. A two-sided CUSUM with a limit for
+    the folder and come from one of its sessions. Limits come from the shop's settings. A two-sided CUSUM with a limit for
     single sessions watches each quantity, from its second session on; the rate of false alarms is that of the whole table.
-    No model is fitted. What was read is kept in an index in the user's cache folder.
+    No model is fitted. Results are kept in an index in the user's cache folder.
 
     \b
     Examples:

@@ -129,7 +129,7 @@ def mismatch(
         ),
     ] = None,
     free: Annotated[
-        Names, Option("Parameters of which nothing is known, such as initial states.", metavar="NAME,...")
+        Names, Option("Parameters without prior knowledge, such as initial states.", metavar="NAME,...")
     ] = (),
     matters: Annotated[
         float | None,
@@ -140,7 +140,7 @@ def mismatch(
             above=0.0,
         ),
     ] = None,
-    offset: Annotated[bool, Option("Let no constant lie between measured and simulated values.")] = True,
+    offset: Annotated[bool, Option("Do not fit a constant difference.")] = True,
     held_out: Annotated[bool, Option("Leave out the held-out test, which takes most of the time.")] = True,
     decimal: o.Decimal = None,
     separator: o.Separator = None,
@@ -149,10 +149,10 @@ def mismatch(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> MismatchResult | SimulatorResult:
-    r"""Find where a simulation and a recording differ, in what form, and what was left out of the simulation.
+    r"""Find where a simulation and a recording differ, in what form, and which physics the simulation lacks.
 
     A row of the table is one measured value beside the simulated one, with everything that was known then: joint angles,
-    positions, loads, temperatures, the time. Units stand at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
+    positions, loads, temperatures, the time. Units are at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
     Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
 
     With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself: it says at which

@@ -59,7 +59,7 @@ Decimal = Annotated[
 Separator = Annotated[
     Literal["comma", "semicolon", "tab", ",", ";", "\t"] | None,
     Option(
-        "What stands between the columns of the table  [default: comma; semicolon with a decimal comma].",
+        "Separator of the table's columns  [default: comma; semicolon with a decimal comma].",
         setting="numbers.separator",
         metavar="[comma|semicolon|tab]",
     ),

@@ -20,7 +20,7 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
 @click.option(
     "--machines", default=500, show_default=True, type=click.IntRange(min=10), help="Random machines per plan."
 )
-@click.option("--plan", type=click.Choice(sorted(PLANS)), help="One of the two plans only.")
+@click.option("--plan", type=click.Choice(sorted(PLANS)), help="Only one of the two plans.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option(
     "--part",

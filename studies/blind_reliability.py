@@ -80,7 +80,7 @@ def reliability(said: Sequence[Forecast]) -> dict[str, list[dict[str, Any]]] | N
     if not said:
         return None
     groups = {title: [one for one in said if belongs(one)] for title, belongs in _GROUPS.items()}
-    return {title: _table(group) for title, group in groups.items() if group}
+    return {title: bins_of(group) for title, group in groups.items() if group}
 
 
 def sure(said: Sequence[Forecast]) -> dict[str, Any]:
@@ -107,7 +107,7 @@ _GROUPS: dict[str, Callable[[Forecast], bool]] = {
 }
 
 
-def _table(said: Sequence[Forecast]) -> list[dict[str, Any]]:
+def bins_of(said: Sequence[Forecast]) -> list[dict[str, Any]]:
     """Return one entry per bin, lower edge included."""
     place = np.digitize([one.probability for one in said], BINS[1:-1])
     table = []

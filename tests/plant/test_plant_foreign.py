@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.plant.foreign.judge import judge
-from tests.plant.foreign.levels import levels_of, table_of
+from tests.plant.foreign.levels import calibration_of, levels_of, table_of
 from tests.plant.foreign.score import compare
 from tests.plant.foreign.sessions import KINDS, LEAST_SIZE, kind_of, make, small_machine
 from tests.plant.machine import reference_machine
@@ -125,10 +125,14 @@ def test_levels_are_scored_by_variables_that_were_put_in() -> None:
     }
 
     def one(variable: str, said: str = "follows") -> dict[str, Any]:
-        return {"variables": [[variable]], "or_variables": [], "answer": said, "before": 2.0, "after": 1.0}
+        sure = 1.0 if said == "follows" else 0.6
+        tested = {"before": 2.0, "after": 1.0}
+        return {"variables": [[variable]], "or_variables": [], "answer": said, "probability": sure, **tested}
 
     follows = [one("travel since its reversal"), one("tilt of the platform"), one("strut-force", "undecided")]
-    row = levels_of(answer, {"levels": {"differs": {"answer": "yes"}, "follows": follows}})
+    sources = [{"name": name, "verdict": "identified", "probability": 0.97} for name in ("backlash", "play")]
+    said = {"differs": {"answer": "yes", "probability": 1.0}, "follows": follows}
+    row = levels_of(answer, {"levels": said, "sources": sources})
     assert row["located"] == ["backlash"]
     assert row["wrong_classes"] == ["tilt of the platform"]
     assert len(row["classes"]) == 2
@@ -137,3 +141,7 @@ def test_levels_are_scored_by_variables_that_were_put_in() -> None:
     assert table["figures"]["effects that a class follows"][0] == "1 of 2"
     assert table["figures"]["classes that no effect follows"][0] == "1 of 2"
     assert table["figures"]["listed causes that were named"][0] == "1 of 2"
+    table, drawn = calibration_of({"0001": scored}, {"command": "c", "date": "2026-11-27", "seed": 1})
+    assert [cell.split(",")[0] for cell in table["figures"]["0.95 to 1"]] == ["1 of 1", "1 of 2", "1 of 2"]
+    assert [cell.split(",")[0] for cell in table["figures"]["0.5 to 0.8"]] == ["0 of 0", "1 of 1", "0 of 0"]
+    assert drawn.count(b"which cause") == 1

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.plant.foreign.judge import commit_of, judge
-from tests.plant.foreign.levels import table_of
+from tests.plant.foreign.levels import calibration_of, table_of
 from tests.plant.foreign.score import as_table, scored
 from tests.plant.foreign.sessions import make
 
@@ -37,6 +37,8 @@ def main() -> None:
     parser.add_argument(
         "--levels", type=Path, help="score: write recall and precision of each level here, of one commit"
     )
+    parser.add_argument("--calibration", type=Path, help="score: write how often the levels' probabilities come true")
+    parser.add_argument("--diagram", type=Path, help="score: draw that here as SVG")
     given = parser.parse_args()
     numbers = _numbers(given.only) or list(range(1, given.count + 1))
     if given.task == "make":
@@ -55,11 +57,15 @@ def main() -> None:
         if given.out:
             given.out.parent.mkdir(parents=True, exist_ok=True)
             given.out.write_text(_text(as_table(figures, given.limits)), encoding="utf-8")
+        head, each = {key: figures[key] for key in ("date", "seed")}, figures["commits"][given.of[0]]["each"]
         if given.levels:
-            head = {key: figures[key] for key in ("date", "seed")}
             head["command"] = "python -m tests.plant.foreign make|run|score FOLDER --levels FILE"
-            table = table_of(figures["commits"][given.of[0]]["each"], head, given.limits)
-            given.levels.write_text(_text(table), encoding="utf-8")
+            given.levels.write_text(_text(table_of(each, head, given.limits)), encoding="utf-8")
+        if given.calibration and given.diagram:
+            head["command"] = "python -m tests.plant.foreign make|run|score FOLDER --calibration FILE --diagram FILE"
+            table, drawn = calibration_of(each, head)
+            given.calibration.write_text(_text(table), encoding="utf-8")
+            given.diagram.write_bytes(drawn)
 
 
 def _text(figures: dict[str, Any]) -> str:

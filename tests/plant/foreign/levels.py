@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from studies.blind_figure import reliability_figure
+from studies.blind_reliability import Forecast, bins_of, forecasts
 from tests.diagnosis.table.levels_study import interval
 
 if TYPE_CHECKING:
@@ -14,6 +16,8 @@ SAID = ("follows", "goes on in time", "happened")
 
 UNLISTED = {"wandering-bar": {"time"}, "stick-slip": {"strut-speed-sign", "reversal"}}
 """Variables of what is on no list."""
+
+LEVELS = ("differs", "follows", "which cause")
 
 REVERSAL = {"strut-speed-sign", "reversal"}
 MEANS = {
@@ -44,14 +48,20 @@ def levels_of(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> dict[str
         return {}
     effects = {one["name"]: set(one.get("variables") or UNLISTED[one["name"]]) for one in answer["effects"]}
     classes = [one for one in said["follows"] if one["answer"] in SAID]
-    told = [set[str]().union(*(MEANS.get(name, {name}) for name in _names(one))) for one in classes]
+    told = [told_of(one) for one in classes]
     every = set[str]().union(*effects.values())
+    listed = {one["name"] for one in answer["effects"] if one.get("listed", True)}
     return {
         "differs": said["differs"]["answer"],
         "effects": sorted(effects),
         "located": sorted(name for name, own in effects.items() if any(own & one for one in told)),
         "classes": [" and ".join(_names(one)) for one in classes],
         "wrong_classes": [" and ".join(_names(one)) for one, own in zip(classes, told, strict=True) if not own & every],
+        "forecasts": {
+            "differs": [[said["differs"]["probability"], bool(effects)]],
+            "follows": [[one["probability"], bool(told_of(one) & every)] for one in said["follows"]],
+            "which cause": [[one.probability, one.right] for one in forecasts(summary["sources"], listed)],
+        },
         "held_out_um": [[one["before"], one["after"]] for one in classes if one["before"] is not None],
     }
 
@@ -90,6 +100,35 @@ def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], lim
         "columns": ["counted", "share", "95 % interval"],
         "figures": figures,
     }
+
+
+def calibration_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
+    """Return how often each level's probabilities come true, in the form of the validation page, and as a diagram."""
+    every = [row["levels"]["forecasts"] for row in rows.values() if row["levels"]]
+    bins = {
+        level: bins_of([Forecast(p, None, right, perturbed=True) for one in every for p, right in one[level]])
+        for level in LEVELS
+    }
+    return {
+        "question": "Do the probabilities of the three levels of circles come true?",
+        **head,
+        "data": f"{len(every)} sessions of two simulated robots whose laws are not the program's own.",
+        "limits": "Cells: right of all with such a probability, and the 95 % interval of their share.",
+        "columns": list(LEVELS),
+        "figures": {
+            f"{of[0]['from']:g} to {of[0]['to']:g}": [
+                f"{one['hits']} of {one['count']}"
+                + (f", {interval(one['hits'], one['count'])}" if one["count"] else "")
+                for one in of
+            ]
+            for of in zip(*bins.values(), strict=True)
+        },
+    }, reliability_figure(bins)
+
+
+def told_of(one: Mapping[str, Any]) -> set[str]:
+    """Return the plant's variables that a class stands for."""
+    return set[str]().union(*(MEANS.get(name, {name}) for name in _names(one)))
 
 
 def _names(one: Mapping[str, Any]) -> Sequence[str]:

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 _UNITS = ("mm", "µm", "um", "m", "inch", "mil", "µinch")
 _SHEET = click.argument("sheet", type=click.Path(path_type=Path), metavar="SHEET")
 _UNIT = click.option(
-    "--unit", type=click.Choice(_UNITS), help="Of a table's coordinates  [default: as the sheet says, else mm]."
+    "--unit", type=click.Choice(_UNITS), help="Unit of a table's coordinates  [default: as the sheet says, else mm]."
 )
 _U_UNIT = click.option(
     "--u-unit",
     type=click.Choice(_UNITS),
-    help="Of its uncertainties, such as µm beside mm  [default: as the sheet says, else that of coordinates].",
+    help="Unit of the uncertainties, such as µm beside mm  [default: as in the sheet, else the coordinates' unit].",
 )
 _COLUMN = click.option(
     "--columns",
@@ -67,7 +67,7 @@ def jig() -> None:
 @_UNIT
 @_U_UNIT
 @click.option(
-    "--names", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig that the sheet calls otherwise."
+    "--names", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig with another name in the sheet."
 )
 @click.option(
     "--coverage", "coverage", type=Finite(0.5, 5), help="Coverage factor of the sheet's uncertainties, 2 for U (k = 2)."

@@ -22,7 +22,7 @@ def loss_option(function: _Function) -> _Function:
         "--largest-loss-percent",
         setting="limits.largest_loss_percent",
         type=Finite(0.0, 100.0),
-        help="A run that lost more of its samples is repeated [%]  [default: what the plan says, or 0.5].",
+        help="A run that lost more of its samples is repeated [%]  [default: the plan's, else 0.5].",
     )(function)
 
 

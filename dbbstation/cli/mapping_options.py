@@ -39,7 +39,7 @@ AS_WRITTEN = (
     click.option(
         "--encoding",
         type=click.Choice(["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"]),
-        help="Encoding of the files  [default: utf-8; sheets are looked at].",
+        help="Encoding of the files  [default: utf-8; detected for sheets].",
     ),
 )
 """How tables are written."""

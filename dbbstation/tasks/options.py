@@ -30,7 +30,7 @@ SourceFiles = Annotated[
         metavar="FILE.py",
     ),
 ]
-HeldOut = Annotated[bool, Option("Leave out the held-out tests: causes are then not asked to predict others.")]
+HeldOut = Annotated[bool, Option("Leave out the held-out tests, so that causes need not predict other tests.")]
 Filter = Annotated[
     Literal["none", "15", "30", "50", "150"],
     Option(

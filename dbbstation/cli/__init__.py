@@ -158,11 +158,7 @@ def _with_new_name(problem: click.ClickException) -> click.ClickException:
 
 
 def _invoked(context: click.Context) -> object:
-    """Return what a command returns.
-
-    Raises:
-        StationError: code of somebody else, such as a user's source, has ended the program.
-    """
+    """Return what a command returns."""
     try:
         return cli.invoke(context)
     except SystemExit as left:

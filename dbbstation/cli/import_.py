@@ -201,12 +201,7 @@ def _read(
 
 
 def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
-    """Ask for confirmation.
-
-    Raises:
-        click.UsageError: nobody is there to confirm it.
-        click.Abort: it was not.
-    """
+    """Ask for confirmation."""
     if not yes and not asker.terminal:
         raise click.UsageError("nothing was written: give --yes to write what is shown, or --dry-run to look only")
     if not yes:
@@ -330,11 +325,7 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
 
 
 def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> list[str]:
-    """Refuse centred circles unless somebody confirms that they are raw.
-
-    Raises:
-        InputError: the input is no terminal, so no person can confirm.
-    """
+    """Refuse centred circles unless somebody confirms that they are raw."""
     from dbbstation.errors import InputError, Problem
     from dbbstation.tasks.importing.plausible import CHANCE
     from dbbstation.tasks.importing.runs import chance_of_runs

@@ -212,12 +212,7 @@ def _check_terminal() -> None:
 
 
 def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
-    """Show the screen until closed; return the exit code.
-
-    Raises:
-        StationError: the unhandled fault that ended the sequence.
-        click.Abort: a signal ended it.
-    """
+    """Show the screen until closed; return the exit code."""
     from dbbstation.service.runner import Runner
     from dbbstation.tui.app import StationApp
     from dbbstation.tui.shown import Shown
@@ -263,11 +258,7 @@ def _line(
 
 
 def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: SessionOptions) -> Choice:
-    """Return what options and settings state for a chosen session.
-
-    Raises:
-        click.UsageError: an option that the start screen has no place for.
-    """
+    """Return what options and settings state for a chosen session."""
     from dbbstation.service.choice import Choice
     from dbbstation.service.order import Gate, Order
 

@@ -33,7 +33,6 @@ class Spline(Form):
 
     @property
     def count(self) -> int:
-        """Return the number of functions."""
         return self.functions - self.falls
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,7 +44,6 @@ class Spline(Form):
         return np.asarray(flat.reshape(*share.shape, self.functions)[..., : self.count], dtype=np.float64)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return three per function."""
         return np.linspace(low, high, 3 * self.functions)
 
 
@@ -58,12 +56,10 @@ class Power(Form):
     power: int = 1
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the scaled power."""
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return (((values - middle) / half) ** self.power)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return enough points to show its bend."""
         return np.linspace(low, high, 3 if self.power == 1 else 13)
 
 
@@ -101,7 +97,6 @@ class Stretches(Form):
 
     @property
     def count(self) -> int:
-        """Return one height per stretch."""
         return len(self.first)
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -110,6 +105,5 @@ class Stretches(Form):
         return np.asarray(begun - ended, dtype=np.float64)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return both sides of every edge."""
         edges = np.array([[a - 0.5, a + 0.5, b - 0.5, b + 0.5] for a, b in zip(self.first, self.last, strict=True)])
         return np.unique(np.clip(np.concatenate([[low], edges.ravel(), [high]]), low, high))

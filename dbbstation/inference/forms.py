@@ -58,16 +58,13 @@ class LinearSplines(Form):
 
     @property
     def count(self) -> int:
-        """Return one per point."""
         return SPLINES
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return hat functions of the points."""
         place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
         return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return its points, averaged over struts."""
         del low, high
         return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
 
@@ -86,16 +83,13 @@ class Walk(Form):
 
     @property
     def count(self) -> int:
-        """Return one per step."""
         return len(self.at) - 1
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return zero before a step, its size after."""
         steps = np.diff(self.at)
         return np.clip((values[..., None] - self.at[:-1]) / steps, 0.0, 1.0) * np.sqrt(steps / self.unit)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return its points."""
         del low, high
         return self.at
 
@@ -108,20 +102,16 @@ class Wave(Form):
 
     @property
     def count(self) -> int:
-        """Return two."""
         return 2
 
     def text(self, unit: str) -> str:
-        """Return its period."""
         return f"period {1.0 / self.frequency:.6g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return cosine and sine."""
         phase = 2.0 * np.pi * self.frequency * values
         return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return eight places per period, over one period if there are many."""
         periods = (high - low) * self.frequency
         periods = periods if periods <= _MOST_PERIODS else 1.0
         span = periods / self.frequency
@@ -142,22 +132,18 @@ class WaveOfTurn(Form):
 
     @property
     def count(self) -> int:
-        """Return cosine and sine by direction."""
         return 4
 
     def text(self, unit: str) -> str:
-        """Return waves per turn."""
         del unit
         return f"{self.frequency:.4g} per turn"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return cosine and sine counterclockwise, then clockwise."""
         both = Wave(self.frequency).columns(np.abs(values))
         ccw = (values > 0.0)[..., None]
         return np.concatenate([both * ccw, both * ~ccw], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return clockwise runs backwards, then counterclockwise ones."""
         del low, high
         turn = np.linspace(0.0, 1.0, int(np.ceil(POINTS_PER_WAVE * max(self.frequency, 1.0))) + 1)
         return np.concatenate([-turn[:0:-1], turn[1:]])
@@ -171,21 +157,17 @@ class Lobes(Form):
 
     @property
     def count(self) -> int:
-        """Return cosine and sine of each."""
         return 2 * len(self.numbers)
 
     def text(self, unit: str) -> str:
-        """Return the number of lobes if single."""
         del unit
         return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return cosine and sine of each."""
         theta = np.radians(values)
         return np.stack([f(k * theta) for k in self.numbers for f in (np.cos, np.sin)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return one turn, fine enough for the shortest wave."""
         del low, high
         step = 10.0 if max(self.numbers) <= 10 else 5.0  # noqa: PLR2004 - lobes as in `LOBES`
         return np.arange(0.0, 360.0, step)
@@ -199,15 +181,12 @@ class Bump(Form):
     width: float
 
     def text(self, unit: str) -> str:
-        """Return its place and width."""
         return f"about {self.centre:.5g} {unit}, {self.width:.3g} {unit} wide either way"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a bell of height one."""
         return np.exp(-0.5 * ((values - self.centre) / self.width) ** 2)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return points across the bump."""
         return _across(self.centre, self.width, low, high)
 
 
@@ -219,15 +198,12 @@ class StepForm(Form):
     width: float
 
     def text(self, unit: str) -> str:
-        """Return its place."""
         return f"at {self.at:.5g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the step from minus to plus a half."""
         return 0.5 * np.tanh((values - self.at) / self.width)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return points across the step."""
         return _across(self.at, self.width, low, high)
 
 
@@ -241,11 +217,9 @@ class SignForm(Form):
     """Plus one way, minus the other."""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the sign of the variable."""
         return np.sign(values)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return one point per direction."""
         del low, high
         return np.array([-1.0, 1.0])
 
@@ -257,11 +231,9 @@ class Proportional(Form):
     unit: float
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the variable in its unit."""
         return (values / self.unit)[..., None]
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return ends and middle."""
         return np.linspace(low, high, 3)
 
 
@@ -275,11 +247,9 @@ class Plane(Form):
 
     @property
     def count(self) -> int:
-        """Return one per coordinate, and the constant."""
         return self.coordinates + self.constant
 
     def text(self, unit: str) -> str:
-        """Return whether with constant."""
         del unit
         return "with a constant" if self.constant else ""
 
@@ -289,7 +259,6 @@ class Plane(Form):
         return np.column_stack([scaled, np.ones(len(scaled))]) if self.constant else scaled
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return ends and middle along the strongest direction."""
         return np.linspace(low, high, 3)
 
 
@@ -302,7 +271,6 @@ class PlaneStep(Form):
     width: float
 
     def text(self, unit: str) -> str:
-        """Return its place."""
         return f"across a line {self.at:.4g} {unit} from the origin, at {self.across_deg:.0f} deg to +X"
 
     @property
@@ -319,7 +287,6 @@ class PlaneStep(Form):
         return StepForm(self.at, self.width).columns(self.along(values))
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return points across the line."""
         return _across(self.at, self.width, low, high)
 
 
@@ -337,11 +304,9 @@ class Spring(Form):
 
     @property
     def count(self) -> int:
-        """Return constant and slope."""
         return 2
 
     def text(self, unit: str) -> str:
-        """Return its direction."""
         del unit
         return f"towards {self.towards_deg:.0f} deg to +X"
 
@@ -350,7 +315,6 @@ class Spring(Form):
         return np.column_stack([np.ones(len(values)), (values - self.about) / 100.0])
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return ends and middle."""
         return np.linspace(low, high, 3)
 
 
@@ -367,22 +331,18 @@ class Ringing(Form):
 
     @property
     def count(self) -> int:
-        """Return two."""
         return 2
 
     def text(self, unit: str) -> str:
-        """Return period and decay."""
         return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return both, odd in direction, zero before the first reversal."""
         since = np.abs(values)
         phase = 2.0 * np.pi * since / self.period
         fading = -np.sign(values) * np.exp(-since / self.decay)
         return np.stack([fading * np.cos(phase), fading * np.sin(phase)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return places from the reversal on."""
         del low
         last = min(high, RINGS_FOR * self.decay)
         return np.linspace(1e-6, last, max(int(POINTS_PER_WAVE * last / self.period), 2) + 1)
@@ -399,20 +359,16 @@ class BehindReversal(Form):
 
     @property
     def count(self) -> int:
-        """Return one per point."""
         return BEHIND_POINTS
 
     def text(self, unit: str) -> str:
-        """Return its distance."""
         return f"over {self.length:.3g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return curves against the new direction; zero before the first reversal."""
         place = np.abs(values) / self.length * (BEHIND_POINTS + 1)
         hats = np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(1, BEHIND_POINTS + 1)))
         return -np.sign(values)[..., None] * hats
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return its own points and both ends."""
         del low, high
         return np.linspace(0.0, self.length, BEHIND_POINTS + 2)

@@ -22,11 +22,9 @@ class Checksum(Schema):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return checksum_bytes(self.algorithm) * (1 if self.written == "binary" else 2)
 
     def pattern(self) -> bytes:
-        """Return the pattern of any checksum."""
         digit = {"binary": b"[\\x00-\\xff]", "hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}[self.written]
         return digit + b"{%d}" % self.width
 

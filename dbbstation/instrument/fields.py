@@ -136,18 +136,15 @@ class Literally(Schema):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return len(self.value)
 
     def pattern(self) -> bytes:
-        """Return the pattern of these bytes."""
         return re.escape(self.value)
 
     def read(self, raw: bytes, found: FrameParts) -> None:
         """Do nothing: the pattern matched."""
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
-        """Return the bytes."""
         return self.value
 
 
@@ -166,19 +163,15 @@ class SignField(Schema):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return 1
 
     def pattern(self) -> bytes:
-        """Return the pattern of any sign."""
         return b"[" + re.escape(b"".join(self.plus + self.minus)) + b"]"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take the sign."""
         found.sign = -1 if raw in self.minus else 1
 
     def write(self, content: Content) -> bytes:
-        """Return the sign of the value."""
         return self.minus[0] if content.value < 0 else self.plus[0]
 
 
@@ -198,12 +191,10 @@ class ChoiceField(Schema):
 
     @property
     def width(self) -> int | None:
-        """Return bytes, None for codes of different length."""
         widths = {len(code.code) for code in self.codes}
         return widths.pop() if len(widths) == 1 else None
 
     def pattern(self) -> bytes:
-        """Return the pattern of any code, the longest first."""
         return (
             b"(?:"
             + b"|".join(re.escape(raw) for raw in sorted((c.code for c in self.codes), key=len, reverse=True))
@@ -211,13 +202,11 @@ class ChoiceField(Schema):
         )
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take unit and status."""
         code = next(code for code in self.codes if code.code == raw)
         found.unit = code.unit or found.unit
         found.report(code.status, code.means, code.remedy)
 
     def write(self, content: Content) -> bytes:
-        """Return the status's code, or the first."""
         return next((code.code for code in self.codes if code is content.voice), self.codes[0].code)
 
 
@@ -230,23 +219,19 @@ class Flags(Schema):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return 1
 
     def pattern(self) -> bytes:
-        """Return the pattern of the base with any bits."""
         free = sum(1 << bit.bit for bit in self.bits)
         allowed = sorted({value for value in range(256) if value & ~free == self.base & ~free})
         return b"[" + b"".join(re.escape(bytes([value])) for value in allowed) + b"]"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Report every bit that differs from the base."""
         for bit in self.bits:
             if (raw[0] ^ self.base) >> bit.bit & 1:
                 found.report(bit.status, bit.means, bit.remedy)
 
     def write(self, content: Content) -> bytes:
-        """Return the base with the status's bit inverted."""
         return bytes([self.base ^ sum(1 << bit.bit for bit in self.bits if bit is content.voice)])
 
 
@@ -258,16 +243,13 @@ class SkipField(Schema):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return len(self.written)
 
     def pattern(self) -> bytes:
-        """Return the pattern of any bytes."""
         return b"[\\x00-\\xff]{%d}" % self.width
 
     def read(self, raw: bytes, found: FrameParts) -> None:
         """Ignore them."""
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
-        """Return the filling."""
         return self.written

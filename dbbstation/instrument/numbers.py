@@ -41,16 +41,10 @@ class Number(Schema):
         return self
 
     def pattern(self) -> bytes:
-        """Return the pattern of the number or a special."""
         specials = b"".join(re.escape(special.code) + b"|" for special in self.specials)
         return b"(?:" + specials + self._digits() + b")"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take the number.
-
-        Raises:
-            NotUnderstood: it is no number.
-        """
         for special in self.specials:
             if special.code == raw:
                 found.report(special.status, special.means, special.remedy)
@@ -85,7 +79,6 @@ class Number(Schema):
         return value if factor == 1.0 else float(f"{value * factor:.12g}")
 
     def rounded(self, value: float) -> float:
-        """Return `value` after writing and reading, before a sign is written."""
         return value
 
     def _digits(self) -> bytes:
@@ -133,11 +126,9 @@ class DecimalText(Number):
 
     @property
     def binary(self) -> bool:
-        """Return whether a line end may occur inside."""
         return False
 
     def rounded(self, value: float) -> float:
-        """Round to the decimals, without minus zero."""
         return round(value, self.decimals) + 0.0
 
     def _digits(self) -> bytes:
@@ -214,16 +205,13 @@ class Integer(Number):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return self.size * (2 if self.written in {"hex", "HEX"} else 1)
 
     @property
     def binary(self) -> bool:
-        """Return whether a line end may occur inside."""
         return self.written in {"binary", "bcd"}
 
     def rounded(self, value: float) -> float:
-        """Round to a whole number."""
         return float(round(value))
 
     def _digits(self) -> bytes:
@@ -279,12 +267,10 @@ class Ieee(Number):
 
     @property
     def width(self) -> int:
-        """Return the number of bytes."""
         return self.size
 
     @property
     def binary(self) -> bool:
-        """Return whether a line end may occur inside."""
         return True
 
     @property
@@ -292,7 +278,6 @@ class Ieee(Number):
         return (">" if self.order == "big" else "<") + ("f" if self.size == 4 else "d")  # noqa: PLR2004 (bytes)
 
     def rounded(self, value: float) -> float:
-        """Round to the format."""
         return float(struct.unpack(self._format, struct.pack(self._format, value))[0])
 
     def _digits(self) -> bytes:

@@ -35,15 +35,12 @@ class Text(Schema):
         return self
 
     def pattern(self) -> bytes:
-        """Return the pattern of printable characters."""
         return _PRINTABLE + (b"{%d}" % self.width if self.width else b"{1,%d}" % self.max_width)
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Keep the words."""
         found.text = raw.decode("ascii").strip()
 
     def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
-        """Return the virtual instrument's words."""
         return self.written.ljust(self.width or 0).encode("ascii")
 
 
@@ -69,16 +66,13 @@ class ErrorTable(Schema):
 
     @property
     def width(self) -> int:
-        """Return the number of characters."""
         return len(self.codes[0].code)
 
     def pattern(self) -> bytes:
-        """Return the pattern of the codes and others of equal width."""
         known = b"|".join(re.escape(code.code) for code in self.codes)
         return b"(?:" + known + b"|" + _PRINTABLE + b"{%d})" % self.width
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take the code's meaning, more exact than the frame's."""
         code = next((one for one in self.codes if one.code == raw), None)
         if code is None:
             found.text = f"code {raw.decode('ascii')}, which its protocol file does not list"
@@ -86,5 +80,4 @@ class ErrorTable(Schema):
         found.status, found.said, found.remedy = code.status, code.means, code.remedy or found.remedy
 
     def write(self, content: Content) -> bytes:
-        """Return the status's code, or the first."""
         return next((one.code for one in self.codes if one is content.voice), self.codes[0].code)

@@ -260,11 +260,7 @@ class _Stretch:
         return driven, met, states
 
     def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
-        """Search one row; return driven lengths, shape (1, 6) [mm], and the states behind it.
-
-        Raises:
-            ModelError: there is no solution.
-        """
+        """Search one row; return driven lengths, shape (1, 6) [mm], and the states behind it."""
         rows = slice(row, row + 1)
         search = RootSearch((self._smooth[row] + self._held_back), MET_MM)
         while not search.done:

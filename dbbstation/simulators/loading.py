@@ -105,11 +105,7 @@ def load_simulator(
 
 
 def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
-    """Return a simulator's executed Python file, or its program or FMU.
-
-    Raises:
-        InputError: the Python file cannot be run, or has no simulator that can be made.
-    """
+    """Return a simulator's executed Python file, or its program or FMU."""
     ports = {name: tuple(port.signals) for name, port in file.ports.items()}
     if file.program is not None:
         command = whole_command(file.program, path.parent)
@@ -152,11 +148,7 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
 
 
 def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
-    """Return own physics.
-
-    Raises:
-        InputError: faults of files; an unknown port.
-    """
+    """Return own physics."""
 
     def fault_of(one: PortSource) -> tuple[str, str] | None:
         if one.port not in file.ports:

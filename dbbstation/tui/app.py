@@ -229,7 +229,6 @@ class StationApp(App[None]):
 
     @property
     def crash(self) -> Exception | None:
-        """Return the programming error that ended the sequence."""
         return None if self._runner is None else self._runner.crash
 
     def _look_up_last(self) -> None:
@@ -257,7 +256,6 @@ class StationApp(App[None]):
                 then(outcome)
 
     def do(self, work: Callable[[], Any], then: Callable[[Any], None], failed: Callable[[Exception], None]) -> None:
-        """Do work of some seconds in the background."""
         self._works.append((Background(work), then, failed))
 
     def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
@@ -308,7 +306,6 @@ class StationApp(App[None]):
         start.search()
 
     def show_results(self, folder: Path) -> None:
-        """Show what can be done with a measured session."""
         known = self._after.get(folder)
         if known is not None and known.busy is None and known.outdated:
             known.close()
@@ -319,7 +316,6 @@ class StationApp(App[None]):
 
     @property
     def drawn(self) -> BoardScreen | None:
-        """Return the topmost screen that shows the board."""
         return next((screen for screen in reversed(self.screen_stack) if isinstance(screen, BoardScreen)), None)
 
     def draw(self) -> None:
@@ -356,7 +352,6 @@ class StationApp(App[None]):
         self.do(write, written, failed)
 
     def _drop_stale_question(self) -> None:
-        """Withdraw a question whose circle has ended."""
         question = self.screen_stack[-1] if self.screen_stack else None  # none: the last look may come while it closes
         if isinstance(question, GiveUpQuestion):
             running = self.board.state in RECORDING and self.board.announced is not None
@@ -388,7 +383,6 @@ class StationApp(App[None]):
         return super().check_action(action, parameters)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Return the current keys with their help."""
         if not isinstance(screen, ExplainedScreen):
             return
         for key, active in screen.active_bindings.items():
@@ -491,7 +485,6 @@ class StationApp(App[None]):
         self.do(write, written, failed)
 
     def close_down(self) -> None:
-        """End sequence and screen without a question."""
         self._wholly = True
         self.leave(sure=True)
 

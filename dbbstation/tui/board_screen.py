@@ -133,7 +133,6 @@ class RunScreen(BoardScreen):
             self.desk.send(Accept(f"not to be seen: {', '.join(completed.answer.unseen)}"))
 
     def action_alone(self) -> None:
-        """Accept the run in place of the earlier one."""
         self.desk.send(Accept(alone=True))
 
     def action_accept(self) -> None:

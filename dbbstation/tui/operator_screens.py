@@ -58,7 +58,6 @@ class JobScreen(RowScreen):
         self.search()
 
     def search(self) -> None:
-        """Find the last session if it is not complete."""
         self.say(texts.START_LOOKS)
         self._reception.do(self._operated.choice, self._found, self._failed)
 

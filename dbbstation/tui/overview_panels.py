@@ -62,7 +62,6 @@ class ChosenTest:
         return directions[min(self.way, len(directions) - 1)]
 
     def runs(self, board: Board, shown: Shown) -> tuple[RunCompleted, ...]:
-        """Return the chosen runs in recording order."""
         return board.runs_of(self.test, self.direction(shown)) if self.tests else ()
 
     def run(self, board: Board, shown: Shown) -> RunCompleted | None:

@@ -25,7 +25,6 @@ class Panel(Static):
         raise NotImplementedError
 
     def show(self, board: Board) -> None:
-        """Show a board."""
         text = self.text(board)
         if not text.is_same(self._shown):
             self._shown = text

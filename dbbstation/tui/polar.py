@@ -41,7 +41,6 @@ class Dial:
 
     @cached_property
     def dot_aspect(self) -> float:
-        """Return height over width of a dot."""
         return self.cell_aspect * braille.CELL_WIDE / braille.CELL_HIGH
 
     @cached_property
@@ -51,7 +50,6 @@ class Dial:
         return max(min(wide, high) / 2.0 - _MARGIN_DOTS, 1.0)
 
     def empty(self) -> Plane:
-        """Return a plane for this field."""
         return braille.empty(self.columns, self.rows)
 
     def places(
@@ -70,7 +68,6 @@ class Dial:
         return min(max(row, 0), self.rows - 1), min(max(column, 0), self.columns - 1)
 
     def magnification(self, scale_um: float, radius_mm: float) -> float:
-        """Return the magnification of deviations relative to the circle."""
         return (BAND_SHARE / scale_um) / (NOMINAL_SHARE / (1e3 * radius_mm))
 
 

@@ -36,7 +36,6 @@ class RowScreen(ExplainedScreen):
         yield Footer(show_command_palette=False)
 
     def say(self, text: str, *, wrong: bool = False) -> None:
-        """Show a sentence at the top."""
         if not self.stands:
             return
         now = self.query_one("#row-now", Static)
@@ -50,7 +49,6 @@ class RowScreen(ExplainedScreen):
             self.query_one("#row-title", Static).update(banner(virtual=virtual) + title)
 
     def about(self, text: Content) -> None:
-        """Show a text below the rows."""
         if not self.stands:
             return
         self.query_one("#row-text", Static).update(text)
@@ -62,11 +60,9 @@ class RowScreen(ExplainedScreen):
 
     @property
     def at(self) -> int:
-        """Return the place of the chosen row."""
         return self.query_one("#rows", OptionList).highlighted or 0
 
     def put(self, rows: Sequence[Content]) -> None:
-        """Show rows and keep the chosen place."""
         if not self.stands:
             return
         options = self.query_one("#rows", OptionList)

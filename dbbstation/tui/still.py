@@ -39,12 +39,10 @@ class Happened:
         """Do nothing."""
 
     def send(self, command: Command) -> bool:
-        """Note the command."""
         self.sent.append(command)
         return False
 
     def mail(self) -> list[Event | SequenceOpened]:
-        """Return everything at the first call."""
         events, self._events = self._events, []
         return events
 

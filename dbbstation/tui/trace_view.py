@@ -89,7 +89,6 @@ class TraceView(Widget):
         head: Direction | None = None,
         beneath: Mapping[Direction, LiveTrace | Derived] | None = None,
     ) -> None:
-        """Draw what is new."""
         fresh = circle is not self._circle or any(
             traces.get(direction) is not trace for direction, (trace, _) in self._drawn.items()
         )

@@ -164,9 +164,6 @@ def _refuse_wrong_sign(one: Recordings) -> None:
     """Refuse an inverted force.
 
     Without inertia, load and spring, force and speed agree on average by friction.
-
-    Raises:
-        CalibrationError: the drive gains power in both directions beyond doubt.
     """
     force, speed = one.force_n, one.motion[:, 1]
     if not one.scale.reverses:

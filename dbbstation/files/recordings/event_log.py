@@ -216,11 +216,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
 
 
 def _parted(log: EventLog, handle: int) -> int:
-    """Part a log from hard links of its file, such as a backup, which keep their content.
-
-    Raises:
-        OutputError: the disk refuses; the log is restored.
-    """
+    """Part a log from hard links of its file, such as a backup, which keep their content."""
     os.close(handle)  # Windows replaces no file that is open
     try:
         write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
@@ -259,11 +255,7 @@ def taken_back(log: EventLog) -> None:
 
 
 def _refuse_another(log: EventLog, handle: int) -> None:
-    """Refuse to write behind lines that were not read.
-
-    Raises:
-        OutputError: the file has another size, or another last line.
-    """
+    """Refuse to write behind lines that were not read."""
     size = os.fstat(handle).st_size
     last = log.links[-1] if log.events else ""
     begin = max(log.end - _LONGEST_LAST, 0)

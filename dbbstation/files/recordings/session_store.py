@@ -249,11 +249,7 @@ class SessionStore:
         )
 
     def _on_disk(self, faults: list[Problem]) -> tuple[bytes | None, dict[str, object] | None]:
-        """Return bytes and data of the session file; no data, with the reason in `faults`, if damaged or missing.
-
-        Raises:
-            InputError: it exists and cannot be read.
-        """
+        """Return bytes and data of the session file; no data, with the reason in `faults`, if damaged or missing."""
         found = read_bytes(self._file, faults, is_input=False)
         text = None if found is None else decode(found, str(self._file), faults)
         document = None if text is None else parse_yaml(text, str(self._file), faults)

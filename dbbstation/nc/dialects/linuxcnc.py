@@ -70,18 +70,14 @@ class LinuxCNC(WordDialect):
     def read(
         self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
-        """Return what a program commands."""
         return read_program(text, name, start=start, setup=setup)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:
-        """Return the percent sign, if the program ends with one."""
         return ("%",) if toolpath.ending is Ending.TEXT else ()
 
     def guard(self, holds: Mapping[str, Sequence[float]]) -> Iterable[str]:
-        """Return conditions of O-words on LinuxCNC's parameters."""
         return guard_lines(holds)
 
     def length_guard(self, text: str, holds: Mapping[str, Sequence[float]], row: int) -> Iterable[str]:
-        """Return the same behind G43."""
         tool = text.removeprefix("G43 ")
         return length_lines(tool, holds[tool], row) if tool != text and tool in holds else ()

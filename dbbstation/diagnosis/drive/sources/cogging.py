@@ -34,7 +34,6 @@ class Cogging(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return cosine and sine at the first look's periods."""
         size = 0.1 * scale.force_n
         cosine = DriveParameter("cosine_n", "N", size, "amplitude of the cosine, position zero is where it is greatest")
         sine = DriveParameter("sine_n", "N", size, "amplitude of the sine")

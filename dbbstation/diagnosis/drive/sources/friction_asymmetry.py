@@ -37,7 +37,6 @@ class FrictionAsymmetry(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return Coulomb and viscous part, which may coexist."""
         if not scale.both_ways:
             return ()
         dry = DriveParameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
@@ -53,5 +52,4 @@ class FrictionAsymmetry(DriveSource):
         )
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Return whether friction dissipates both ways."""
         return abs(values.get("coulomb_asymmetry_n", 0.0)) <= max(values.get("coulomb_n", 0.0), 0.0)

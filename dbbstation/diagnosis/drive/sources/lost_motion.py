@@ -46,7 +46,6 @@ class LostMotion(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return amplitude, play, and way of return."""
         if not (scale.reverses and scale.both_ways):
             return ()
         size = DriveParameter(
@@ -58,7 +57,6 @@ class LostMotion(DriveSource):
         return (DriveForm((size,), _columns, (gap, rise), (gaps, RISES)),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Return whether the missing force is at most Coulomb friction."""
         return values["lost_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 

@@ -31,7 +31,6 @@ class PositionFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return slope and bow."""
         size = 0.2 * scale.force_n
         slope = DriveParameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
         bow = DriveParameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")

@@ -45,7 +45,6 @@ class Presliding(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude at lengths."""
         if not scale.reverses:
             return ()
         size = DriveParameter(
@@ -57,7 +56,6 @@ class Presliding(DriveSource):
         return (DriveForm((size,), _columns, (length,), (tuple(1e3 * share * scale.travel_m for share in SHARES),)),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Return whether it equals Coulomb friction within uncertainty."""
         return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 

@@ -35,7 +35,6 @@ class StribeckFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude at Stribeck speeds."""
         size = DriveParameter(
             "static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True
         )

@@ -37,12 +37,10 @@ class ForceTimeSkew(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude."""
         size = DriveParameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
         return (DriveForm((size,), _columns),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:
-        """Return whether the delay is a few samples."""
         return abs(values.get("delay_ms", 0.0)) <= MOST_SAMPLES * 1e3 * scale.sample_s
 
 

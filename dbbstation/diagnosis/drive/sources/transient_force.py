@@ -26,5 +26,4 @@ class TransientForce(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:  # noqa: ARG002
-        """Return none."""
         return ()

@@ -1,14 +1,12 @@
-"""Readings that may be damaged though they fit the grammar: lines without a checksum prove nothing of their digits.
+"""Readings that may be damaged though they fit the grammar, on lines without a checksum.
 
-A device writes all its numbers in one way, which is set on the device: one unit, so many decimals, and as many digits before the
-point as the number has (or always as many, with zeros in front). A digit lost or put in, a point that moved, a unit that changed show
-as another form than that of the lines before. Two things are no damage:
+A device writes all numbers in one form: unit, decimals, and digits before the point as needed or zero-padded. A lost or
+inserted digit, a moved point or another unit changes this form. Two changes are no damage:
 
-- A number that passes a power of ten has a digit more or less. A digit lost before the point takes at least 0.8 of 10^d from a number
-  v of d + 1 digits, of at least 10^d: the first digit itself is that much or more; without another one, v = a 10^d + ... becomes
-  less than (a + 1) 10^(d - 1). A digit put in is the same backwards. Where the step is less than half of 10^d, the number passed it.
-- The device was set to another form. Then all lines that follow have it. Where one line in a thousand is damaged, three in a row
-  are once in 10^9 lines (two years at 14 lines a second), so the third is believed.
+- A number passes a power of ten. A digit lost before the point takes at least 0.8 of 10^d from a number of d + 1 digits,
+  which is at least 10^d; an inserted digit adds as much. So a step below half of 10^d is genuine.
+- The device was set to another form. All following lines then have it. If one line in a thousand is damaged, three in a
+  row occur once in 10^9 lines (two years at 14 lines a second), so the third is accepted.
 """
 
 from __future__ import annotations

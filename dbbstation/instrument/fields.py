@@ -1,16 +1,16 @@
-"""The parts that a frame on the wire is made of.
+"""The parts of a frame on the wire.
 
-Every part knows both directions: `pattern` and `read` take it from bytes, `write` makes the bytes. Driver and virtual
-instrument therefore cannot disagree about a protocol.
+Every part has both directions: `pattern` and `read` take it from bytes, `write` makes the bytes, so driver and virtual
+instrument always agree.
 
     literal    fixed bytes: head, separator, line end
     sign       the sign of the length, apart from its digits
     choice     one of several codes, each with a unit or a status
     flags      one byte of status bits
-    skip       bytes that say nothing of the length
+    skip       ignored bytes
 
-Further kinds stand in `numbers.py` (decimal, integer, float), `checksum_part.py`, `telling.py` (text, errors) and `frame.py`
-(optional).
+Further kinds are in `numbers.py` (decimal, integer, float), `checksum_part.py`, `telling.py` (text, errors) and
+`frame.py` (optional).
 """
 
 from __future__ import annotations

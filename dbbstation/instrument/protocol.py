@@ -1,14 +1,13 @@
-"""The wire protocol of a length instrument, `dbb-instrument/1`: what one YAML file in `protocols/instruments` says.
+"""The wire protocol of a length instrument, `dbb-instrument/1`: the content of a YAML file in `protocols/instruments`.
 
 Protocol
 ├── line       baud rate, bits, parity, stop bits, flow control
-├── ask        how a reading is obtained: asked for each time, or streaming; commands to start and to stop; the request that
-│              follows an error
-├── reply      what all replies begin and end with
+├── ask        request, latch or stream; start and stop commands; the request after an error
+├── reply      prefix and end of all replies
 ├── length     unit, sense, range
-├── frames     what comes over the wire: one frame that carries the length, others that are messages
+├── frames     one with the length, others are messages
 ├── timing     latency, rate, patience
-└── profiles   variants of the device: what each has instead
+└── profiles   variants of the device, each with its own keys
 """
 
 from __future__ import annotations

@@ -26,16 +26,14 @@ tool tip. A program must not inherit any of these from the one before it."""
 
 
 class LinuxCNC(WordDialect):
-    """Words of an axis are written where they change, the motion code in every line.
+    """Words of an axis are written when they change, the motion code in every line.
 
-    - F under G94 is the speed along X, Y and Z as if A, B and C stood still, which is the feed of the tool tip: it
-      needs no correction where the platform tilts on the way.
-    - `G64 P Q0`: LinuxCNC starts with corners rounded as far as the feed needs. P bounds that. Exact path (G61) would
-      stop at each of 3600 corners. Q0 keeps LinuxCNC from merging short moves, which it does only while A, B and C
-      stand still: nominal and compensated programs would run differently.
-    - G61 and G64 hold for the end of each move that follows, and do not stop the machine themselves: a move under G61
-      that is written in pieces has G64 before the first and G61 before the last.
-    - Dwells (G4) end blending: between feed-in and arc the machine stands still at the corner.
+    - F under G94 is the speed along X, Y and Z alone, which is the feed of the tool tip; tilting needs no correction.
+    - `G64 P Q0`: P bounds the rounding of corners, while exact path (G61) would stop at each of 3600 corners. Q0 keeps
+      LinuxCNC from merging short moves, which it does only while A, B and C are constant.
+    - G61 and G64 apply to the end of each following move, without a stop of their own. A move under G61 in pieces has G64
+      before the first and G61 before the last.
+    - Dwells (G4) end blending, so the machine stops at the corner between feed-in and arc.
     """
 
     name = "linuxcnc"

@@ -44,7 +44,6 @@ def found(folder: Path) -> tuple[str, float, float]:
 
 
 def main() -> None:
-    """Read the command line and do what it says."""
     parser = argparse.ArgumentParser(
         prog="python -m tests.diagnosis.limit_constants", description=__doc__.splitlines()[0]
     )

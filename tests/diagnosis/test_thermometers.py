@@ -40,7 +40,6 @@ class Coarse(Mechanism):
     of: Mechanism = PARTS["thermal-frame"][0]
 
     def columns(self, motion, platform):
-        """What they show [degC]."""
         shown = self.of.columns(motion, platform)
         return {name: RESOLUTION_K * np.round(values / RESOLUTION_K) for name, values in shown.items()}
 
@@ -88,12 +87,10 @@ class Bracket(Mechanism):
     name: ClassVar[str] = "bracket"
 
     def lengthening_mm(self, motion, platform):
-        """Of strut 3 `(n, 6)`."""
         del platform
         return 0.006 * SHOP.excess_k(motion)[:, None] * np.eye(6)[2]
 
     def columns(self, motion, platform):
-        """The machine's thermometer [degC]."""
         del platform
         return {"machine_temp_c": motion.scene.ambient_temp_c + SHOP.excess_k(motion)}
 

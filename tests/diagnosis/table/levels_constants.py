@@ -102,7 +102,6 @@ def figures(rows: list[dict[str, object]]) -> dict[str, list[object]]:
 
 
 def main() -> None:
-    """Run what the file has not, and write it after each table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seeds", default="31,32")
     options.add_argument("--out", type=Path, required=True)

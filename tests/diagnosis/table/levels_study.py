@@ -242,7 +242,6 @@ def figures(rows: list[dict[str, object]]) -> dict[str, list[object]]:
 
 
 def main() -> None:
-    """Run what the file has not, and write it after each table."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--seeds", default="11,12,13")
     options.add_argument("--what", default="effect,twin,noise,injected")

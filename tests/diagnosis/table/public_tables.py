@@ -84,7 +84,6 @@ TABLES = {
 
 
 def main() -> None:
-    """Compare each table, and write the answers."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("folder", type=Path)
     options.add_argument("--out", type=Path, required=True)

@@ -28,7 +28,6 @@ class Backlash(Mechanism):
     gap_um: tuple[float, float, float, float, float, float] = (4.0, 4.0, 4.0, 4.0, 4.0, 4.0)
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """Follower minus driver `(n, 6)`."""
         del motion
         followed_mm = [follower(driven_mm[:, strut], gap_um / 2000.0) for strut, gap_um in enumerate(self.gap_um)]
         return np.stack(followed_mm, axis=1) - driven_mm

@@ -55,11 +55,9 @@ class BarDrift(Mechanism):
     logged: bool = False
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """Minus the growth of the rod, `(n,)`."""
         del platform
         return -self.expansion_um_m_k * 1e-6 * length_mm * self.warming.excess_k(motion)
 
     def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
-        """The bar's temperature [degC], if somebody logs it."""
         del platform
         return {"bar_temp_c": motion.scene.ambient_temp_c + self.warming.excess_k(motion)} if self.logged else {}

@@ -43,7 +43,6 @@ class DriveCurrents(Mechanism):
         return replace(self, stream=int(rng.integers(2**31)))
 
     def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
-        """`motor1_current_a` to `motor6_current_a` `(n,)`."""
         axial_n = -self.moving_kg * GRAVITY_M_S2 * platform.direction[:, :, 2]
         load_n = platform.tension_n + axial_n
         half_mm = self.turn_over_um / 2000.0

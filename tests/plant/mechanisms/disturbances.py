@@ -40,7 +40,6 @@ class WanderingBar(Mechanism):
         return replace(self, walk_um=tuple(walk_um.tolist()))
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """Where the walk is `(n,)`."""
         del platform, length_mm
         walk_um = np.array(self.walk_um)
         return np.interp(motion.session_s, WALK_STEP_S * np.arange(len(walk_um)), walk_um) / 1000.0
@@ -87,7 +86,6 @@ class BumpedJig(Mechanism):
     from_run: int = 14
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Nothing before, the shift from then on `(3,)`."""
         del platform
         slots = motion.scene.slots
         later = self.from_run < len(slots) and motion.of_run.start_s >= slots[self.from_run].start_s
@@ -106,7 +104,6 @@ class KinkedStrut(Mechanism):
     slope_um_m: float = 500.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """Zero up to the kink, a straight line behind it `(n, 6)`."""
         del motion
         change_mm = np.zeros_like(driven_mm)
         beyond_mm = np.maximum(driven_mm[:, self.strut - 1] - self.at_mm, 0.0)
@@ -127,7 +124,6 @@ class RingingStrut(Mechanism):
     decay_s: float = 1.5
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """Against the new direction first `(n, 6)`."""
         change_mm = np.zeros_like(driven_mm)
         speed_mm_s = motion.strut_speed_mm_s[:, self.strut - 1]
         moving = np.flatnonzero(np.abs(speed_mm_s) > 1e-6)

@@ -56,7 +56,6 @@ class JointFriction(Mechanism):
     """Of the moment, joint by joint."""
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Stretch `(n, 6)` under the sideways forces."""
         commanded = commanded_platform(motion.machine, motion.commanded)
         angle_rad = joint_angles_rad(motion.machine, commanded.direction)
         share = np.stack([self.shares[strut] * self._wound(angle_rad[:, strut]) for strut in range(6)], axis=1)
@@ -87,7 +86,6 @@ class UjointScrew(Mechanism):
     share: float = 0.02
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Twist since home times the lead per turn `(n, 6)`."""
         home = commanded_platform(motion.machine, HOME)
         since_home_rad = _twist_rad(motion.machine, platform) - _twist_rad(motion.machine, home)
         return self.share * motion.machine.screw_lead_mm / (2 * np.pi) * since_home_rad
@@ -120,7 +118,6 @@ class JointRunout(Mechanism):
     platform_eccentricity_um: FloatArray = field(default_factory=_zeros_63)
 
     def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """The eccentricity turned about the first axis `(n, 6, 3)`, less what it is at home."""
         return _orbit_mm(motion.machine, platform.direction, np.asarray(self.eccentricity_um) / 1000.0)
 
     def joint_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:

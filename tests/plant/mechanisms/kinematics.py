@@ -42,7 +42,6 @@ class Kinematics(Mechanism):
         )
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """`ΔL` `(6,)`."""
         del motion, platform
         return self.length_mm
 

@@ -35,7 +35,6 @@ class BentCover(Mechanism):
     height_um: float = 4.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """A raised cosine over the strut's length `(n, 6)`."""
         del motion
         off = np.clip((driven_mm[:, self.strut - 1] - self.at_mm) / self.width_mm, -1.0, 1.0)
         return _of_strut(self.height_um / 2000.0 * (1.0 + np.cos(np.pi * off)), self.strut)
@@ -52,7 +51,6 @@ class SpringyDrive(Mechanism):
     give_um_s2_m: float = 500.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """The strut stays behind in proportion to how fast its speed grows `(n, 6)`."""
         if len(driven_mm) == 1:
             return np.zeros_like(driven_mm)
         speed_mm_s = motion.strut_speed_mm_s[:, self.strut - 1]
@@ -72,7 +70,6 @@ class CreepingSpindle(Mechanism):
     phase_deg: float = 20.0
 
     def tool_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """The socket's centre goes round the spindle's axis `(n, 3)`, platform frame."""
         del platform
         angle_rad = np.radians(self.share * motion.angle_deg + self.phase_deg)
         circle = np.stack([np.cos(angle_rad), np.sin(angle_rad), np.zeros_like(angle_rad)], axis=1)
@@ -92,7 +89,6 @@ class RockingTable(Mechanism):
     soft_mm: float = 15.0
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Half the tip to either side of the line, over some millimetres `(n, 3)`."""
         del motion
         across_rad = np.radians(self.across_deg)
         side_mm = platform.position_mm[:, :2] @ np.array([np.cos(across_rad), np.sin(across_rad)]) - self.line_mm
@@ -111,7 +107,6 @@ class CyclingChiller(Mechanism):
     period_s: float = 43.0
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Up for three quarters of the period, down for one `(n, 6)`."""
         del platform
         part = np.mod(motion.session_s / self.period_s, 1.0)
         tooth = np.where(part < 0.75, part / 0.75, (1.0 - part) / 0.25) - 0.5
@@ -128,7 +123,6 @@ class WindingCable(Mechanism):
     pull_um: float = 2.0
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """Grows with the square of the turn since the run began `(n,)`."""
         del platform, length_mm
         turned = (motion.angle_deg - motion.of_run.path.path.start_deg) / 360.0
         return self.pull_um / 1000.0 * turned**2

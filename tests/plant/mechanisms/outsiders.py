@@ -31,7 +31,6 @@ class OddGearWobble(Mechanism):
     phase_deg: float = 40.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """A sine of the strut's own travel `(n, 6)`."""
         turns = self.turns_per_screw_turn * driven_mm[:, self.strut - 1] / motion.machine.screw_lead_mm
         change_mm = np.zeros_like(driven_mm)
         change_mm[:, self.strut - 1] = (
@@ -73,7 +72,6 @@ class LobedSocket(Mechanism):
     phase_deg: float = 15.0
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """A cosine of the bar's angle `(n,)`."""
         del platform, length_mm
         return self.amplitude_um / 1000.0 * np.cos(np.radians(self.lobes * motion.angle_deg - self.phase_deg))
 
@@ -121,7 +119,6 @@ class DentedScrew(Mechanism):
     height_um: float = 6.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """A bell over the strut's length `(n, 6)`."""
         del motion
         change_mm = np.zeros_like(driven_mm)
         off = (driven_mm[:, self.strut - 1] - self.at_mm) / self.width_mm
@@ -141,7 +138,6 @@ class BuildingSway(Mechanism):
     towards_deg: float = 65.0
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """A sine of time along one direction in the plane `(n, 3)`."""
         del platform
         towards_rad = np.radians(self.towards_deg)
         along = np.array([np.cos(towards_rad), np.sin(towards_rad), 0.0])

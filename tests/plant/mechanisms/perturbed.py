@@ -91,22 +91,18 @@ class ScaledStruts(Perturbed):
         raise NotImplementedError
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray | None:
-        """The law's change of driven lengths, scaled `(n, 6)`."""
         change_mm = self.law.driven_mm(motion, driven_mm)
         return None if change_mm is None else change_mm * self.factor(motion, None)
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """The law's growth of struts, scaled `(n, 6)`."""
         change_mm = self.law.lengthening_mm(motion, platform)
         return None if change_mm is None else change_mm * self.factor(motion, platform)
 
     def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """The law's shift of base joints, scaled `(n, 6, 3)`."""
         change_mm = self.law.base_shift_mm(motion, platform)
         return None if change_mm is None else change_mm * self.factor(motion, platform)[..., None]
 
     def joint_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """The law's shift of platform joints, scaled `(n, 6, 3)`."""
         change_mm = self.law.joint_shift_mm(motion, platform)
         return None if change_mm is None else change_mm * self.factor(motion, platform)[..., None]
 
@@ -118,7 +114,6 @@ class FromStrutToStrut(ScaledStruts):
     deviation: Six
 
     def factor(self, motion: Motion, platform: Platform | None) -> FloatArray:
-        """Constants `(6,)`."""
         del motion, platform
         return 1.0 + np.array(self.deviation)
 
@@ -135,7 +130,6 @@ class AlongStrut(ScaledStruts):
     phase_deg: Six
 
     def factor(self, motion: Motion, platform: Platform | None) -> FloatArray:
-        """By commanded length `(n, 6)`."""
         del platform
         turns = motion.commanded_mm / np.array(self.wavelength_mm)
         return 1.0 + np.sqrt(2.0) * self.deviation * np.cos(2 * np.pi * turns + np.radians(self.phase_deg))
@@ -148,7 +142,6 @@ class ByLoad(ScaledStruts):
     deviation: float
 
     def factor(self, motion: Motion, platform: Platform | None) -> FloatArray:
-        """By tension `(n, 6)`."""
         del motion
         if platform is None:
             raise ValueError(f"{self.name} acts in the drives, where no load is known yet")
@@ -163,7 +156,6 @@ class ByDirection(ScaledStruts):
     deviation: Six
 
     def factor(self, motion: Motion, platform: Platform | None) -> FloatArray:
-        """By the direction of the last movement of each strut `(n, 6)`; 1 before the first."""
         del platform
         return 1.0 + np.array(self.deviation) * _last_direction(motion.commanded_mm)
 
@@ -183,7 +175,6 @@ class AcrossPlate(Perturbed):
     towards_deg: float
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray | None:
-        """The law's shift, scaled by where the ball stands `(3,)`."""
         shift_mm = self.law.fixed_ball_mm(motion, platform)
         if shift_mm is None:
             return None

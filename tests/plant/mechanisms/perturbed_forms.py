@@ -51,7 +51,6 @@ class BowedScrewLead(ScrewLead):
     reach_mm: float = 150.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """In proportion to travel, and with its square `(n, 6)`."""
         change_mm = super().driven_mm(motion, driven_mm)
         return change_mm * (1.0 + np.array(self.bow) * (driven_mm - self.zero_mm) / self.reach_mm)
 
@@ -64,7 +63,6 @@ class HarmonicScrewCyclic(ScrewCyclic):
     harmonic_phase_deg: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """Two sines of the strut's length `(n, 6)`."""
         turns = driven_mm / motion.machine.screw_lead_mm
         second_mm = np.array(self.amplitude_um) * np.array(self.harmonic) / 1000.0
         phase_rad = np.radians(self.harmonic_phase_deg)
@@ -79,7 +77,6 @@ class HarmonicBarCyclic(BarCyclic):
     harmonic_phase_deg: float = 0.0
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """Two sines of the length read `(n,)`."""
         second = BarCyclic(self.harmonic * self.amplitude_um, self.period_um / 2, self.harmonic_phase_deg)
         return super().reading_mm(motion, platform, length_mm) + second.reading_mm(motion, platform, length_mm)
 

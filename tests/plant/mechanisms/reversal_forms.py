@@ -44,7 +44,6 @@ class SoftPlay(Play):
     """A gap filled with grease or a soft seat: the load moves the strut across it little by little, `tanh(T/friction)`."""
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """By the load at the commanded pose `(n, 6)`."""
         commanded = commanded_platform(platform.machine, motion.commanded)
         commanded.extra_loads = platform.extra_loads
         commanded.inverse_jacobian = platform.inverse_jacobian
@@ -65,7 +64,6 @@ class StickSlip(Mechanism):
     jerks: int = 4
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """Against the movement, a saw tooth of the travel since the last turn `(n, 6)`."""
         del motion
         return np.stack([self._strut(driven_mm[:, k], um / 1000.0) for k, um in enumerate(self.stick_um)], axis=1)
 

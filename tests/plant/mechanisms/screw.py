@@ -26,7 +26,6 @@ class ScrewLead(Mechanism):
     zero_mm: float = 750.0
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """In proportion to travel `(n, 6)`."""
         del motion
         return np.array(self.error_um_m) * 1e-6 * (driven_mm - self.zero_mm)
 
@@ -41,6 +40,5 @@ class ScrewCyclic(Mechanism):
     phase_deg: Six = (0.0, 60.0, 130.0, 200.0, 250.0, 310.0)
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """By the strut's own length over the lead `(n, 6)`."""
         turns = driven_mm / motion.machine.screw_lead_mm
         return np.array(self.amplitude_um) / 1000.0 * np.sin(2 * np.pi * turns + np.radians(self.phase_deg))

@@ -28,7 +28,6 @@ class ServoLag(Mechanism):
     time_constant_ms: Six = (2.0, 2.0, 3.0, 2.0, 2.0, 2.0)
 
     def driven_mm(self, motion: Motion, driven_mm: FloatArray) -> FloatArray:
-        """Filtered minus commanded `(n, 6)`."""
         del driven_mm
         if motion.slot is None:
             # Poses without a run have no path between them, and nothing moves at a standstill.

@@ -24,7 +24,6 @@ class ToolBallOffset(Mechanism):
     offset_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def tool_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """The offset `(3,)`."""
         del motion, platform
         return np.array(self.offset_mm)
 
@@ -43,7 +42,6 @@ class JigDistortion(Mechanism):
     reach_mm: float = 141.4
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Lift of the bore, and lean times height of the ball above the plate `(3,)`."""
         del platform
         plan = motion.scene.plan
         centre_mm = np.array(plan.ball(motion.of_run.test.ball).centre_mm)
@@ -65,7 +63,6 @@ class BarCyclic(Mechanism):
     phase_deg: float = 0.0
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """A sine of the length read `(n,)`."""
         del motion, platform
         turns = length_mm * 1000.0 / self.period_um
         return self.amplitude_um / 1000.0 * np.sin(2 * np.pi * turns + np.radians(self.phase_deg))
@@ -80,7 +77,6 @@ class BallForm(Mechanism):
     waves: tuple[tuple[int, float, float], ...] = ((2, 0.4, 20.0), (3, 0.3, 70.0))
 
     def reading_mm(self, motion: Motion, platform: Platform, length_mm: FloatArray) -> FloatArray:
-        """The same in every circle and both directions `(n,)`."""
         del platform, length_mm
         return sum(
             (

@@ -36,11 +36,9 @@ class ThermalStruts(Mechanism):
         return self.warming.excess_k(motion)[:, None] * np.array(self.shares)
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Expansion times length times rise `(n, 6)`."""
         return self.expansion_um_m_k * 1e-6 * platform.length_mm * self._excess_k(motion)
 
     def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
-        """The struts' temperatures [degC], if somebody logs them."""
         del platform
         if not self.logged:
             return {}
@@ -59,13 +57,11 @@ class ThermalFrame(Mechanism):
     logged: bool = False
 
     def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Growth in proportion to the distance from the centre `(n, 6, 3)`."""
         del platform
         growth = self.expansion_um_m_k * 1e-6 * self.warming.excess_k(motion)
         return growth[:, None, None] * motion.machine.base_joints_mm
 
     def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
-        """The frame's temperature [degC], if somebody logs it."""
         del platform
         return {"machine_temp_c": motion.scene.ambient_temp_c + self.warming.excess_k(motion)} if self.logged else {}
 
@@ -81,13 +77,11 @@ class SpindleGrowth(Mechanism):
     logged: bool = False
 
     def tool_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Down along the platform's own Z `(n, 3)`."""
         del platform
         growth_mm = self.growth_um_k / 1000.0 * self.warming.excess_k(motion)
         return growth_mm[:, None] * np.array([0.0, 0.0, -1.0])
 
     def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
-        """The machine's temperature near the spindle [degC], if somebody logs it."""
         del platform
         return {"machine_temp_c": motion.scene.ambient_temp_c + self.warming.excess_k(motion)} if self.logged else {}
 
@@ -102,7 +96,6 @@ class JigThermal(Mechanism):
     expansion_um_m_k: float = 11.5
 
     def fixed_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Growth of the ball's place `(3,)`, with the plate and the holder."""
         del platform
         plan = motion.scene.plan
         centre_mm = np.array(plan.ball(motion.of_run.test.ball).centre_mm)

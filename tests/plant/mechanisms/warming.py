@@ -43,7 +43,6 @@ class Warming:
         return np.interp(motion.session_s, times_s, excess_k)
 
     def history(self, scene: Scene, until_s: float) -> tuple[FloatArray, FloatArray]:
-        """Session times and temperatures, `(m,)` each, on a fine grid from the cold start on."""
         times_s = np.arange(-self.head_start_s, max(until_s, scene.end_s) + 2 * GRID_S, GRID_S)
         # What heats during the second that ends at a grid point is known at its middle.
         heat = np.full(len(times_s), self.idle_share)
@@ -71,7 +70,6 @@ class Shop(Warming):
     door_k: float = -1.5
 
     def history(self, scene: Scene, until_s: float) -> tuple[FloatArray, FloatArray]:
-        """Session times and temperatures, `(m,)` each, on a fine grid."""
         times_s = np.arange(-self.head_start_s, max(until_s, scene.end_s) + 2 * GRID_S, GRID_S)
         swing = self.rise_k * np.sin(2.0 * np.pi * times_s / self.period_s)
         since_s = np.maximum(times_s - self.door_s, 0.0)
@@ -88,7 +86,6 @@ class SeveralBodies(Warming):
     bodies: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
 
     def history(self, scene: Scene, until_s: float) -> tuple[FloatArray, FloatArray]:
-        """Session times and temperatures, `(m,)` each, on a fine grid from the cold start on."""
         law = {key.name: getattr(self, key.name) for key in fields(Warming)}
         total_k: FloatArray | float = 0.0
         for share, factor in self.bodies:

@@ -52,7 +52,6 @@ class StrutWeight(Mechanism):
         return (effective_kg * GRAVITY_M_S2)[:, :, None] * across(platform.direction)
 
     def load(self, motion: Motion, platform: Platform) -> FloatArray:
-        """All six together on the platform `(n, 6)`."""
         del motion
         force_n = self.transverse_n(platform)
         return np.concatenate([force_n.sum(axis=1), np.cross(platform.arm_mm, force_n).sum(axis=1)], axis=1)
@@ -67,7 +66,6 @@ class BaseCompliance(Mechanism):
     compliance_mm_n: tuple[float, float, float] = (1e-6, 1e-6, 3e-6)
 
     def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """A strut in tension draws its base joint towards the platform `(n, 6, 3)`."""
         del motion
         return np.array(self.compliance_mm_n) * platform.tension_n[:, :, None] * platform.direction
 
@@ -85,7 +83,6 @@ class StrutBending(Mechanism):
     bending_stiffness_n_mm2: float = 1.0e10
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """Shortening, so negative `(n, 6)`."""
         del motion
         length_mm = platform.length_mm
         load_n_mm = self.rod_kg * GRAVITY_M_S2 * np.linalg.norm(across(platform.direction), axis=2) / length_mm

@@ -21,10 +21,19 @@ from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 
-MOVED: dict[str, tuple[Any, str, tuple[float, ...], int]] = {
+SHORTEST_MM = ((0.0035, 4), (0.007, 4), (0.01, 3))
+"""Shortest travel over which friction sticks, and how many lengths are tried; usually 0.005 of four."""
+
+MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "IDLE": (explain, "IDLE", (0.7, 0.97), 4),
     "HALF": (shape_look, "HALF", (0.25, 1.0), 4),
     "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
+    "STICKING_MM": (
+        shapes,
+        "STICKING_MM",
+        tuple((first, 0.01, 0.02, 0.04)[-count:] for first, count in SHORTEST_MM),
+        23,
+    ),
 }
 """By constant: its module and name, other values, and the session on which it decides most."""
 
@@ -49,12 +58,17 @@ def main() -> None:
     )
     parser.add_argument("folder", type=Path, help="that `python -m tests.plant.foreign make` wrote")
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--only", choices=MOVED, help="move this one; keep the others' stored figures")
     given = parser.parse_args()
     columns: dict[str, tuple[str, float, float]] = {}
-    for name, (module, attribute, values, session) in MOVED.items():
+    if given.only:
+        columns = {key: tuple(cells) for key, cells in json.loads(given.out.read_text("utf-8"))["figures"].items()}
+    for name in [given.only] if given.only else MOVED:
+        module, attribute, values, session = MOVED[name]
         usual = getattr(module, attribute)
         for value in (usual, *values):
-            key = f"session {session}, as it is" if value == usual else f"session {session}, {name} {value:g}"
+            told = ", ".join(f"{one:g}" for one in (value if isinstance(value, tuple) else (value,)))
+            key = f"session {session}, as it is" if value == usual else f"session {session}, {name} {told}"
             if key in columns:
                 continue
             with mock.patch.object(module, attribute, value):
@@ -62,7 +76,7 @@ def main() -> None:
             sys.stderr.write(f"{key}: {columns[key]}\n")
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
-        "data": "Two sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5 and 6.",
+        "data": "Three sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, and 0.005, 0.01, 0.02, 0.04 mm.",
         "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,

@@ -15,6 +15,7 @@ from dbbstation.diagnosis.thinned import thinned
 from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.disturbances import BumpedJig, RingingStrut
+from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.perturbed_forms import GradualBacklash
 from tests.plant.mechanisms.reversal_forms import StickSlip
@@ -126,3 +127,15 @@ def test_a_strut_that_sticks_and_slips_is_no_spike(tmp_path):
     found = diagnose_sessions([tmp_path / "s"], None, (), lambda _: None).diagnosis
     assert {str(one.verdict) for one in found.sources} <= {"ruled-out", "not-testable"}
     assert (found.unexplained.strut, found.unexplained.variable) == (2, "travel since its reversal")
+
+
+@pytest.mark.slow
+def test_what_is_there_beside_a_strut_that_sticks_is_named_alone(tmp_path):
+    """Gravity keeps its name, and no rival over reversals, loads or joints gets one."""
+    stick = StickSlip((0.0, 3.0, 0.0, 0.0, 2.0, 0.0), jerks=5)
+    plan = subset(table_ii_plan(12), EIGHT)
+    record(tmp_path / "s", seed=12, plan=plan, mechanisms=[KINEMATICS, stick, Gravity()], rate_hz=25.0)
+    rivals = ["gravity", "backlash", "reversal-spike", "play", "joint-runout"]
+    found = diagnose_sessions([tmp_path / "s"], rivals, (), lambda _: None).diagnosis
+    assert [one.name for one in found.sources if str(one.verdict) not in {"ruled-out", "not-testable"}] == ["gravity"]
+    assert found.sources[0].verdict == "identified"

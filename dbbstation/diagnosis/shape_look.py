@@ -11,11 +11,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
+from scipy.fft import next_fast_len
 from scipy.linalg import qr
 from scipy.sparse import csr_array
 
-from dbbstation.diagnosis.directional_sums import DirectionalSums, NearbyWaves, sides, solved, squares, taken
 from dbbstation.diagnosis.shapes import (
     BALL,
     EVERY,
@@ -28,8 +27,9 @@ from dbbstation.diagnosis.shapes import (
     Samples,
     Shape,
 )
-from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, Ringing, StepForm, Wave, WaveOfTurn
+from dbbstation.inference.forms import Form, Lobes, PlaneStep, Ringing, Wave, WaveOfTurn
 from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.sums import Sums, bumps, peaks, steps
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
@@ -55,15 +55,8 @@ SHORTEST_MM = 4.0
 PIECES = 8192
 """Of time, at the most."""
 
-AT_ONCE = 32
-"""Directions of the base whose transforms are held at once: a hundred megabytes with all of a joint fit."""
-
 SHORTEST_S = 3.0
 """Shortest wave of time that is looked for; four pieces where the recordings last longer than that allows [s]."""
-
-FINER = (1.0 / 30.0, 1.0 / 450.0)
-"""Steps of frequency about the best one of the first look, as shares of one over the extent of the variable: the last
-keeps the phase of a wave to a degree from one end to the other."""
 
 WIDTHS_MM = (3.0, 5.0, 8.0, 13.0, 20.0)
 """Standard deviations of bumps of strut length: dents and bent covers [mm]."""
@@ -129,7 +122,7 @@ class TemplateScan:
 
     def sums(
         self, variable: str, strut: int | None, moves: str, pieces: Callable[[NDArray[np.float64]], NDArray[np.int64]]
-    ) -> DirectionalSums:
+    ) -> Sums:
         """Sum over pieces of a variable."""
         values = np.concatenate([run.values[variable] for run in self._runs])
         gain = np.vstack([run.gain[moves] for run in self._runs])
@@ -137,7 +130,7 @@ class TemplateScan:
             gain = gain[:, strut - 1 : strut]
             values = values[:, strut - 1] if variable in OF_STRUTS else values
         gain = gain * (PLAUSIBLE_MM / self._noise)
-        _, piece, number = np.unique(pieces(values), return_inverse=True, return_counts=True)
+        own, piece, number = np.unique(pieces(values), return_inverse=True, return_counts=True)
         many, directions = len(values), gain.shape[1]
         rows = np.argsort(piece, kind="stable")
         ends = np.concatenate([[0], np.cumsum(number)])
@@ -149,8 +142,9 @@ class TemplateScan:
 
         at = added(values.reshape(many, -1)) / number[:, None]
         products = (gain[:, :, None] * gain[:, None, :]).reshape(many, -1)
-        return DirectionalSums(
+        return Sums(
             at=at[:, 0] if values.ndim == 1 else at,
+            place=own - own[0],
             rest=added(gain * self._rest[:, None]),
             gains=added(products).reshape(-1, directions, directions),
             base=np.stack([added(self._base, gain[:, d]) for d in range(directions)], axis=1),
@@ -163,16 +157,16 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
     for strut in range(1, STRUTS + 1):
         low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
         sums = look.sums("strut-length", strut, EVERY, partial(_piece, low=low, width=PIECE_MM))
-        found += _waves(
-            "strut-length", strut, EVERY, sums, np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low)
-        )
-        found += _best("strut-length", "bump", strut, EVERY, sums, _bumps(low, high), _BUMPS_APART)
-        found += _best("strut-length", "step", strut, EVERY, sums, _steps(low, high), 1.0)
+        grid = np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low)
+        explained = sums.of_forms([Wave(float(frequency)) for frequency in grid])
+        found += _waves("strut-length", strut, EVERY, sums, grid, explained)
+        found += _best("strut-length", "bump", strut, EVERY, sums, bumps(low, high, WIDTHS_MM), _BUMPS_APART)
+        found += _best("strut-length", "step", strut, EVERY, sums, steps(low, high, _STEPS), 1.0)
         if "strut-force" in extent.low:
             low, high = (float(limit["strut-force"][strut - 1]) for limit in (extent.low, extent.high))
             wide = max(high - low, 1e-6) / _FORCES
             sums = look.sums("strut-force", strut, EVERY, partial(_piece, low=low, width=wide))
-            found += _best("strut-force", "step", strut, EVERY, sums, _steps(low, high), 1.0)
+            found += _best("strut-force", "step", strut, EVERY, sums, steps(low, high, _STEPS), 1.0)
     if "time" in extent.low:
         low, high = float(extent.low["time"]), float(extent.high["time"])
         wide = max(SHORTEST_S / 4.0, (high - low) / PIECES)
@@ -180,8 +174,11 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
         movers += [(strut, EVERY) for strut in range(1, STRUTS + 1)]
         for own, moves in movers:
             sums = look.sums("time", own, moves, partial(_piece, low=low, width=wide))
-            found += _waves_of_time(own, moves, sums, low, wide, high - low)
-            found += _best("time", "step", own, moves, sums, _steps(low, high, _TIMES), 1.0)
+            length = next_fast_len(2 * (int(sums.place[-1]) + 1), real=True)
+            first, last = max(1, int(np.floor(0.5 * length * wide / (high - low)))), length // 4
+            grid = np.arange(first, last) / (length * wide)
+            found += _waves("time", own, moves, sums, grid, sums.of_waves(length, first, last))
+            found += _best("time", "step", own, moves, sums, steps(low, high, _TIMES), 1.0)
     if "time since its reversal" in extent.low:
         rings: list[Form] = [
             Ringing(float(period_s), decay_s)
@@ -254,15 +251,6 @@ def _place(values: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.asarray(x * 100_000 + y, dtype=np.int64)
 
 
-def _bumps(low: float, high: float) -> list[Form]:
-    return [Bump(float(at), width) for width in WIDTHS_MM for at in np.arange(low + width, high - width, width / 2.0)]
-
-
-def _steps(low: float, high: float, count: int = _STEPS) -> list[Form]:
-    wide = (high - low) / count
-    return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
-
-
 def _lines(places: NDArray[np.float64]) -> list[Form]:
     found: list[Form] = []
     for across in ACROSS_DEG:
@@ -274,80 +262,24 @@ def _lines(places: NDArray[np.float64]) -> list[Form]:
 
 
 def _best(
-    variable: str, kind: str, strut: int | None, moves: str, sums: DirectionalSums, forms: Sequence[Form], apart: float
+    variable: str, kind: str, strut: int | None, moves: str, sums: Sums, forms: Sequence[Form], apart: float
 ) -> list[Shape]:
-    if not forms:
-        return []
-    curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
+    """Return local maxima of explanation."""
     tried = max(len(forms) / apart, 1.0)
-    explained = sums.explained(curves)
     return [
-        Shape(variable, kind, strut, moves, forms[k], tried, float(explained[k])) for k in _peaks(explained, STRONGEST)
+        Shape(variable, kind, strut, moves, form, tried, explained) for explained, form in sums.best(forms, STRONGEST)
     ]
 
 
-def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
-    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
-    peaks = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
-    return np.asarray(peaks[np.argsort(-explained[peaks])][:most])
-
-
 def _waves(
-    variable: str, strut: int | None, moves: str, sums: DirectionalSums, grid: NDArray[np.float64]
-) -> list[Shape]:
-    if len(grid) == 0:
-        return []
-    explained = sums.explained(_cosines(sums.at, grid))
-    return _finer(variable, strut, moves, sums, grid, explained)
-
-
-def _finer(
     variable: str,
     strut: int | None,
     moves: str,
-    sums: DirectionalSums,
+    sums: Sums,
     grid: NDArray[np.float64],
-    of_grid: NDArray[np.float64],
+    explained: NDArray[np.float64],
 ) -> list[Shape]:
-    extent = float(np.ptp(sums.at))
-    found = []
-    for k in _peaks(of_grid, MADE_FINER):
-        waves, best = NearbyWaves(sums, float(grid[k])), grid[k]
-        for step in FINER:
-            near = best + np.arange(-15, 16) * step / extent
-            near = near[near > 0.25 / extent]
-            by_near = waves.explained(near)
-            best = near[int(by_near.argmax())]
-        found.append((float(by_near.max()), Wave(float(best))))
-    found.sort(key=lambda one: -one[0])
+    """Return waves of a frequency grid, refined."""
+    found = sums.finer([float(grid[k]) for k in peaks(explained, MADE_FINER)], float(np.ptp(sums.at)))
     tried = len(grid) / 2.0
     return [Shape(variable, "wave", strut, moves, wave, tried, explained) for explained, wave in found[:STRONGEST]]
-
-
-def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
-    phase = 2.0 * np.pi * np.outer(at, frequencies)
-    return np.stack([np.cos(phase), np.sin(phase)], axis=2)
-
-
-def _waves_of_time(
-    strut: int | None, moves: str, sums: DirectionalSums, low: float, width: float, extent: float
-) -> list[Shape]:
-    place = np.floor((sums.at - low) / width).astype(np.int64)
-    size = next_fast_len(2 * (int(place.max()) + 1), real=True)
-    first, last = max(1, int(np.floor(0.5 * size * width / extent))), size // 4
-
-    def transformed(values: NDArray[np.float64], step: int) -> NDArray[np.complex128]:
-        wide = np.zeros((size, values.shape[1]))
-        wide[place] = values
-        return np.asarray(rfft(wide, axis=0)[step * first : step * last : step])
-
-    grid = np.arange(first, last) / (size * width)
-    directions = sums.rest.shape[1]
-    rest = transformed(sums.rest, 1)
-    of_base = np.zeros((len(grid), 2 * directions, 2 * directions))
-    for first_column in range(0, sums.base.shape[2], AT_ONCE):
-        some = sums.base[:, :, first_column : first_column + AT_ONCE].reshape(len(place), -1)
-        of_base += taken(sides(transformed(some, 1).reshape(len(grid), directions, -1)))
-    twice = transformed(sums.gains.reshape(len(place), -1), 2).reshape(len(grid), directions, directions)
-    explained = solved(sides(rest), of_base, squares(sums.gains.sum(axis=0), twice))
-    return _finer("time", strut, moves, sums, grid, explained)

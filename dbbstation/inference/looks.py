@@ -13,7 +13,7 @@ import numpy as np
 from dbbstation.inference.curves import Spline
 from dbbstation.inference.forms import Bump, StepForm, Wave
 from dbbstation.inference.patterns import Family, Pattern, log_odds
-from dbbstation.inference.pieces import Sums, peaks
+from dbbstation.inference.sums import FINER, Sums, bumps, peaks, steps
 from dbbstation.inference.variables import Kind
 
 if TYPE_CHECKING:
@@ -59,9 +59,6 @@ NEIGHBOUR = 0.7
 """Share of what the best form about one of a list explains that this one explains itself, at the least: a wave half a step of
 frequency away explains sinc²(1/4) = 0.81 of it, a bump half a step away and a factor of 1.4 wider 0.92."""
 
-FINER = (1.0 / 30.0, 1.0 / 450.0)
-"""Steps of frequency about the best one, as shares of one over the range: the last keeps the phase to a degree."""
-
 
 def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_], size: float) -> list[Pattern]:
     """Return the best waves, bumps and steps over variables.
@@ -75,71 +72,65 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
         pieces = min(PIECES, len(np.unique(values)) // 2, len(values) // ROWS_PER_PIECE)
         if pieces < 2 * PIECES_PER_WAVE:
             continue
-        sums = Sums.over(left, values, pieces)
+        sums = _sums(left, values, pieces, size)
         # Where noise is not white, a first look does not know how much of each form whitening leaves.
         roughly = left.whitening is not None
         most = STRONGEST_COLOURED if roughly else STRONGEST
-        found += _waves(variable, sums, size, pieces, most, roughly=roughly)
+        found += _waves(variable, sums, float(np.ptp(values)), pieces, most, roughly=roughly)
         finer = [n for n in FINER_CURVES if n * PIECES_PER_WAVE <= pieces]
         found += [
             _pattern(variable, Family.CURVE, Spline(variable.low, variable.high, n), 1.0, f"{n} points") for n in finer
         ]
         if variable.kind is not Kind.TIME:
-            found += _best(variable, Family.BUMP, sums, _bumps(variable, pieces), size, 3.0, most, roughly=roughly)
-            found += _best(variable, Family.STEP, sums, _steps(variable), size, 1.0, most, roughly=roughly)
+            widths = [variable.extent / w for w in WIDTHS if w <= pieces / 2]
+            for family, forms, apart in (
+                (Family.BUMP, bumps(variable.low, variable.high, widths), 3.0),
+                (Family.STEP, steps(variable.low, variable.high, STEPS), 1.0),
+            ):
+                tried = max(len(forms) / apart, 1.0)  # of neighbours every so many-th counts as a try
+                least = 0.0 if roughly else _least(tried)
+                for explained, form in sums.best(forms, most):
+                    if explained >= least:
+                        (_, best), *_ = sums.best(_near(form), 1)
+                        found.append(_pattern(variable, family, best, tried))
     return found
 
 
-def _waves(variable: Variable, sums: Sums, size: float, pieces: int, strongest: int, *, roughly: bool) -> list[Pattern]:
-    """Return waves from twice the range to four pieces, refined."""
-    extent = variable.extent
-    grid, explained = sums.explained_by_waves(min(MOST_CYCLES, pieces / PIECES_PER_WAVE), size)
-    if not len(grid):
-        return []
-    found: list[tuple[float, float]] = []
-    least = 0.0 if roughly else _least(len(grid) / 2.0)
-    for k in peaks(explained, 2 * strongest):
-        if explained[k] < least:
-            break
-        found.append(_nearest(sums, float(grid[k]), FINER[0] / extent, 0.25 / extent, size))
-    found = sorted(found, reverse=True)[:strongest]
-    finest = [_nearest(sums, frequency, FINER[1] / extent, 0.25 / extent, size)[1] for _, frequency in found]
-    return [_pattern(variable, Family.WAVE, Wave(frequency), len(grid) / 2.0) for frequency in finest]
+def _sums(left: Left, values: NDArray[np.float64], pieces: int, size: float) -> Sums:
+    """Return sums over equal pieces of a variable, shape (n,)."""
+    low, high = float(values.min()), float(values.max())
+    place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
+    own, number, count = np.unique(place, return_inverse=True, return_counts=True)
+    order = np.argsort(number, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(count)[:-1]])
+
+    def added(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.add.reduceat(rows[order], starts, axis=0), dtype=np.float64)
+
+    squares, base = np.asarray(count * size**2, dtype=np.float64), size * added(left.beside)
+    if left.whitening is not None:
+        # How much whitening leaves of a curve depends on how fast it changes; for a first look, as of the noise itself.
+        squares, base = squares * (left.coloured.innovation / left.coloured.sigma) ** 2, base[:, :0]
+    return Sums(
+        added(values) / count, own, size * added(left.towards)[:, None], squares[:, None, None], base[:, None, :]
+    )
 
 
-def _nearest(sums: Sums, frequency: float, step: float, lowest: float, size: float) -> tuple[float, float]:
-    near = np.asarray(frequency + np.arange(-15, 16) * step, dtype=np.float64)
-    near = near[near > lowest]
-    by_near = sums.explained(_cosines(sums.at, float(near[0]), step, len(near)), size)
-    k = int(by_near.argmax())
-    return float(by_near[k]), float(near[k])
-
-
-def _best(
-    variable: Variable,
-    family: Family,
-    sums: Sums,
-    forms: Sequence[Form],
-    size: float,
-    apart: float,
-    strongest: int,
-    *,
-    roughly: bool,
+def _waves(
+    variable: Variable, sums: Sums, extent: float, pieces: int, strongest: int, *, roughly: bool
 ) -> list[Pattern]:
-    """Return local maxima of a list; every so many-th counts as a try."""
-    if not forms:
+    """Return waves from twice the range to four pieces, refined."""
+    length = 2 * (int(sums.place[-1]) + 1)
+    last = min(int(2.0 * min(MOST_CYCLES, pieces / PIECES_PER_WAVE)), length // 4)
+    if last <= 1:
         return []
-    tried = max(len(forms) / apart, 1.0)
-    found = []
-    explained = _explained(sums, forms, size)
+    explained, tried = sums.of_waves(length, 1, last), (last - 1) / 2.0
     least = 0.0 if roughly else _least(tried)
-    for k in peaks(explained, strongest):
-        if explained[k] < least:
-            break
-        near = _near(forms[k])
-        best = near[int(_explained(sums, near, size).argmax())]
-        found.append(_pattern(variable, family, best, tried))
-    return found
+    grid = np.arange(1, last) * pieces / (length * extent)
+    found = sums.finer(
+        [float(grid[k]) for k in peaks(explained, 2 * strongest) if explained[k] >= least], variable.extent
+    )
+    return [_pattern(variable, Family.WAVE, wave, tried) for _, wave in found[:strongest]]
 
 
 def _least(tried: float) -> float:
@@ -185,10 +176,6 @@ CLOSER = (1.0, 1.0, 0.3, 0.3, 0.1, 0.03)
 """Steps in which a place is moved to where it is best, in steps of the finest list."""
 
 
-def _explained(sums: Sums, forms: Sequence[Form], size: float) -> NDArray[np.float64]:
-    return sums.explained(np.stack([form.columns(sums.at) for form in forms], axis=1), size)
-
-
 def _near(form: Form) -> list[Form]:
     if isinstance(form, Bump):
         return [
@@ -214,24 +201,3 @@ def _pattern(variable: Variable, family: Family, form: Form, tried: float, label
         label or " ".join(form.text(variable.unit).split()).replace(" ,", ","),
         tried,
     )
-
-
-def _bumps(variable: Variable, pieces: int) -> list[Form]:
-    low, high, extent = variable.low, variable.high, variable.extent
-    widths = [extent / w for w in WIDTHS if w <= pieces / 2]
-    return [Bump(float(at), w) for w in widths for at in np.arange(low + w, high - w, w / 2.0)]
-
-
-def _steps(variable: Variable) -> list[Form]:
-    wide = variable.extent / STEPS
-    places = np.linspace(variable.low, variable.high, STEPS + 1)[2:-2]
-    return [StepForm(float(at), wide / 4.0) for at in places]
-
-
-def _cosines(at: NDArray[np.float64], lowest: float, step: float, count: int) -> NDArray[np.float64]:
-    """Return cosines and sines of equidistant frequencies by rotation, shape (b, m, 2)."""
-    turned = np.empty((len(at), count), dtype=np.complex128)
-    turned[:, 0] = np.exp(2j * np.pi * lowest * at)
-    turned[:, 1:] = np.exp(2j * np.pi * step * at)[:, None]
-    np.cumprod(turned, axis=1, out=turned)
-    return np.stack([turned.real, turned.imag], axis=2)

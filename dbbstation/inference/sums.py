@@ -1,4 +1,4 @@
-"""Readings summed over pieces of a variable, and what curves explain."""
+"""Sums over pieces of a variable, which make curves cheap and exact within a piece; what curves explain."""
 
 from __future__ import annotations
 
@@ -6,17 +6,33 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import rfft
 from scipy.special import jv
 
+from dbbstation.inference.forms import Bump, Form, StepForm, Wave
+
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionalSums:
-    """Sums over one variable for d directions."""
+class Sums:
+    """Sums over one variable for d directions.
+
+    Gains are in prior standard deviations of an amplitude over noise.
+
+    Attributes:
+        at: piece means, shape (b,) or (b, c).
+        place: piece numbers from zero, shape (b,).
+        rest: gain times residual, shape (b, d).
+        gains: gain times gain, shape (b, d, d).
+        base: gain times base directions, shape (b, d, k).
+    """
 
     at: NDArray[np.float64]
+    place: NDArray[np.int64]
     rest: NDArray[np.float64]
     gains: NDArray[np.float64]
     base: NDArray[np.float64]
@@ -31,6 +47,75 @@ class DirectionalSums:
         gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
         return solved(rest, taken(base), gains)
 
+    def of_forms(self, forms: Sequence[Form]) -> NDArray[np.float64]:
+        """Return squares explained by forms, shape (m,)."""
+        curves = [form.columns(self.at) for form in forms]
+        return self.explained(np.stack(curves, axis=1)) if curves else np.zeros(0)
+
+    def of_waves(self, length: int, first: int, last: int) -> NDArray[np.float64]:
+        """Return squares explained by waves of `first` to `last` - 1 periods in `length` pieces, by Fourier transform."""
+        pieces, directions, width = self.base.shape
+
+        def transformed(values: NDArray[np.float64], step: int) -> NDArray[np.complex128]:
+            wide = np.zeros((length, values.shape[1]))
+            wide[self.place] = values
+            return np.asarray(rfft(wide, axis=0)[step * first : step * last : step])
+
+        of_base = np.zeros((last - first, 2 * directions, 2 * directions))
+        for column in range(0, width, AT_ONCE):
+            some = self.base[:, :, column : column + AT_ONCE].reshape(pieces, -1)
+            of_base += taken(sides(transformed(some, 1).reshape(last - first, directions, -1)))
+        twice = transformed(self.gains.reshape(pieces, -1), 2).reshape(last - first, directions, directions)
+        return solved(sides(transformed(self.rest, 1)), of_base, squares(self.gains.sum(axis=0), twice))
+
+    def best(self, forms: Sequence[Form], most: int) -> list[tuple[float, Form]]:
+        """Return the local maxima of a list with what they explain, best first."""
+        explained = self.of_forms(forms)
+        return [(float(explained[k]), forms[k]) for k in peaks(explained, most)]
+
+    def finer(self, frequencies: Iterable[float], extent: float) -> list[tuple[float, Wave]]:
+        """Return waves at their best frequencies near given ones with what they explain, best first.
+
+        Args:
+            extent: of the variable.
+        """
+        found = []
+        for frequency in frequencies:
+            waves, best = NearbyWaves(self, frequency), frequency
+            for step in FINER:
+                near = np.asarray(best + np.arange(-15, 16) * step / extent, dtype=np.float64)
+                near = near[near > 0.25 / extent]
+                explained = waves.explained(near)
+                best = float(near[int(explained.argmax())])
+            found.append((float(explained.max()), Wave(best)))
+        return sorted(found, key=lambda one: -one[0])
+
+
+FINER = (1.0 / 30.0, 1.0 / 450.0)
+"""Steps of frequency about the best one, as shares of one over the extent: the last keeps a wave's phase to a degree from one end to the
+other."""
+
+AT_ONCE = 32
+"""Directions of the base whose transforms are held at once: a hundred megabytes with all of a joint fit."""
+
+
+def peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+    """Return local maxima, best first."""
+    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
+    found = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
+    return np.asarray(found[np.argsort(-explained[found])][:most])
+
+
+def bumps(low: float, high: float, widths: Iterable[float]) -> list[Form]:
+    """Return bumps of some widths away from the ends."""
+    return [Bump(float(at), width) for width in widths for at in np.arange(low + width, high - width, width / 2.0)]
+
+
+def steps(low: float, high: float, count: int) -> list[Form]:
+    """Return sharp steps away from the ends."""
+    wide = (high - low) / count
+    return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
+
 
 class NearbyWaves:
     """Squares explained by waves near a frequency, from polynomial sums.
@@ -39,7 +124,7 @@ class NearbyWaves:
     9.1.44 and 9.1.45]; `TERMS` suffice within `REACH` waves.
     """
 
-    def __init__(self, sums: DirectionalSums, frequency: float) -> None:
+    def __init__(self, sums: Sums, frequency: float) -> None:
         self._frequency = frequency
         low, high = float(sums.at.min()), float(sums.at.max())
         self._half = max((high - low) / 2.0, np.finfo(np.float64).tiny)

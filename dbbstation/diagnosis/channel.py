@@ -18,6 +18,7 @@ from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_M
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import parts_of
 from dbbstation.diagnosis.shapes import variables
+from dbbstation.inference.bank import spacing_of
 from dbbstation.inference.blocks import Block, compress, with_random
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
@@ -364,10 +365,8 @@ class CircleChannel:
 
 
 def _spacing(parameter: Parameter, value: float) -> float:
-    grid = np.sort(np.array(parameter.grid))
-    if len(grid) == 1:
+    if len(parameter.grid) == 1:
         return parameter.plausible
     if parameter.listed:
         return LISTED_WITHIN * value
-    k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))
-    return float(grid[k] - grid[k - 1])
+    return spacing_of(sorted(parameter.grid), value)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.triangle import RANK
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -31,9 +32,6 @@ NEGLIGIBLE = 30.0
 
 RIVALS = 3
 """Causes in the place of each member that are laid out at their own best values before they are compared."""
-
-RANK = 1e-9
-"""Rank tolerance: share of the largest eigenvalue below which a direction says nothing."""
 
 
 class Alternatives:

@@ -32,6 +32,7 @@ from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import solve
+from dbbstation.inference.triangle import RANK
 from dbbstation.inference.uneven import (
     has_long_tails,
     log_student,
@@ -507,9 +508,6 @@ NOISE_ROUNDS = 8
 
 TIE = 1e-3
 """Log odds by which a variable is less probable than the one before it in the table: of two that say the same, the first is named."""
-
-RANK = 1e-9
-"""Share of the largest singular value of the base below which a direction says nothing."""
 
 SETTLED = 0.03
 """Change of the noise that is none: its spectrum is hardly known better."""

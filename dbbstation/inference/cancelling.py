@@ -36,12 +36,15 @@ def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: flo
     return Cancelling({name: scale * own for name, own in rms.items() if own > whole}, scale * whole, unit)
 
 
-def effects_by_name(settled: Settled, names: Mapping[str, str] | None = None) -> dict[str, NDArray[np.float64]]:
-    """Return the best hypothesis's effects by name, shape (n,) each.
+def cancelling_of(settled: Settled, unit: str, names: Mapping[str, str] | None = None) -> Cancelling | None:
+    """Return cancelling effects of the best hypothesis and parameters of the base, or None.
 
     Args:
         names: display names by member; equal ones are summed. None: own names.
     """
+    base = settled.channel.base
     shown = {name: name if names is None else names.get(name) or name for name in settled.best.names}
     groups = {of: [name for name in shown if shown[name] == of] for of in sorted(set(shown.values()))}
-    return {of: settled.effect(members) for of, members in groups.items()}
+    effects = {of: settled.effect(members) for of, members in groups.items()}
+    parameters = enumerate(zip(base.names, settled.base_values(), strict=True))
+    return cancelling(effects | {name: base.samples[:, k] * value for k, (name, value) in parameters}, unit)

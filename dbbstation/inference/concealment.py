@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.blocks import spread
+from dbbstation.inference.triangle import axes_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,9 +52,8 @@ def concealment(
     stacked = spread(blocks, size)[:, wanted]
     explaining, signature = stacked[:, : len(fitted)], stacked[:, len(fitted) :] @ amplitudes
     explaining = explaining if free is None else explaining @ free
-    u, s, _ = np.linalg.svd(explaining / np.maximum(np.linalg.norm(explaining, axis=0), 1e-300), full_matrices=False)
-    u = u[:, s > SEEN * s[0]]
-    rest = signature - u @ (u.T @ signature)
+    axes = axes_of(explaining, SEEN)
+    rest = signature - axes @ (axes.T @ signature)
     count = sum(block.count for block in blocks)
     whole2, rest2 = float(signature @ signature), float(rest @ rest)
     share = 1.0 - rest2 / whole2 if whole2 > 0.0 else 0.0

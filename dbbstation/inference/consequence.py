@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from dbbstation.inference.triangle import left_by
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -43,8 +45,7 @@ def may_result(variable: Variable, channel: Channel) -> bool:
         for values in (channel.simulated.values, channel.residual)
     )
     whole = float(np.sum(np.square(values - values.mean())))
-    left = _left(values, simulated)
-    both = _left(values, np.hstack([simulated, carried]))
+    left, both = (float(np.sum(np.square(left_by(by, values)))) for by in (simulated, np.hstack([simulated, carried])))
     if not STILL * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
         return False
     free = len(values) - simulated.shape[1] - carried.shape[1]
@@ -64,8 +65,3 @@ def _with_derivatives(
             found[rows, 2] = np.gradient(values[rows], time[rows])
             found[rows, 3] = np.gradient(found[rows, 2], time[rows])
     return found
-
-
-def _left(values: NDArray[np.float64], by: NDArray[np.float64]) -> float:
-    scaled = by / np.maximum(np.linalg.norm(by, axis=0), 1e-300)
-    return float(np.sum(np.square(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])))

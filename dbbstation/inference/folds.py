@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import numpy as np
 
 from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.inference.followed import left_without
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
@@ -132,23 +134,17 @@ def held_out_error(
         plain = float(np.mean(channel.residual[~rows])) if reference is None else reference(~rows)
         refitted = channel.residual - channel.base.samples @ channel.without(rows).refitted()
         corrected = channel.residual - settled.predicted()
-        one, two, three = (_rms(errors[rows]) for errors in (channel.residual - plain, refitted, corrected))
+        one, two, three = (rms(errors[rows]) for errors in (channel.residual - plain, refitted, corrected))
         found.append(Fold(name, int(rows.sum()), one, two, three, _gains(settled, rows)))
     return HeldOutError(tuple(found))
 
 
 def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
-    residual, members = settled.channel.residual, settled.best.members
-    with_all = float(np.sum(np.square((residual - settled.predicted())[rows])))
-    columns = {member.cause.name: settled.bank.samples(member.columns) for member in members}
+    """Return each member's gain in unused rows, others refitted, by kind."""
+    with_all = float(np.sum(np.square(left_without(settled, ())[rows])))
     found: dict[Kind, float] = {}
-    for member in members:
-        effect = np.zeros(len(residual))
-        if others := settled.best.without(member.cause.name):
-            samples = np.hstack([columns[other.cause.name] for other in others])
-            effect = samples @ settled.comparison.estimates(others).values
-        error = residual - effect - settled.channel.base.samples @ settled.base_values(effect)
-        kind = settled.bank.kind_of(member.cause.name)
+    for member in settled.best.members:
+        kind, error = settled.bank.kind_of(member.cause.name), left_without(settled, [member.cause.name])
         found[kind] = found.get(kind, 0.0) + float(np.sum(np.square(error[rows]))) - with_all
     return found
 
@@ -194,7 +190,3 @@ def part_numbers(lengths: Sequence[int]) -> NDArray[np.int64]:
 
 def _beside(k: int, count: int) -> list[int]:
     return [first for first in (k - 1, k) if 0 <= first < count - 1]
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -313,7 +313,7 @@ def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
     """Return the residual after effects of these variables alone, refitted; none given: after everything."""
     follow = follow_of(one)
     rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
-    return _left_without(one, rest)
+    return left_without(one, rest)
 
 
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignored: Collection[str] = ()) -> ClassGain:
@@ -326,8 +326,8 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
         one, rows, follow = part.settled, part.rows, follow_of(part.settled)
         out = [name for name in one.best.names if follow(name) <= set(ignored)]
         names = [n for n in one.best.names if n not in out and (wanted is None or follow(n) & set(wanted))]
-        with_all = _left_without(one, out)
-        without = _left_without(one, [*out, *names]) if names else with_all
+        with_all = left_without(one, out)
+        without = left_without(one, [*out, *names]) if names else with_all
         after += float(np.sum(np.square(with_all[rows])))
         before += float(np.sum(np.square(without[rows])))
         brought.append(log_density(one, rows, with_all) - log_density(one, rows, without) if names else 0.0)
@@ -336,7 +336,8 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
     return ClassGain(DensityGains(tuple(brought), counts), float(np.sqrt(before / mean)), float(np.sqrt(after / mean)))
 
 
-def _left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
+def left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
+    """Return the residual without some members, others refitted, shape (n,)."""
     if not names:
         return np.asarray(one.channel.residual - one.predicted())
     effect = np.zeros(len(one.channel.residual))

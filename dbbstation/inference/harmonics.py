@@ -200,12 +200,7 @@ def misfit(
         noise: None: from high harmonics.
     """
     low, high = bands(min(len(residual) for residual in residuals))
-    all_coefficients = _all_coefficients(residuals, phases_rad, high)
-    first = [1, high + 1]
-    for group in set(groups):
-        of_group = [k for k, g in enumerate(groups) if g == group]
-        all_coefficients[np.ix_(of_group, first)] -= all_coefficients[np.ix_(of_group, first)].mean(axis=0)
-    mean, by_harmonic = _squares(all_coefficients, high)
+    mean, by_harmonic = _squares(centred_coefficients(residuals, phases_rad, groups, high), high)
     if noise is None:
         noise = noise_spectrum(by_harmonic[low:], low, 2.0 * len(residuals))
     counts = np.r_[1.0, np.full(low, 2.0)] * len(residuals)
@@ -220,6 +215,20 @@ def misfit(
     excess = max(float(measured.sum()) - expected, 0.0) / len(residuals) / samples
     probability = float(fdtrc(freedom, noise.freedom, ratio))
     return Misfit(probability, float(np.sqrt(noise.power[0])), float(np.sqrt(excess)), ratio)
+
+
+def centred_coefficients(
+    residuals: Sequence[NDArray[np.float64]],
+    phases_rad: Sequence[NDArray[np.float64]],
+    groups: Sequence[object],
+    highest: int,
+) -> NDArray[np.float64]:
+    """Return all runs' coefficients without each group's common first harmonic, shape (runs, 2 highest + 1)."""
+    found, first = _all_coefficients(residuals, phases_rad, highest), [1, highest + 1]
+    for group in set(groups):
+        rows = [k for k, g in enumerate(groups) if g == group]
+        found[np.ix_(rows, first)] -= found[np.ix_(rows, first)].mean(axis=0)
+    return found
 
 
 def noise_left_by(

@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
+from dbbstation.inference.triangle import left_by
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -170,9 +171,9 @@ def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], 
     law = bank.laws.get(one[0].cause.name) if len(one) == 1 else None
     if law is not None and law.grids:
         forms += [bank.whitened(law.columns(point)) for point in product(*((grid[0], grid[-1]) for grid in law.grids))]
-    left = float(np.sum(np.square(_left(effect, beside))))
+    left = float(np.sum(np.square(left_by(beside, effect))))
     return any(
-        float(np.sum(np.square(_left(effect, np.hstack([beside, form]))))) <= (1.0 - EQUIVALENT**2) * left
+        float(np.sum(np.square(left_by(np.hstack([beside, form]), effect)))) <= (1.0 - EQUIVALENT**2) * left
         for form in forms
     )
 
@@ -183,8 +184,3 @@ def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Membe
 
 def _count(members: Sequence[Member]) -> int:
     return sum(len(member.variant.columns) for member in members)
-
-
-def _left(effect: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
-    scaled = by / np.maximum(np.linalg.norm(by, axis=0), 1e-300)
-    return np.asarray(effect - scaled @ np.linalg.lstsq(scaled, effect, rcond=None)[0])

@@ -15,6 +15,7 @@ from dbbstation.inference.named_values import named_values, with_jackknife
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Verdict
 
@@ -191,7 +192,7 @@ class CauseJudge:
             values, covariance = self._values[cause.name]
         sigmas = self._sigmas(shown, values, covariance)
         effect = self._settled.bank.samples(shown.columns) @ values
-        whole, rms, confounded = self._concealed(shown, effect, values)
+        whole, beyond, confounded = self._concealed(shown, effect, values)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
         gains = self._gains(cause.name) if member is not None else None
         law = self._settled.bank.laws.get(cause.name)
@@ -210,7 +211,7 @@ class CauseJudge:
             variables=tuple(v.name for v in variables),
             probability=probability,
             log_factor=gain,
-            rms=rms,
+            rms=beyond,
             sigmas=sigmas,
             whole_rms=whole,
             confounded=confounded,
@@ -218,7 +219,7 @@ class CauseJudge:
             spans=tuple(_span(v.values[largest], v.name, v.unit) for v in variables) if there else (),
             rows_there=int(largest.sum()),
             rows=rows,
-            blocks=tuple(_rms(effect[rows] - effect.mean()) for rows in channel.blocks) if there else (),
+            blocks=tuple(rms(effect[rows] - effect.mean()) for rows in channel.blocks) if there else (),
             equivalent=equal if len(equal) > 1 else (),
             ambiguous_with=others,
             text=text,
@@ -347,9 +348,9 @@ class CauseJudge:
     ) -> tuple[float, float, float]:
         """Return an effect's rms, its rms beyond the base, and the absorbed share."""
         kept = effect[self._settled.channel.kept]
-        whole = _rms(kept - kept.mean())
+        whole = rms(kept - kept.mean())
         fitted = self._settled.bank.base_values(-effect) - self._without
-        rest = _rms(kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept])
+        rest = rms(kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept])
         share = 1.0 - (rest / whole) ** 2 if whole > 0.0 else 0.0
         return whole, rest, float(np.clip(share, 0.0, 1.0))
 
@@ -367,7 +368,3 @@ def _stretches(effect: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
     inside = np.concatenate([[False], np.abs(effect) > 0.0, [False]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int64)))
     return tuple((int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True))
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

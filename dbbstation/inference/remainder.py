@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from dbbstation.inference.harmonics import bands, coefficients
+from dbbstation.inference.harmonics import bands, centred_coefficients
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,14 +72,9 @@ def remainder(
         groups: sharing the first harmonic.
     """
     low, _ = bands(min(len(residual) for residual in residuals))
-    found = np.array([coefficients(r, phase, low) for r, phase in zip(residuals, phases_rad, strict=True)])
-    first = [1, low + 1]
-    for group in set(groups):
-        rows = [k for k, g in enumerate(groups) if g == group]
-        found[np.ix_(rows, first)] -= found[np.ix_(rows, first)].mean(axis=0)
     samples = float(np.mean([len(residual) for residual in residuals]))
     power = np.r_[noise.power[: low + 1], noise.power[1 : low + 1]]
-    squares = found**2
+    squares = centred_coefficients(residuals, phases_rad, groups, low) ** 2
     order = np.r_[np.arange(low + 1), np.arange(1, low + 1)]
     by_harmonic = [squares[:, order == k] / power[order == k] for k in range(low + 1)]
     in_harmonics = [(float(one.sum()), one.size) for one in by_harmonic]

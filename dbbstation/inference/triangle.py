@@ -1,4 +1,4 @@
-"""Upper triangles of many rows."""
+"""Upper triangles of many rows, and what columns leave of others."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 
 SLAB = 512
 """Rows that are made a triangle at once: with 32 columns 128 kB, which stay in a core's cache."""
+
+RANK = 1e-9
+"""Share of the largest singular value or eigenvalue of columns below which a direction says nothing."""
 
 
 def triangle_of(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -29,3 +32,24 @@ def triangle_of(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
     if not np.isfinite(triangle).all():
         raise ValueError("measurements and their derivatives must be numbers")
     return triangle
+
+
+def axes_of(columns: NDArray[np.float64], least: float = RANK) -> NDArray[np.float64]:
+    """Return orthonormal axes of columns, shape (n, k).
+
+    Args:
+        least: share of the largest singular value of scaled columns below which a direction is none.
+    """
+    u, s, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
+    return np.asarray(u[:, s > least * s[:1]], dtype=np.float64)
+
+
+def left_by(columns: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what columns, shape (n, k), leave of values, shape (n,), by least squares."""
+    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])
+
+
+def rms(values: NDArray[np.float64]) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))

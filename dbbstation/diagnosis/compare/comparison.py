@@ -18,12 +18,13 @@ from dbbstation.diagnosis.compare.pairs import match
 from dbbstation.diagnosis.compare.set_up import with_set_up
 from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
-from dbbstation.inference.cancelling import cancelling, effects_by_name
+from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT, SURE
 from dbbstation.trace.analysis import figures
 
@@ -77,7 +78,7 @@ class RunDifference:
     @property
     def rms_mm(self) -> float:
         """Return the smooth difference's rms [mm]."""
-        return _rms(self.smooth_mm)
+        return rms(self.smooth_mm)
 
     @property
     def differs(self) -> bool:
@@ -139,12 +140,13 @@ class Comparison:
     @cached_property
     def rms_mm(self) -> float:
         """Return the rms of smooth differences [mm]."""
-        return _rms(np.concatenate([run.smooth_mm for run in self.runs]))
+        return rms(np.concatenate([run.smooth_mm for run in self.runs]))
 
     @property
     def cancelling(self) -> Cancelling | None:
         """Return cancelling effects [mm], or None."""
-        return cancelling(effects_by_name(self.settled), "µm", 1e3)
+        settled = self.settled
+        return cancelling({name: settled.effect([name]) for name in sorted(settled.best.names)}, "µm", 1e3)
 
     @property
     def noise_mm(self) -> float:
@@ -154,7 +156,7 @@ class Comparison:
     @property
     def found_rms_mm(self) -> float:
         """Return the rms of findings over all runs [mm]."""
-        return _rms(np.concatenate([run.found_mm for run in self.runs]))
+        return rms(np.concatenate([run.found_mm for run in self.runs]))
 
     @property
     def halves_mm(self) -> tuple[float, float] | None:
@@ -164,7 +166,7 @@ class Comparison:
         )
         if not len(both):
             return None
-        return _rms(both.mean(axis=1)), _rms(0.5 * (both[:, 0] - both[:, 1]))
+        return rms(both.mean(axis=1)), rms(0.5 * (both[:, 0] - both[:, 1]))
 
 
 @with_one_thread
@@ -283,7 +285,3 @@ def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
         f"in session {name} all circles lie on their commanded centres within noise: their centres were removed",
         remedy="compare raw bar lengths; a circle without its centre does not say where it was",
     )
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

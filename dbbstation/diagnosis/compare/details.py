@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.inference.read_off import HALF
+from dbbstation.inference.triangle import RANK
 from dbbstation.inference.verdict import OUT
 from dbbstation.sources.registry import sources_named
 
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.settled import Settled
-
-RANK = 1e-9
-"""Share of the largest singular value of the kinematic columns below which a direction says nothing."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import CURVES, Family, Pattern
+from dbbstation.inference.triangle import axes_of
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import SURE, Acts
 
@@ -130,7 +131,7 @@ def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Itera
     Curves near standstill are not orthogonalised, because friction would extend them to full speed. Over position the
     whole curve also competes with a named law plus remainder.
     """
-    axes = _axes(straight)
+    axes = axes_of(straight, SAME)
     for pattern in patterns:
         if isinstance(pattern.form, Spline) and pattern.form.falls:
             yield pattern  # zero at speed, where causes of one number are known by
@@ -154,11 +155,6 @@ def _of_files(recordings: Recordings) -> Pattern:
     for k, rows in enumerate(recordings.blocks):
         samples[rows, k] = 1.0
     return Pattern(Family.BLOCKS, (), samples)
-
-
-def _axes(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    u, s, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
-    return np.asarray(u[:, s > SAME * s[0]], dtype=np.float64)
 
 
 def _variables(recordings: Recordings) -> dict[str, Variable]:
@@ -297,7 +293,7 @@ def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Sc
     periods = np.arange(PERIODS_IN_TRAVEL, highest, WAVE_STEP)
     if len(periods) < 1.0 / WAVE_STEP:
         return scale, np.inf
-    axes = _axes(smooth)
+    axes = axes_of(smooth, SAME)
     left = recordings.force_n - axes @ (axes.T @ recordings.force_n)
     position = recordings.at(lambda s: s.position_m)
     waves = periods / scale.travel_m

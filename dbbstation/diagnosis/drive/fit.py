@@ -12,7 +12,7 @@ from scipy.special import log_ndtr
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
 from dbbstation.inference.settle import growth, moved
-from dbbstation.inference.triangle import triangle_of
+from dbbstation.inference.triangle import RANK, triangle_of
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -269,9 +269,6 @@ def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:
 
 STRETCHES = 10
 """Stretches that are left out in turn."""
-
-RANK = 1e-9
-"""Singular value, relative, below which a direction is not seen at all."""
 
 
 def log_possible(fitted: DriveFit) -> float:

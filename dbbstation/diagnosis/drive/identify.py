@@ -26,11 +26,10 @@ from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
 from dbbstation.diagnosis.drive.held_out import held_out
 from dbbstation.diagnosis.drive.limits import VAGUE, DriveLimits, limits_of, mass_is_known, sentences
 from dbbstation.diagnosis.drive.locate import locate
-from dbbstation.diagnosis.drive.naming import source_of
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.facts.value import Value
-from dbbstation.inference.cancelling import cancelling, effects_by_name
+from dbbstation.inference.cancelling import cancelling_of
 from dbbstation.inference.detectable import detectable_causes
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
     from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.trace.drive_recording import DriveRecording
 
@@ -134,7 +132,7 @@ def identify(
         locations=locate(put_together, force - base_n, noise, follows) if mismatch else (),
         sources=tuple(_with_weight(finding, values) for finding in verdicts.findings()),
         unexplained=rest,
-        cancelling=_cancelling(explained),
+        cancelling=cancelling_of(settled, "N", {name: verdicts.source_of(name) for name in settled.best.names}),
         cannot_tell=sentences(limits, explained, known),
         held_out="not-tested" if held is None else "tested",
         held_out_rms_n=held,
@@ -160,15 +158,6 @@ def _table(
         "base_force_n": base_n,
         "model_force_n": model_n,
     }
-
-
-def _cancelling(explained: ExplainedDrive) -> Cancelling | None:
-    settled, drive = explained.settled, explained.drive
-    base, patterns = settled.channel.base, settled.bank.patterns
-    shown = {name: source_of(drive, patterns, name) for name in settled.best.names}
-    forces = zip(base.names, settled.base_values(), strict=True)
-    of_base = {name: base.samples[:, k] * value for k, (name, value) in enumerate(forces)}
-    return cancelling(effects_by_name(settled, shown) | of_base, "N")
 
 
 def _signals(explained: ExplainedDrive) -> RecordedSignals:

@@ -11,7 +11,8 @@ from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
-from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter, rms
+from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -15,10 +15,10 @@ from dbbstation.diagnosis.simulator.density import log_density
 from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
-from dbbstation.diagnosis.simulator.work import rms
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
 from dbbstation.inference.folds import Fold, HeldOutError, beside, part_numbers
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:

@@ -13,10 +13,11 @@ from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.laws import form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
-from dbbstation.diagnosis.simulator.work import BudgetSpentError, rms
+from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.named_values import named_values
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -249,8 +250,3 @@ MEND = "narrow the bounds of the parameters, or mend `simulate` for these values
 def sizes(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
     """Return signals' greatest absolute values; one for zero."""
     return {name: float(np.abs(values).max(initial=0.0)) or 1.0 for name, values in columns.items()}
-
-
-def rms(values: NDArray[np.float64]) -> float:
-    """Return the root mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
-from dbbstation.inference.cancelling import cancelling, effects_by_name
+from dbbstation.inference.cancelling import cancelling_of
 from dbbstation.inference.folds import held_out_error, parts_of
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
@@ -23,6 +23,7 @@ from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import solve
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
 if TYPE_CHECKING:
@@ -163,12 +164,12 @@ class Mismatch:
     def rms_before(self) -> float:
         """Return the rms beyond base parameters, in the table's unit."""
         base = self.settled.channel.base.samples @ np.array([f.before.value for f in self.fitted])
-        return _rms(self.settled.channel.residual - base)
+        return rms(self.settled.channel.residual - base)
 
     @property
     def rms_after(self) -> float:
         """Return the rms beyond all findings."""
-        return _rms(self.settled.channel.residual - self.explained)
+        return rms(self.settled.channel.residual - self.explained)
 
 
 @with_one_thread
@@ -217,7 +218,7 @@ def _found(
     held_out = _held_out(settled, table, chosen, progress) if hold_out else None
     refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
     kept = channel.residual - (float(np.mean(channel.residual)) if table.has_offset else 0.0)
-    is_worse_here = is_worse(_rms(channel.residual - settled.predicted()), _rms(kept))
+    is_worse_here = is_worse(rms(channel.residual - settled.predicted()), rms(kept))
     left = left_over(settled)
     parts = ChosenWithoutParts(chosen) if hold_out else None
     levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)
@@ -235,7 +236,7 @@ def _found(
         held_out=held_out,
         lacking=lacking,
         texts={source.name: source.texts for source in sources},
-        cancelling=_cancelling(settled, table.unit),
+        cancelling=cancelling_of(settled, table.unit),
     )
 
 
@@ -264,13 +265,6 @@ def choose_without(
     """Repeat the selection without rows, shape (n,), in a smaller search, which can only raise the error."""
     kept = channel.without(rows).thinned(FOLD_ROWS)
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=MOST_WORK_WITHOUT)
-
-
-def _cancelling(settled: Settled, unit: str) -> Cancelling | None:
-    base = settled.channel.base
-    parameters = zip(base.names, settled.base_values(), strict=True)
-    of_base = {n: base.samples[:, k] * v for k, (n, v) in enumerate(parameters)}
-    return cancelling(effects_by_name(settled) | of_base, unit)
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:
@@ -309,7 +303,3 @@ def _noise_alone(channel: Channel) -> float:
     runs = [left[rows] for rows in channel.stretches] if channel.time is not None else [left]
     found = noise_of(runs, channel.base.samples.shape[1])
     return max(found.effective if channel.time is not None else found.sigma, channel.least_noise, 1e-300)
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -18,7 +18,7 @@ from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_M
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import parts_of
 from dbbstation.diagnosis.shapes import variables
-from dbbstation.inference.bank import spacing_of
+from dbbstation.inference.bank import DRAWS, spacing_of
 from dbbstation.inference.blocks import Block, compress, with_random
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
@@ -52,9 +52,6 @@ OUTSIZE = 20.0
 ROOM = 4096
 """Columns of causes for which room is made: thirty circles have 1100 to 1500, and some 2200 where causes are laid out anew several times.
 More would be copied, and a copy holds all of them twice for a moment: 0.4 GB at 25,000 samples."""
-
-DRAWS = 4
-"""Draws of white noise from which it is seen how much of the noise a model takes out."""
 
 
 class CircleChannel:

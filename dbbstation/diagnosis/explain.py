@@ -23,6 +23,7 @@ from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, search
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.settle import SEEDS
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
 
 MOST_ROUNDS = 10
 """Times that hypotheses and joint fit may settle against each other."""
-
-SEEDS = 3
-"""Most probable hypotheses that are looked at again after each change."""
 
 GRID = 0.3
 """Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""

@@ -9,6 +9,7 @@ import numpy as np
 from dbbstation.diagnosis.findings import Location
 from dbbstation.diagnosis.variables import SESSION_TIME
 from dbbstation.inference.harmonics import smooth
+from dbbstation.inference.left_over import COUNTS_SIGMA, MOST_LOCATIONS
 from dbbstation.model.machine_model import MachineModel
 
 if TYPE_CHECKING:
@@ -22,10 +23,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.levels import Levels
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Effect, Fitted
-
-MOST_LOCATIONS = 12
-COUNTS_SIGMA = 4.0
-"""A smoothed deviation counts as misfit above this many of its standard deviations."""
 
 
 def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, levels: Levels) -> tuple[Location, ...]:

@@ -28,6 +28,7 @@ from dbbstation.diagnosis.shapes import (
     Shape,
 )
 from dbbstation.inference.forms import Form, Lobes, PlaneStep, Ringing, Wave, WaveOfTurn
+from dbbstation.inference.looks import STRONGEST
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.sums import Sums, bumps, peaks, steps
 from dbbstation.machine.geometry import STRUTS
@@ -38,9 +39,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.blocks import Columns
-
-STRONGEST = 2
-"""Forms of each kind that are kept as shapes."""
 
 MADE_FINER = 6
 """Waves of a grid that are looked at more finely: one that falls between two points of the grid loses a fifth there, and

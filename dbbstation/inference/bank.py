@@ -27,6 +27,7 @@ from dbbstation.inference.coloured import (
     largest_decay,
     with_put_back,
 )
+from dbbstation.inference.harmonics import LEAST_LEFT
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds, odds_of_driven
@@ -57,10 +58,6 @@ DRAWS = 4
 
 TANGENT = 1e-3
 """Step of a nonlinear parameter for its tangent, in units of the spacing of its grid."""
-
-LEAST_LEFT = 0.02
-"""Share of noise that columns must leave of a frequency for it to say anything: of what they take up altogether, what priors leave
-is a shadow of the effect, not of the noise."""
 
 QUIETEST = 1e-9
 """Share of the residual below which nothing is noise: digits run out there."""

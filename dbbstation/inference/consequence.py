@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from dbbstation.inference.detectable import ENTIRELY
+from dbbstation.inference.left_over import SIGNIFICANT
 from dbbstation.inference.triangle import left_by
 
 if TYPE_CHECKING:
@@ -24,12 +26,6 @@ itself, as a torque is: of a column that only goes along with it, such as a temp
 CARRIES = 0.5
 """Share of the column's other squares that the difference makes with its derivatives: more than all other variables together."""
 
-BY_CHANCE = 1e-3
-"""Probability of that by chance, as that of `left_over`."""
-
-STILL = 1e-9
-"""Share of the squares of a column below which nothing is left of it: it is the simulated value over again, which carries no difference."""
-
 
 def may_result(variable: Variable, channel: Channel) -> bool:
     """Return whether a column may be a consequence of the simulation as well as a cause of the difference.
@@ -46,12 +42,12 @@ def may_result(variable: Variable, channel: Channel) -> bool:
     )
     whole = float(np.sum(np.square(values - values.mean())))
     left, both = (float(np.sum(np.square(left_by(by, values)))) for by in (simulated, np.hstack([simulated, carried])))
-    if not STILL * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
+    if not ENTIRELY * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
         return False
     free = len(values) - simulated.shape[1] - carried.shape[1]
     more = carried.shape[1]
     return (
-        free > 0 and float(f_distribution.sf((left - both) / more / max(both / free, 1e-300), more, free)) < BY_CHANCE
+        free > 0 and float(f_distribution.sf((left - both) / more / max(both / free, 1e-300), more, free)) < SIGNIFICANT
     )
 
 

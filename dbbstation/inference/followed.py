@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from scipy.special import logsumexp
 
+from dbbstation.inference.alternatives import NEGLIGIBLE
 from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.levels import RUN, TIME
 from dbbstation.inference.model_comparison import FLEXIBLE
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.settled import Settled
-
-NEGLIGIBLE = 30.0
-"""Log odds against all sets together from which on a set counts for nothing."""
 
 MOST_VARIABLES = 5
 """Variables of a class at the most: one of more says nothing to anybody."""

@@ -270,7 +270,8 @@ SMOOTHED = 9
 """Harmonics over which the share that a model leaves is averaged."""
 
 LEAST_LEFT = 0.02
-"""Share of a harmonic that must be left of it to say anything of the noise there."""
+"""Share of noise that columns must leave of a harmonic or frequency for it to say anything: of what they take up altogether, what priors
+leave is a shadow of the effect, not of the noise."""
 
 
 def _all_coefficients(

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 SIGNIFICANT = 0.001
 """Probability by chance, over all tests, below which something is left."""
 
+MOST_LOCATIONS = 12
+"""Places of a misfit that are listed, the largest first."""
+
+COUNTS_SIGMA = 4.0
+"""A smoothed deviation counts as misfit above this many of its standard deviations."""
+
 BINS = 20
 """Pieces of a variable that are asked for by themselves, with as many rows in each."""
 

@@ -21,6 +21,7 @@ from dbbstation.inference.followed import (
     way_probability,
 )
 from dbbstation.inference.law_form import law_form
+from dbbstation.inference.left_over import SIGNIFICANT
 from dbbstation.inference.levels import ONCE, RUN, TIME, Followed, FollowsAnswer, Levels, difference_of
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE
@@ -35,9 +36,6 @@ if TYPE_CHECKING:
 SLOW = 10
 """Slowest frequencies of a stretch, whose power is held against that of the next twice as many: noise with `FEWEST_INDEPENDENT` independent
 samples is flat over them."""
-
-BY_CHANCE = 1e-3
-"""Probability below which their power is no chance, as that of `left_over`."""
 
 WAYS = ("value", "direction", "late", "in_time")
 
@@ -108,7 +106,7 @@ def _doubts_about_noise(settled: Settled) -> tuple[str, ...]:
         found.append(f"{len(channel.target)} rows are too few to know the noise")
     if channel.time is None:
         found.append("the order of the rows is unknown, so that noise cannot be told from an effect")
-    if slow_chance(settled) < BY_CHANCE:
+    if slow_chance(settled) < SIGNIFICANT:
         found.append("slow noise could hide it")
     return tuple(found)
 

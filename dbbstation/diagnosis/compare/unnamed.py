@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes
+from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.forms import LinearSplines, Lobes, SignForm
 from dbbstation.inference.patterns import Family, Pattern, patterns
 from dbbstation.inference.variables import Kind, Variable
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
 OWN_LOBES = (2, 3, 4, 5)
 """Undulations per turn of a curve that every test or run has of its own: what a machine does to a circle is mostly there."""
-
-SAME_RHYTHM = 0.999
-"""Correlation of the times of both sessions from which on nothing tells them apart."""
 
 
 def variables_of(sides: Sides) -> tuple[Variable, ...]:
@@ -49,7 +47,7 @@ def _times(sides: Sides) -> list[Variable]:
         if len(times) == len(sides.pairs):
             found[name] = Variable(name, "s", Kind.TIME, sides.averaged(side, times))
     both = list(found.values())
-    if len(both) > 1 and np.corrcoef(both[0].values, both[1].values)[0, 1] > SAME_RHYTHM:
+    if len(both) > 1 and np.corrcoef(both[0].values, both[1].values)[0, 1] > EQUIVALENT:
         return both[:1]
     return both
 

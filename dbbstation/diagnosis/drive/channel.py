@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.naming import acts
 from dbbstation.diagnosis.drive.recordings import with_waves
+from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
@@ -176,16 +177,11 @@ def _law(
         return recordings.compared(lambda signals: form.columns(signals, values))
 
     odds = np.log(source.prior_probability / (1.0 - source.prior_probability)) - np.log(form.tried)
-    parameters = (*form.amplitudes, *form.shapes)
     along = "time" if source.varies_with.startswith("time") else "position"
-    return Law(
-        name=name,
-        columns=columns,
-        plausible=np.array([p.plausible for p in form.amplitudes]),
-        parameters=tuple(p.name for p in parameters),
-        units=tuple(p.unit for p in parameters),
-        grids=form.grids,
-        positive=tuple(p.positive for p in form.amplitudes),
+    return law_of(
+        name,
+        form.parameters,
+        columns,
         form_uncertainty=source.form_uncertainty,
         discrepancy=lambda effect, _, __: _departure(effect, variables[along].values),
         log_odds=float(odds),

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from dbbstation.sources.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
 from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 
 if TYPE_CHECKING:
@@ -50,38 +51,31 @@ class Scale:
         return self.high_m - self.low_m
 
 
-@dataclass(frozen=True)
-class DriveParameter:
-    """One number of a cause.
-
-    Attributes:
-        plausible: one standard deviation, in the name's unit.
-        meaning: one line with the sign.
-    """
-
-    name: str
-    unit: str
-    plausible: float
-    meaning: str
-    positive: bool = False
-
-
 @dataclass(frozen=True, eq=False)
 class DriveForm:
     """One form of a cause.
 
     Attributes:
-        columns: force per amplitude, shape (n, p), at values of `shapes`.
-        grids: start values, rising.
+        parameters: amplitudes, then nonlinear numbers with a rising `grid`.
+        columns: force per amplitude, shape (n, p), at values of the nonlinear numbers.
+        label: of a coexisting form; may be empty.
         tried: independent forms of the choice.
     """
 
-    amplitudes: tuple[DriveParameter, ...]
+    parameters: tuple[Parameter, ...]
     columns: Callable[[Signals, tuple[float, ...]], NDArray[np.float64]]
-    shapes: tuple[DriveParameter, ...] = ()
-    grids: tuple[tuple[float, ...], ...] = ()
     label: str = ""
     tried: float = 1.0
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Return the p amplitudes."""
+        return tuple(p for p in self.parameters if not p.grid)
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """Return the nonlinear numbers."""
+        return tuple(p for p in self.parameters if p.grid)
 
 
 class DriveSource(ABC):

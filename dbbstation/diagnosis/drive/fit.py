@@ -11,6 +11,7 @@ from scipy.special import log_ndtr
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
+from dbbstation.inference.impossible import NEGATIVE_SIGMA
 from dbbstation.inference.settle import growth, moved
 from dbbstation.inference.triangle import RANK, triangle_of
 from dbbstation.inference.verdict import OUT
@@ -31,9 +32,6 @@ on simulated drives they make the mass too small by half of this."""
 
 LIKELY = 0.01
 """Probability of a hypothesis from which on it counts for the uncertainty of what all hypotheses have."""
-
-IMPOSSIBLE_SIGMA = 3.0
-"""Standard uncertainties below zero from which on a mass or a friction is impossible: one in 700 by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +123,7 @@ class DriveFit:
     def impossible(self) -> list[str]:
         """Return significantly negative base parameters, worst first."""
         below = {name: -v.value / v.uncertainty for name, v in self.base.items() if v.uncertainty > 0.0}
-        return [n for n, s in sorted(below.items(), key=lambda item: -item[1]) if s > IMPOSSIBLE_SIGMA]
+        return [n for n, s in sorted(below.items(), key=lambda item: -item[1]) if s > NEGATIVE_SIGMA]
 
 
 def fit(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.findings import ForceLocation
+from dbbstation.inference.left_over import COUNTS_SIGMA, MOST_LOCATIONS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -14,9 +15,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.coloured import Coloured
 
-MOST_LOCATIONS = 12
-COUNTS_SIGMA = 4.0
-"""A smoothed deviation counts as misfit above this many of its standard deviations."""
 
 SMOOTHED = 5
 """Samples that are averaged before they are looked at; so many below the limit do not end a stretch."""

@@ -14,6 +14,7 @@ from dbbstation.diagnosis.simulator.laws import form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
+from dbbstation.inference.alternatives import RIVALS
 from dbbstation.inference.named_values import named_values
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 
 MOST_ROUNDS = 20
 """Times that a term is put in, taken out or refuted, or everything refitted, at the most."""
-
-RIVALS = 3
-"""Candidates that are each put in and refitted where one is wanted, at the most: the best by the linear comparison."""
 
 RIVAL_SHARE = 0.5
 """Log posterior of a rival by the linear comparison, over that of the best, from which on it is put in: linear answers to a term that

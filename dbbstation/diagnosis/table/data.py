@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.bent import bent_laws
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.memory import memory_laws
@@ -113,8 +114,7 @@ class Table:
 
     def _law(self, source: TableSource) -> Law:
         parameters = source.parameters()
-        amplitudes = [p for p in parameters if not p.grid]
-        shaped = [p for p in parameters if p.grid]
+        shaped = [p.name for p in parameters if p.grid]
         given = {name: self.columns[name] for name in source.needs}
         along = source.follows or (source.needs[0] if source.needs else "")
         follows = next((v for v in self.variables if v.name == along), None)
@@ -122,20 +122,9 @@ class Table:
             follows = Variable(along, "", Kind.ANY, self.columns[along])
 
         def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
-            names = [p.name for p in shaped]
-            return np.asarray(source.columns(given, dict(zip(names, point, strict=True))), dtype=np.float64)
+            return np.asarray(source.columns(given, dict(zip(shaped, point, strict=True))), dtype=np.float64)
 
-        return Law(
-            name=source.name,
-            columns=columns,
-            plausible=np.array([p.plausible for p in amplitudes]),
-            parameters=tuple(p.name for p in (*amplitudes, *shaped)),
-            units=tuple(p.unit for p in (*amplitudes, *shaped)),
-            grids=tuple(tuple(p.grid) for p in shaped),
-            positive=tuple(p.positive for p in amplitudes),
-            form_uncertainty=source.form_uncertainty,
-            follows=follows,
-        )
+        return law_of(source.name, parameters, columns, form_uncertainty=source.form_uncertainty, follows=follows)
 
 
 def _sizes_of_noise(

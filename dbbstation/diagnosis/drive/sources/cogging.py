@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,15 +35,15 @@ class Cogging(DriveSource):
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         size = 0.1 * scale.force_n
-        cosine = DriveParameter("cosine_n", "N", size, "amplitude of the cosine, position zero is where it is greatest")
-        sine = DriveParameter("sine_n", "N", size, "amplitude of the sine")
+        cosine = Parameter("cosine_n", "N", size, "amplitude of the cosine, position zero is where it is greatest")
+        sine = Parameter("sine_n", "N", size, "amplitude of the sine")
         found = []
         for wave in scale.waves_per_m:
-            period = DriveParameter("period_mm", "mm", 1e3 / wave, "travel of one wave")
             # A wave that is off by a quarter over the travel fits no more; three points hold the best one between them.
             grid = tuple(1e3 / (wave + step / scale.travel_m) for step in (0.15, 0.0, -0.15))
+            period = Parameter("period_mm", "mm", 1e3 / wave, "travel of one wave", grid)
             label = f"{1e3 / wave:.3g} mm"
-            found.append(DriveForm((cosine, sine), _columns, (period,), (grid,), label, scale.waves_tried))
+            found.append(DriveForm((cosine, sine, period), _columns, label, scale.waves_tried))
         return tuple(found)
 
 

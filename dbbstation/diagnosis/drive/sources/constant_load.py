@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 
 class ConstantLoad(DriveSource):
@@ -25,5 +25,6 @@ class ConstantLoad(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        size = DriveParameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
+        """Return one amplitude."""
+        size = Parameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
         return (DriveForm((size,), lambda s, _: np.ones((len(s.t_s), 1))),)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 COULOMB_SHARE = 0.5
 """Usual size, one standard deviation, of the force's root mean square."""
+
+MOST_OF_COULOMB = 1.5
+"""Times the Coulomb friction up to which friction after a reversal can be: 2.5 standard deviations of what its formula is off by."""
 
 
 class CoulombFriction(DriveSource):
@@ -28,7 +31,8 @@ class CoulombFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        size = DriveParameter(
+        """Return one amplitude."""
+        size = Parameter(
             "coulomb_n", "N", COULOMB_SHARE * scale.force_n, "force against the direction of travel", positive=True
         )
         return (DriveForm((size,), lambda s, _: s.direction[:, None]),)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,8 +39,8 @@ class FrictionAsymmetry(DriveSource):
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         if not scale.both_ways:
             return ()
-        dry = DriveParameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
-        wet = DriveParameter(
+        dry = Parameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
+        wet = Parameter(
             "viscous_asymmetry_n_s_m",
             "N·s/m",
             0.2 * scale.force_n / scale.speed_m_s,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,15 +36,21 @@ class FrictionDrift(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        dry = DriveParameter("coulomb_change_n", "N", 0.2 * scale.force_n, "change of Coulomb friction in the end")
-        wet = DriveParameter(
+        """Return Coulomb or viscous part at time constants."""
+        dry = Parameter("coulomb_change_n", "N", 0.2 * scale.force_n, "change of Coulomb friction in the end")
+        wet = Parameter(
             "viscous_change_n_s_m", "N·s/m", 0.2 * scale.force_n / scale.speed_m_s, "change of viscous friction"
         )
-        tau = DriveParameter("time_constant_s", "s", 0.3 * scale.duration_s, "after which 63 % of the change are done")
-        grid = (tuple(share * scale.duration_s for share in SHARES),)
+        tau = Parameter(
+            "time_constant_s",
+            "s",
+            0.3 * scale.duration_s,
+            "after which 63 % of the change are done",
+            tuple(share * scale.duration_s for share in SHARES),
+        )
         return (
-            DriveForm((dry,), lambda s, t: (s.direction * _growth(s, t[0]))[:, None], (tau,), grid, "Coulomb"),
-            DriveForm((wet,), lambda s, t: (s.speed_m_s * _growth(s, t[0]))[:, None], (tau,), grid, "viscous"),
+            DriveForm((dry, tau), lambda s, t: (s.direction * _growth(s, t[0]))[:, None], "Coulomb"),
+            DriveForm((wet, tau), lambda s, t: (s.speed_m_s * _growth(s, t[0]))[:, None], "viscous"),
         )
 
 

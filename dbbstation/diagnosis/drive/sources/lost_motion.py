@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.sources.coulomb_friction import MOST_OF_COULOMB
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,9 +21,6 @@ GAPS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
 
 RISES = (0.25, 1.0, 2.0)
 """Ways over which the load is taken up again, of the play."""
-
-MOST_OF_COULOMB = 1.5
-"""Times the Coulomb friction up to which it can be: 2.5 standard deviations of what its formula is off by."""
 
 
 class LostMotion(DriveSource):
@@ -48,13 +46,11 @@ class LostMotion(DriveSource):
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         if not (scale.reverses and scale.both_ways):
             return ()
-        size = DriveParameter(
-            "lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True
-        )
-        gap = DriveParameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play")
-        rise = DriveParameter("rise_per_gap", "1", 1.0, "way over which the load comes back, over the play")
+        size = Parameter("lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True)
         gaps = tuple(1e3 * share * scale.travel_m for share in GAPS)
-        return (DriveForm((size,), _columns, (gap, rise), (gaps, RISES)),)
+        gap = Parameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play", gaps)
+        rise = Parameter("rise_per_gap", "1", 1.0, "way over which the load comes back, over the play", RISES)
+        return (DriveForm((size, gap, rise), _columns),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         return values["lost_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)

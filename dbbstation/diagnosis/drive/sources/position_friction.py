@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,8 +32,8 @@ class PositionFriction(DriveSource):
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         size = 0.2 * scale.force_n
-        slope = DriveParameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
-        bow = DriveParameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
+        slope = Parameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
+        bow = Parameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
         middle, half = 0.5 * (scale.low_m + scale.high_m), 0.5 * scale.travel_m
 
         def place(signals: Signals) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,13 +35,14 @@ class PowerLawFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        size = DriveParameter(
+        """Return one amplitude at powers."""
+        size = Parameter(
             "at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed", positive=True
         )
-        power = DriveParameter("power", "1", 1.0, "exponent of the speed")
+        power = Parameter("power", "1", 1.0, "exponent of the speed", POWERS)
         top = scale.speed_m_s
 
         def columns(one: Signals, exponent: tuple[float, ...]) -> NDArray[np.float64]:
             return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent[0])[:, None]
 
-        return (DriveForm((size,), columns, (power,), (POWERS,)),)
+        return (DriveForm((size, power), columns),)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
+from dbbstation.diagnosis.drive.sources.coulomb_friction import MOST_OF_COULOMB
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
 
 SHARES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
 """Lengths of the build-up that are tried, of the travel."""
-
-MOST_OF_COULOMB = 1.5
-"""Times the Coulomb friction up to which it can be: 2.5 standard deviations of what its formula is off by."""
 
 
 class Presliding(DriveSource):
@@ -47,13 +45,13 @@ class Presliding(DriveSource):
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         if not scale.reverses:
             return ()
-        size = DriveParameter(
+        size = Parameter(
             "presliding_n", "N", 0.2 * scale.force_n, "friction still to turn round at reversal", positive=True
         )
-        length = DriveParameter(
-            "length_mm", "mm", 1e3 * 0.01 * scale.travel_m, "travel after which 37 % are left of it"
-        )
-        return (DriveForm((size,), _columns, (length,), (tuple(1e3 * share * scale.travel_m for share in SHARES),)),)
+        lengths = tuple(1e3 * share * scale.travel_m for share in SHARES)
+        meaning = "travel after which 37 % are left of it"
+        length = Parameter("length_mm", "mm", 1e3 * 0.01 * scale.travel_m, meaning, lengths)
+        return (DriveForm((size, length), _columns),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)

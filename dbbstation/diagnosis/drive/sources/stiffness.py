@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 
 class Stiffness(DriveSource):
@@ -22,7 +22,8 @@ class Stiffness(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        size = DriveParameter(
+        """Return one amplitude."""
+        size = Parameter(
             "stiffness_n_mm",
             "N/mm",
             1e-3 * 0.6 * scale.force_n / scale.travel_m,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,11 +35,11 @@ class StribeckFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        size = DriveParameter(
-            "static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True
-        )
-        speed = DriveParameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left")
-        return (DriveForm((size,), _columns, (speed,), (tuple(share * scale.speed_m_s for share in SHARES),)),)
+        """Return one amplitude at Stribeck speeds."""
+        size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True)
+        speeds = tuple(share * scale.speed_m_s for share in SHARES)
+        speed = Parameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left", speeds)
+        return (DriveForm((size, speed), _columns),)
 
 
 def _columns(signals: Signals, speed_m_s: tuple[float, ...]) -> NDArray[np.float64]:

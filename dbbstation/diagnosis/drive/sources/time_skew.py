@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveForm, DriveParameter, DriveSource, Scale, Texts
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,7 +37,8 @@ class ForceTimeSkew(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        size = DriveParameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
+        """Return one amplitude."""
+        size = Parameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
         return (DriveForm((size,), _columns),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:

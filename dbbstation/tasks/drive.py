@@ -34,6 +34,14 @@ def identify(
         float | None, Option("Force of the drive at 1 A, for motor_current_a.", metavar="N/A")
     ] = None,
     sources: Annotated[Names | None, Option("Causes to compare [default: all].", metavar="A,B,...")] = None,
+    source_files: Annotated[
+        Files,
+        Option(
+            "Python file with physics of your own, as for `mismatch`. It is executed. May be given more than once.",
+            kind="path",
+            metavar="FILE.py",
+        ),
+    ] = (),
     cutoff_hz: Annotated[
         float | None,
         Option("Bandwidth in which force and model are compared [default: chosen from the recording].", metavar="HZ"),
@@ -67,13 +75,19 @@ def identify(
         StoppedError: `stop` returned True.
     """
     from dbbstation.diagnosis.drive.identify import identify as identified_drive
+    from dbbstation.diagnosis.drive.own import COLUMNS, own_force
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
     from dbbstation.files.recordings.drive_csv import read_drive
     from dbbstation.results.drive import drive_result
     from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.tables import load_sources
 
     telling = Telling(progress, stop, say)
     named = drive_sources_named(known_drive_sources() if sources is None else tuple(sources))
+    own, lacking = load_sources(paths_of(source_files), COLUMNS, "a recording of a drive")
+    replaced = {source.name for source in own}
+    named = (*(source for source in named if source.name not in replaced), *map(own_force, own))
+    telling.note(*(f"{name} is not compared: {why}" for name, why in lacking.items()))
     files = [read_drive(path) for path in paths_of(recordings)]
     telling.note(*(str(warning) for file in files for warning in file.warnings))
     raw = [file.recording(force_per_ampere) for file in files]

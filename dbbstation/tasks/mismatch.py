@@ -222,7 +222,7 @@ def mismatch(
     )
     tabulated = load_tables(data if isinstance(data, tuple) else (data,), asked)
     telling.note(*tabulated.notes)
-    sources, lacking = load_sources(paths_of(source_files), tabulated.table)
+    sources, lacking = load_sources(paths_of(source_files), tabulated.table.columns)
     telling.note(*(f"{name} cannot be asked: {why}" for name, why in lacking.items()))
     found = find_mismatch(
         tabulated.table, sources, hold_out=held_out, lacking=lacking, matters=matters, progress=telling.stage

@@ -20,7 +20,7 @@ from dbbstation.files.table_sources import own_table_sources
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Container, Sequence
 
     from numpy.typing import NDArray
 
@@ -206,8 +206,10 @@ def _greatest(files: Sequence[TableFile], name: str) -> float:
     return max((float(np.abs(column[np.isfinite(column)]).max(initial=0.0)) for column in columns), default=0.0)
 
 
-def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource], dict[str, str]]:
-    """Return own physics for which the table has columns, and why others lack them, by name.
+def load_sources(
+    files: Sequence[Path], columns: Container[str], where: str = "the table"
+) -> tuple[list[TableSource], dict[str, str]]:
+    """Return own physics for which there are columns, and why others lack them, by name.
 
     Raises:
         InputError: faults of the files.
@@ -215,9 +217,9 @@ def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource]
     usable: list[TableSource] = []
     lacking = {}
     for source in own_table_sources(files, TableSource):  # type: ignore[type-abstract]
-        missing = [name for name in source.needs if name not in table.columns]
+        missing = [name for name in source.needs if name not in columns]
         if missing:
-            lacking[source.name] = f"the table has no column {', '.join(missing)}"
+            lacking[source.name] = f"{where} has no column {', '.join(missing)}"
         else:
             usable.append(source)
     return usable, lacking

@@ -1,0 +1,64 @@
+"""Physics of a user's own, written for any table, as a cause of force."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+    from dbbstation.diagnosis.table.contract import TableSource
+
+
+def drive_columns(signals: Signals) -> dict[str, NDArray[np.float64]]:
+    """Return what physics may be computed from, shape (n,) each, at all samples of a recording.
+
+    `direction` is +1, -1, or 0 at standstill; `since_reversal_mm` is infinite before the first reversal.
+    """
+    return {
+        "t_s": signals.t_s,
+        "position_mm": 1e3 * signals.position_m,
+        "speed_mm_s": 1e3 * signals.speed_m_s,
+        "acceleration_mm_s2": 1e3 * signals.acceleration_m_s2,
+        "direction": signals.direction,
+        "since_reversal_mm": 1e3 * signals.since_reversal_m,
+    }
+
+
+COLUMNS = {
+    "t_s": "time",
+    "position_mm": "position",
+    "speed_mm_s": "speed",
+    "acceleration_mm_s2": "acceleration",
+    "direction": "speed",
+    "since_reversal_mm": "travel since reversal",
+}
+"""Names of these columns, and of the variables that they stand for."""
+
+
+def own_force(source: TableSource) -> DriveSource:
+    """Return a source whose columns are forces [N], each a column of `COLUMNS` or computed from these."""
+    shapes = [p.name for p in source.parameters() if p.grid]
+
+    def columns(signals: Signals, values: tuple[float, ...]) -> NDArray[np.float64]:
+        known = drive_columns(signals)
+        given = {name: known[name] for name in source.needs}
+        return np.asarray(source.columns(given, dict(zip(shapes, values, strict=True))), dtype=np.float64)
+
+    class OwnForce(DriveSource):
+        """The same as a cause of force."""
+
+        name = source.name
+        varies_with = COLUMNS[source.follows or source.needs[0]]
+        texts = source.texts
+        form_uncertainty = source.form_uncertainty
+
+        def forms(self, scale: Scale) -> tuple[DriveForm, ...]:  # noqa: ARG002 - it states sizes itself
+            return (DriveForm(source.parameters(), columns),)
+
+    return OwnForce()

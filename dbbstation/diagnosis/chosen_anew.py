@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.explained import MOST_MEMBERS
 from dbbstation.diagnosis.left_out import groups_of, predicted_without
-from dbbstation.inference.chosen_anew import GainsOfTests, chosen_anew
+from dbbstation.inference.chosen_anew import KnownGains, chosen_anew
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.hypotheses import CLOSE, search
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
-def without_tests(explained: Explained, outcome: Settled) -> GainsOfTests | None:
+def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
     """Hold back groups of tests; None for too few, or without causes.
 
     The reference is the kinematic calibration of the same tests.
@@ -58,4 +58,6 @@ def without_tests(explained: Explained, outcome: Settled) -> GainsOfTests | None
     names = [m.cause.name for m in settled.best.members if not m.cause.setup]
     without = {wanted: {name for name in names if follow(name) & wanted} for wanted in classes}
     errors = predicted_without(explained, [(), *without.values(), names])
-    return GainsOfTests(held_back, anew, dict(zip([*without, frozenset[str]()], errors[1:], strict=True)), errors[0])
+    return KnownGains.of_tests(
+        held_back, anew, dict(zip([*without, frozenset[str]()], errors[1:], strict=True)), errors[0]
+    )

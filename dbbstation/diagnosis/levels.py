@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import Explained, SettledCircles
-    from dbbstation.inference.chosen_anew import GainsOfTests
+    from dbbstation.inference.chosen_anew import KnownGains
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.projection import BesideBase
@@ -116,8 +116,12 @@ def _law(explained: Explained, cause: Cause) -> Law:
     )
 
 
-def circle_levels(explained: Explained, outcome: Settled, gains: GainsOfTests | None) -> Levels:
-    """Return the three levels of circles [µm]."""
+def circle_levels(explained: Explained, outcome: Settled, gains: KnownGains | None) -> Levels:
+    """Return the three levels of circles [µm].
+
+    Args:
+        gains: None: not tested.
+    """
     found = levels_by_tests(outcome, _left(explained), gains).times(UM)
     unmodelled = explained.settled.unmodelled.follows
     # Of what moves no strut, all amplitudes together are no place.

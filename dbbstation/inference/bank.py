@@ -182,7 +182,7 @@ class Bank:
         """Measure noise beside members or everything, as set."""
         return self.measure_noise(members if self.measures_beside_members else None)
 
-    def measure_noise(self, members: Sequence[Member] | None = None, *, white: bool = False) -> Coloured:
+    def measure_noise(self, members: Sequence[Member] | None = None) -> Coloured:
         """Measure noise from the residual and whiten columns by it.
 
         Power that columns absorb from such noise, seen by draws, is restored by frequency.
@@ -211,7 +211,7 @@ class Bank:
                 trust, tails = most_probable_tails(left[:, 0] / self.trust / self.noise.innovation)
             changes = ((spread, self.spread), (trust, self.trust))
             uneven = max(float(np.abs(new / old - 1.0).max(initial=0.0)) for new, old in changes)
-            if self.channel.time is not None and not white and innovation > least:
+            if self.channel.time is not None and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
             self._take(found, spread, trust)
             self.tails, self.grows_with = tails, grows_with

@@ -42,20 +42,14 @@ def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: 
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
 
 
-def spread(blocks: Sequence[Block], columns: int, noise: float | None = None) -> NDArray[np.float64]:
-    """Return all blocks' rows over all columns, target last, shape (r, columns + 1).
-
-    Args:
-        noise: rows are divided by it or the block's own; None: undivided.
-    """
+def spread(blocks: Sequence[Block], columns: int) -> NDArray[np.float64]:
+    """Return all blocks' rows over all columns, target last, shape (r, columns + 1)."""
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0
     for block in blocks:
         rows = wide[row : row + len(block.target)]
         rows[:, block.columns] = block.triangle
         rows[:, -1] = block.target
-        if noise is not None:
-            rows /= noise if block.noise is None else block.noise
         row += len(rows)
     return wide
 

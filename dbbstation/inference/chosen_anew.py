@@ -54,31 +54,47 @@ class ChosenAnew:
 
 
 @dataclass(frozen=True, eq=False)
-class GainsOfTests:
-    """Held-out gains of classes in groups of tests.
+class KnownGains:
+    """Held-out gains of classes that were asked for beforehand.
 
     Attributes:
-        errors: rms error of predicting groups without each class, by its variables; of the base alone under none.
+        rows: of each part, shape (n,).
+        gains: of each class, by its variables; of everything under none.
+        errors: rms error of each part with everything, or of all.
+        anew: what was chosen without each part; None where gains are all that is known.
     """
 
     rows: Sequence[NDArray[np.bool_]]
-    anew: ChosenAnew
-    errors: Mapping[frozenset[str], float]
-    error: float
+    gains: Mapping[frozenset[str], ClassGain]
+    errors: Sequence[float]
+    anew: ChosenAnew | None = None
+
+    @classmethod
+    def of_tests(
+        cls, rows: Sequence[NDArray[np.bool_]], anew: ChosenAnew, errors: Mapping[frozenset[str], float], error: float
+    ) -> KnownGains:
+        """Return the gains of groups of tests.
+
+        Args:
+            errors: rms errors of predicting groups without each class, by its variables; of the base alone under none.
+            error: with everything.
+        """
+        counts = tuple(int(one.sum()) for one in rows)
+        parts = {key: tuple(part[key] for part in anew.of_classes) if key else anew.whole for key in errors}
+        gains = {key: ClassGain(DensityGains(parts[key], counts), before, error) for key, before in errors.items()}
+        return cls(rows, gains, [error], anew)
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of everything over some variables; None: everything."""
-        key = frozenset(wanted or ())
-        gains = tuple(part[key] for part in self.anew.of_classes) if key else self.anew.whole
-        return ClassGain(DensityGains(gains, tuple(int(one.sum()) for one in self.rows)), self.errors[key], self.error)
+        return self.gains[frozenset(wanted or ())]
 
-    def but_for(self, _ignored: Collection[str]) -> GainsOfTests:
-        """Return the same, because effects within a run are random effects of that run."""
+    def but_for(self, _ignored: Collection[str]) -> KnownGains:
+        """Return the same: what happens in a test is a random effect of it, and no term of a simulator follows the time."""
         return self
 
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
-        """Return the error with everything."""
-        return [self.error]
+        """Return the rms error of each part with everything, which is put in together."""
+        return list(self.errors)
 
 
 def chosen_anew(

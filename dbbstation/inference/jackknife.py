@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.blocks import compress, spread, with_random
+from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
@@ -18,21 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.blocks import Block
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
-
-
-def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float64]:
-    """Return the values' covariance, shape (k, k)."""
-    norm = np.maximum(np.linalg.norm(spread(blocks, size)[:, :-1], axis=0), 1e-300)
-    values = []
-    for out in range(len(blocks)):
-        kept = spread([block for k, block in enumerate(blocks) if k != out], size)
-        found, *_ = np.linalg.lstsq(kept[:, :-1] / norm, kept[:, -1], rcond=1e-12)
-        values.append(found / norm)
-    away = np.array(values) - np.mean(values, axis=0)
-    return np.asarray((len(blocks) - 1) / len(blocks) * away.T @ away, dtype=np.float64)
 
 
 def weighted_jackknife(

@@ -65,14 +65,13 @@ class LeftOver:
         return min(self.looks, key=lambda look: look.probability)
 
 
-def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
+def left_over(settled: Settled) -> LeftOver:
     """Test the best hypothesis's whitened residual."""
     channel, bank = settled.channel, settled.bank
     rows = channel.residual - settled.predicted()
     left = bank.whitened(rows) / settled.noise.innovation
-    if freedom is None:
-        used = sum(len(member.variant.columns) for member in settled.best.members) + channel.base.samples.shape[1]
-        freedom = max(float(len(left) - used), 1.0)
+    used = sum(len(member.variant.columns) for member in settled.best.members) + channel.base.samples.shape[1]
+    freedom = max(float(len(left) - used), 1.0)
     square = float(left @ left) / freedom
     beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma
     # The noise was measured on the same rows, beside more columns: it is known about as well as the square.

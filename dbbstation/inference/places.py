@@ -13,18 +13,23 @@ from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from dbbstation.inference.chosen_anew import GainsOfTests
+    from dbbstation.inference.chosen_anew import KnownGains
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.settled import Settled
 
 
-def levels_by_tests(settled: Settled, left: LeftOver, gains: GainsOfTests | None) -> Levels:
-    """Return the three levels, with the strut, or all struts, on which each class surely acts."""
+def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) -> Levels:
+    """Return the three levels, with the strut, or all struts, that each class acts on for sure.
+
+    Args:
+        left: residual tests.
+        gains: None: not tested.
+    """
     anew = None if gains is None else gains.anew
     found = levels_of(settled, left, gains, anew, sizes=detectable_causes(settled))
     follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
-    correction = None if gains is None else gains.error < gains.errors[frozenset()]
+    correction = None if gains is None else gains.of(None).after < gains.of(None).before
     return replace(found, follows=follows, correction=correction)
 
 

@@ -166,14 +166,13 @@ def test_blocks_spread_over_all_columns_say_the_same(problem):
     blocks = blocks_of(jacobians, columns, targets)
     blocks[2] = replace(blocks[2], noise=0.05)
     size = len(known.prior)
-    for noise in (None, NOISE):
-        wide = spread(blocks, size, noise)
-        expected = np.zeros((size + 1, size + 1))
-        for k, (jacobian, at, target) in enumerate(zip(jacobians, columns, targets, strict=True)):
-            whole = np.zeros((len(target), size + 1))
-            whole[:, at], whole[:, -1] = jacobian, target
-            expected += whole.T @ whole / (1.0 if noise is None else (0.05 if k == 2 else NOISE) ** 2)
-        np.testing.assert_allclose(wide.T @ wide, expected, rtol=1e-10, atol=1e-10)
+    wide = spread(blocks, size)
+    expected = np.zeros((size + 1, size + 1))
+    for jacobian, at, target in zip(jacobians, columns, targets, strict=True):
+        whole = np.zeros((len(target), size + 1))
+        whole[:, at], whole[:, -1] = jacobian, target
+        expected += whole.T @ whole
+    np.testing.assert_allclose(wide.T @ wide, expected, rtol=1e-10, atol=1e-10)
     assert spread([], size).shape == (0, size + 1)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.blocks import Columns, compress
-from dbbstation.inference.chosen_anew import LEAST_PARTS, GainsOfTests, chosen_anew
+from dbbstation.inference.chosen_anew import LEAST_PARTS, KnownGains, chosen_anew
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.held_out import held_out
@@ -27,8 +27,12 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 
-def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, GainsOfTests | None]:
-    """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups."""
+def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
+    """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups.
+
+    Args:
+        hold_out: choose everything anew; False: only refit values.
+    """
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
     parts = []
     for group in range(max(groups) + 1):
@@ -42,7 +46,7 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
     return Trial(None if gains is None else gains.anew, refits_without(settled, parts)), gains
 
 
-def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> GainsOfTests:
+def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> KnownGains:
     """Return each cause's gain, and each class's; the reference is an unchanged machine."""
     bank, kept = settled.bank, settled.channel.kept
 
@@ -58,7 +62,7 @@ def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool
     anew = chosen_anew(settled.comparison, of_others(), choose, bank.kind_of, classes=(classes, follow))
     rest = [[m for m in settled.best.members if not follow(m.cause.name) & wanted] for wanted in classes]
     error, *without = (predicted(sides, settled, some).rms for some in (settled.best.members, *rest, ()))
-    return GainsOfTests(parts, anew, dict(zip([*classes, frozenset[str]()], without, strict=True)), error)
+    return KnownGains.of_tests(parts, anew, dict(zip([*classes, frozenset[str]()], without, strict=True)), error)
 
 
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:

@@ -74,10 +74,6 @@ class DriveChannel:
     of_law: dict[str, tuple[DriveSource, DriveForm]]
     shortest_wave_mm: float
 
-    def laws_of(self, source: str) -> list[str]:
-        """Return a source's laws."""
-        return [name for name, (own, _) in self.of_law.items() if own.name == source]
-
 
 def drive_channel(
     recordings: Recordings,

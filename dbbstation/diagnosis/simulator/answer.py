@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import not_told_apart
-from dbbstation.diagnosis.simulator.held import (
-    PredictedGains,
-    PredictedPart,
-    PredictedPartsError,
-    parts,
-    predicted_parts,
-)
+from dbbstation.diagnosis.simulator.held import PredictedPart, PredictedPartsError, gains_of, parts, predicted_parts
 from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
 from dbbstation.diagnosis.simulator.search import compared, moves, search
 from dbbstation.diagnosis.simulator.separate import separations
@@ -41,6 +35,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.separate import SeparatingInput
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import Run
+    from dbbstation.inference.chosen_anew import KnownGains
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
@@ -155,7 +150,7 @@ def find(
         except BudgetSpentError as error:
             stopped = error.what
     held_out = PredictedPartsError(tuple(folds)) if len(folds) >= LEAST_PARTS else None
-    gains = None if held_out is None else PredictedGains(tuple(folds))
+    gains = None if held_out is None else gains_of(folds)
     return _said(nodes, base, found, held_out, as_simulated, stopped, gains=gains, matters=matters)
 
 
@@ -179,7 +174,7 @@ def _said(
     as_simulated: NDArray[np.float64],
     stopped: str,
     *,
-    gains: PredictedGains | None,
+    gains: KnownGains | None,
     matters: float | None,
 ) -> SimulatorComparison:
     node, settled = found.node, found.settled

@@ -16,13 +16,14 @@ from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
+from dbbstation.inference.chosen_anew import KnownGains
 from dbbstation.inference.folds import Fold, HeldOutError, beside, part_numbers
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -57,36 +58,21 @@ class PredictedPartsError(HeldOutError):
         return DensityGains(gains.parts, gains.rows)
 
 
-@dataclass(frozen=True)
-class PredictedGains:
-    """Held-out gains of classes."""
+def gains_of(parts: Sequence[PredictedPart]) -> KnownGains:
+    """Return the held-out gains of classes."""
+    counts = np.array([part.rows for part in parts], dtype=np.float64)
 
-    parts: tuple[PredictedPart, ...]
+    def over_all(errors: Sequence[float]) -> float:
+        return float(np.sqrt(counts @ np.square(errors) / counts.sum()))
 
-    @property
-    def rows(self) -> list[NDArray[np.bool_]]:
-        """Return the parts' rows, shape (n,) each."""
-        return [part.where for part in self.parts]
-
-    def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """Return the gain over some signals; None: all."""
-        key = frozenset(wanted or ())
-        every = [part.of_classes[key] for part in self.parts]
-        counts = np.array([part.rows for part in self.parts], dtype=np.float64)
-
-        def over_all(errors: list[float]) -> float:
-            return float(np.sqrt(counts @ np.square(errors) / counts.sum()))
-
-        gains = DensityGains(tuple(gain for gain, _ in every), tuple(part.rows for part in self.parts))
-        return ClassGain(gains, over_all([error for _, error in every]), over_all([part.after for part in self.parts]))
-
-    def but_for(self, _ignored: Collection[str]) -> PredictedGains:
-        """Return the same, because no term follows the time."""
-        return self
-
-    def errors_with(self, _wanted: Collection[str]) -> list[float]:
-        """Return the rms error of each part with all terms."""
-        return [part.after for part in self.parts]
+    after = [part.after for part in parts]
+    found = {}
+    for key in parts[0].of_classes:
+        gains, before = zip(*(part.of_classes[key] for part in parts), strict=True)
+        found[key] = ClassGain(
+            DensityGains(gains, tuple(part.rows for part in parts)), over_all(before), over_all(after)
+        )
+    return KnownGains([part.where for part in parts], found, after)
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.simulator.candidates import candidates
-from dbbstation.diagnosis.simulator.held import PredictedGains, PredictedPart
+from dbbstation.diagnosis.simulator.held import PredictedPart, gains_of
 from dbbstation.diagnosis.simulator.laws import followed, way
 from dbbstation.diagnosis.simulator.model import SimulatorPort
 from dbbstation.diagnosis.simulator.terms import TermForm
@@ -53,10 +53,10 @@ def test_errors_of_parts_are_pooled_by_rows():
         )
         for rows, after, gain, without in ((10, 1.0, 4.0, 2.0), (30, 2.0, 6.0, 4.0))
     )
-    found = PredictedGains(parts).of({"x at joint"})
+    found = gains_of(parts).of({"x at joint"})
     assert found.gains.parts == (4.0, 6.0)
     assert found.gains.rows == (10, 30)
     assert found.before == pytest.approx(np.sqrt((10 * 4.0 + 30 * 16.0) / 40))
     assert found.after == pytest.approx(np.sqrt((10 * 1.0 + 30 * 4.0) / 40))
     assert found.predicts
-    assert PredictedGains(parts).of(None).gains.total == 14.0
+    assert gains_of(parts).of(None).gains.total == 14.0

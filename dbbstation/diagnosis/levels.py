@@ -117,11 +117,7 @@ def _law(explained: Explained, cause: Cause) -> Law:
 
 
 def circle_levels(explained: Explained, outcome: Settled, gains: KnownGains | None) -> Levels:
-    """Return the three levels of circles [µm].
-
-    Args:
-        gains: None: not tested.
-    """
+    """Return the three levels of circles [µm]."""
     found = levels_by_tests(outcome, _left(explained), gains).times(UM)
     unmodelled = explained.settled.unmodelled.follows
     # Of what moves no strut, all amplitudes together are no place.

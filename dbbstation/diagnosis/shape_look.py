@@ -262,7 +262,6 @@ def _lines(places: NDArray[np.float64]) -> list[Form]:
 def _best(
     variable: str, kind: str, strut: int | None, moves: str, sums: Sums, forms: Sequence[Form], apart: float
 ) -> list[Shape]:
-    """Return local maxima of explanation."""
     tried = max(len(forms) / apart, 1.0)
     return [
         Shape(variable, kind, strut, moves, form, tried, explained) for explained, form in sums.best(forms, STRONGEST)
@@ -277,7 +276,6 @@ def _waves(
     grid: NDArray[np.float64],
     explained: NDArray[np.float64],
 ) -> list[Shape]:
-    """Return waves of a frequency grid, refined."""
     found = sums.finer([float(grid[k]) for k in peaks(explained, MADE_FINER)], float(np.ptp(sums.at)))
     tried = len(grid) / 2.0
     return [Shape(variable, "wave", strut, moves, wave, tried, explained) for explained, wave in found[:STRONGEST]]

@@ -140,7 +140,6 @@ def held_out_error(
 
 
 def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
-    """Return each member's gain in unused rows, others refitted, by kind."""
     with_all = float(np.sum(np.square(left_without(settled, ())[rows])))
     found: dict[Kind, float] = {}
     for member in settled.best.members:

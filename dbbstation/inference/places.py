@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 
 def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) -> Levels:
-    """Return the three levels, with the strut, or all struts, that each class acts on for sure.
-
-    Args:
-        left: residual tests.
-        gains: None: not tested.
-    """
+    """Return the three levels, with the strut, or all struts, on which each class surely acts."""
     anew = None if gains is None else gains.anew
     found = levels_of(settled, left, gains, anew, sizes=detectable_causes(settled))
     follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)

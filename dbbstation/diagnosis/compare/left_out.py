@@ -28,11 +28,7 @@ if TYPE_CHECKING:
 
 
 def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
-    """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups.
-
-    Args:
-        hold_out: choose everything anew; False: only refit values.
-    """
+    """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups."""
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
     parts = []
     for group in range(max(groups) + 1):

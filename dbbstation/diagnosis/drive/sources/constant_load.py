@@ -25,6 +25,5 @@ class ConstantLoad(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude."""
         size = Parameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
         return (DriveForm((size,), lambda s, _: np.ones((len(s.t_s), 1))),)

@@ -31,7 +31,6 @@ class CoulombFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude."""
         size = Parameter(
             "coulomb_n", "N", COULOMB_SHARE * scale.force_n, "force against the direction of travel", positive=True
         )

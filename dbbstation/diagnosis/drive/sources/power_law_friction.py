@@ -35,7 +35,6 @@ class PowerLawFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude at powers."""
         size = Parameter(
             "at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed", positive=True
         )

@@ -22,7 +22,6 @@ class Stiffness(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude."""
         size = Parameter(
             "stiffness_n_mm",
             "N/mm",

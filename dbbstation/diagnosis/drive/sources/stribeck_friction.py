@@ -35,7 +35,6 @@ class StribeckFriction(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude at Stribeck speeds."""
         size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True)
         speeds = tuple(share * scale.speed_m_s for share in SHARES)
         speed = Parameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left", speeds)

@@ -37,7 +37,6 @@ class ForceTimeSkew(DriveSource):
     )
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return one amplitude."""
         size = Parameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
         return (DriveForm((size,), _columns),)
 

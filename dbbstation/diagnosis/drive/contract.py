@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from dbbstation.sources.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
+from dbbstation.diagnosis.table.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
 from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 
 if TYPE_CHECKING:

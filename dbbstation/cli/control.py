@@ -24,7 +24,7 @@ _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result a
 
 @click.group()
 def control() -> None:
-    """Correct a machine inside its control: a LinuxCNC kinematics made of the model, or parameters for one that is there.
+    """Correct a machine inside its control: a LinuxCNC kinematics made from the model, or parameters for an existing one.
 
     \b
     Examples:

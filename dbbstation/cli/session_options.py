@@ -56,7 +56,7 @@ _AGE = shop_option(
     "--largest-bar-age-h",
     setting="limits.largest_bar_age_h",
     type=Finite(0.1, 10_000),
-    help="A calibration of the bar that is older is refused [h]  [default: 24].",
+    help="Older calibrations of the bar are refused [h]  [default: 24].",
 )
 
 

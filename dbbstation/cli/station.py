@@ -90,7 +90,7 @@ def station(
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
 
-    Without options it begins with the sessions there are, and what a new one needs. Records what `dbbstation measure`
+    Without options it begins with the existing sessions and the choices for a new one. Records what `dbbstation measure`
     records. Quitting loses nothing; the same command continues the session.
 
     \b

@@ -38,7 +38,7 @@ class InputBook:
         return real_path(path) in self._read
 
     def note_virtual(self, name: str) -> None:
-        """Note that something read comes from a virtual machine, in all books around too."""
+        """Note that an input comes from a virtual machine, in enclosing books too."""
         self.virtual[name] = None
         if self._around is not None:
             self._around.note_virtual(name)

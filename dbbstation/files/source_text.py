@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.errors import Problem
+from dbbstation.errors import InputError, Problem
 from dbbstation.files.gateway import LARGEST_BYTES, NotRegularError, TooLargeError, content_of, opened
 from dbbstation.files.inputs import note_input, note_read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
+
+_Found = TypeVar("_Found")
 
 
 def read_bytes(
@@ -101,6 +103,35 @@ def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:
         what = f"byte {data[error.start]:#04x} is not UTF-8 text"
         faults.append(Problem(file, line, column, what, "save the file as UTF-8"))
     return None
+
+
+def without_faults(read: Callable[[list[Problem]], _Found | None]) -> _Found:
+    """Return what a reader returns that adds to a list of faults.
+
+    Raises:
+        InputError: every fault with its place.
+    """
+    faults: list[Problem] = []
+    found = read(faults)
+    if found is None or faults:
+        raise InputError(faults)
+    return found
+
+
+def text_of(path: Path, largest: int = LARGEST_BYTES) -> str:
+    """Return a file's text.
+
+    Raises:
+        InputError: it cannot be read, or is no UTF-8.
+    """
+    data = without_faults(lambda faults: read_bytes(path, faults, largest))
+    return without_faults(lambda faults: decode(data, str(path), faults))
+
+
+def numbered_lines(text: str) -> list[tuple[int, str]]:
+    """Return lines with their numbers, without comments and blank ones."""
+    lines = enumerate(text.splitlines(), start=1)
+    return [(number, line) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 
 
 def shortened(text: str) -> str:

@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.quantities import ExpansionUmMK, Quantity, TemperatureDegc
 from dbbstation.files.formats.session import Day, Moment
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.plan.bar import Bar
@@ -133,11 +134,7 @@ def read_bar(path: Path) -> BarFile:
     Raises:
         InputError: every fault with its place.
     """
-    faults: list[Problem] = []
-    bar = parse_bar(path, faults)
-    if bar is None or faults:
-        raise InputError(faults)
-    return bar
+    return without_faults(lambda faults: parse_bar(path, faults))
 
 
 def write_bar(path: Path, bar: BarFile, *, force: bool = False) -> None:

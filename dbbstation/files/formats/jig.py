@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_document, validate
 from dbbstation.files.yaml.text import Location, YamlDocument, parse_yaml
@@ -168,11 +169,7 @@ def read_jig(path: Path) -> JigFile:
     Raises:
         InputError: every fault with its place.
     """
-    faults: list[Problem] = []
-    jig = parse_jig(path, faults)
-    if jig is None or faults:
-        raise InputError(faults)
-    return jig
+    return without_faults(lambda faults: parse_jig(path, faults))
 
 
 def jig_text(jig: JigFile) -> str:

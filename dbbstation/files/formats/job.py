@@ -5,12 +5,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem
 from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings_schema import ToleranceSettings
 from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, misspelt, time_scale_of, virtual_port
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.schema import Schema, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
 
@@ -71,11 +72,7 @@ def read_job(path: Path) -> JobFile:
     Raises:
         InputError: every fault of it and its files.
     """
-    faults: list[Problem] = []
-    job = parse_job(path, faults)
-    if job is None or faults:
-        raise InputError(faults)
-    return job
+    return without_faults(lambda faults: parse_job(path, faults))
 
 
 def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem
 from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.machine.geometry import (
@@ -246,10 +247,7 @@ def read_machine(path: Path) -> Machine:
     Raises:
         InputError: every fault with its place.
     """
-    faults: list[Problem] = []
-    parts = parse_machine(path, faults)
-    if parts is None or faults:
-        raise InputError(faults)
+    parts = without_faults(lambda faults: parse_machine(path, faults))
     return parts.to_domain()
 
 

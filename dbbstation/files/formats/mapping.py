@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dbbstation.errors import InputError, Problem
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.formats.quantities import Quantity
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
 from dbbstation.trace import columns
@@ -21,6 +21,8 @@ from dbbstation.trace.columns import ColumnKind
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import Self
+
+    from dbbstation.errors import Problem
 
 INCH_MM = 25.4
 """One inch [mm], exactly [ISO 31-1]."""
@@ -197,11 +199,7 @@ def read_mapping(path: Path) -> MappingFile:
     Raises:
         InputError: every fault with its place.
     """
-    faults: list[Problem] = []
-    mapping = parse_mapping(path, faults)
-    if mapping is None or faults:
-        raise InputError(faults)
-    return mapping
+    return without_faults(lambda faults: parse_mapping(path, faults))
 
 
 def mapping_text(mapping: MappingFile) -> str:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.catalogue import nearest
-from dbbstation.errors import InputError, ModelError, Problem
+from dbbstation.errors import ModelError, Problem
 from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, SourceSchema
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.inputs import note_virtual
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import dotted, format_of, read_document, validate
 from dbbstation.model.identified import IdentifiedModel
@@ -54,11 +55,7 @@ def read_model(
         InputError: every fault with its place; an installed source that cannot be used.
         ModelError: two of the sources have one name.
     """
-    faults: list[Problem] = []
-    model = parse_model(Path(path), _by_name(sources), faults)
-    if model is None or faults:
-        raise InputError(faults)
-    return model
+    return without_faults(lambda faults: parse_model(Path(path), _by_name(sources), faults))
 
 
 def _by_name(sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None) -> Mapping[str, ErrorSource]:

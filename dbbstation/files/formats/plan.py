@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem
 from dbbstation.files.formats.jig import (
     BY_CMM,
     UNDER_SPINDLE,
@@ -20,6 +20,7 @@ from dbbstation.files.formats.jig import (
     parse_jig,
 )
 from dbbstation.files.formats.quantities import Quantity, twice
+from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
@@ -223,11 +224,7 @@ def read_inline_plan(path: Path) -> InlinePlan:
     Raises:
         InputError: every fault of both with its place.
     """
-    faults: list[Problem] = []
-    plan = parse_plan(path, faults)
-    if plan is None or faults:
-        raise InputError(faults)
-    return plan
+    return without_faults(lambda faults: parse_plan(path, faults))
 
 
 def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:

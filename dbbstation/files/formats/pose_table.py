@@ -12,7 +12,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
-from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, shortened, text_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,11 +48,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     Raises:
         InputError: every missing column and every cell that is no finite number, with its line.
     """
-    faults: list[Problem] = []
-    data = read_bytes(path, faults, LARGEST_TABLE)
-    text = None if data is None else decode(data, str(path), faults)
-    if text is None:
-        raise InputError(faults)
+    text = text_of(path, LARGEST_TABLE)
     table = csv_rows(io.StringIO(text, newline=""), language.separator, str(path), skip_spaces=True)
     _, names = next(table, (1, []))
     missing = [name for name in POSE_COLUMNS if name not in names]
@@ -61,6 +57,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         if any(sign in name for name in names for sign in SEPARATORS if sign != language.separator):
             remedy += f"; {language.text}: {ELSE}"
         raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
+    faults: list[Problem] = []
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
     for line, cells in table:

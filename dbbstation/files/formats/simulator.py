@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
+from dbbstation.errors import Problem
+from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes, without_faults
 from dbbstation.files.yaml.schema import Schema, read_document, validate
 
 if TYPE_CHECKING:
@@ -167,11 +167,7 @@ def read_simulator(path: Path) -> SimulatorFile:
     Raises:
         InputError: every fault of both files with its place.
     """
-    faults: list[Problem] = []
-    found = parse_simulator(path, faults)
-    if found is None or faults:
-        raise InputError(faults)
-    return found
+    return without_faults(lambda faults: parse_simulator(path, faults))
 
 
 def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, python: str, faults: list[Problem]) -> None:

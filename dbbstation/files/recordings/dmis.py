@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import LARGEST_SHEET, decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_SHEET, shortened, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,11 +37,8 @@ def read_dmis(path: Path) -> list[DmisPoint]:
     Raises:
         InputError: it cannot be read, has no features, no unit, polar coordinates, or several frames.
     """
+    text = text_of(path, LARGEST_SHEET)
     faults: list[Problem] = []
-    data = read_bytes(path, faults, LARGEST_SHEET)
-    text = None if data is None else decode(data, str(path), faults)
-    if text is None:
-        raise InputError(faults)
     found: list[DmisPoint] = []
     factor, frame = 0.0, 0
     for line, statement in _statements(text):

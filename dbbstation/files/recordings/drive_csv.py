@@ -13,7 +13,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.number_language import is_number
-from dbbstation.files.source_text import LARGEST_TABLE, decode, first_line, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
 from dbbstation.trace.drive_recording import DriveRecording
 
 if TYPE_CHECKING:
@@ -82,12 +82,7 @@ def read_drive(path: Path) -> DriveFile:
     Raises:
         InputError: every missing column and unusable line.
     """
-    faults: list[Problem] = []
-    data = read_bytes(path, faults, LARGEST_TABLE)
-    text = None if data is None else decode(data, str(path), faults)
-    if text is None:
-        raise InputError(faults)
-    return parse_drive(text, str(path))
+    return parse_drive(text_of(path, LARGEST_TABLE), str(path))
 
 
 def parse_drive(text: str, file: str) -> DriveFile:
@@ -96,11 +91,7 @@ def parse_drive(text: str, file: str) -> DriveFile:
     Raises:
         InputError: as `read_drive`.
     """
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = numbered_lines(text)
     if not lines:
         what, remedy = "there is no line that names the columns", f"begin with `{TIME},{POSITION},{FORCE}`"
         raise InputError([Problem(file, 0, 0, what, remedy)])

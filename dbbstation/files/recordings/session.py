@@ -36,7 +36,7 @@ from dbbstation.files.recordings.session_checks import check_bar, check_runs
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_set_up import check_set_up_errors, mounted_name, set_up_readings
 from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
-from dbbstation.files.source_text import read_bytes, unreadable
+from dbbstation.files.source_text import read_bytes, unreadable, without_faults
 from dbbstation.files.yaml.schema import validate
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
 from dbbstation.plan.circle import Direction
@@ -246,10 +246,7 @@ def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
     Raises:
         InputError: every fault of session, machine and plan, every missing or changed file.
     """
-    faults: list[Problem] = []
-    session = parse_session(path, faults)
-    if session is None or faults:
-        raise InputError(faults)
+    session = without_faults(lambda faults: parse_session(path, faults))
     if session.virtual:
         note_virtual(session.name)
     return replace(session, keeps=keeps)

@@ -13,7 +13,7 @@ import numpy as np
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
-from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -80,12 +80,7 @@ def read_table(path: Path, needed: Iterable[str] = (), numbers: NumberLanguage |
     Raises:
         InputError: it cannot be read, has no rows, lacks a column (with likely ones), or rows of different width.
     """
-    faults: list[Problem] = []
-    data = read_bytes(path, faults, LARGEST_TABLE)
-    text = None if data is None else decode(data, str(path), faults)
-    if text is None:
-        raise InputError(faults)
-    return parse_table(text, str(path), needed, numbers)
+    return parse_table(text_of(path, LARGEST_TABLE), str(path), needed, numbers)
 
 
 def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: NumberLanguage | None = None) -> TableFile:
@@ -94,11 +89,7 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
     Raises:
         InputError: as `read_table`.
     """
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
+    lines = numbered_lines(text)
     if not lines:
         raise InputError([Problem(file, 0, 0, "the file has no columns and no rows", "begin with a line of names")])
     header, head = lines[0]

@@ -134,7 +134,7 @@ def mismatch(
     matters: Annotated[
         float | None,
         Option(
-            'Smallest effect that you care about, rms in the unit of the measured values: "no" is answered only where it would '
+            'Smallest effect that you care about, rms in the unit of the measured values: the answer is "no" only if it would '
             "have been found [default: what refitted parameters leave].",
             metavar="SIZE",
             above=0.0,

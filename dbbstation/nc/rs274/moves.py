@@ -206,8 +206,7 @@ class Moves(Modes):
     def _cycle_step(self, block: ProgramBlock, what: str, depth: float) -> None:
         line = block.place.line
         if what == "dwell":
-            if self._cycle.numbers.get("P", 0.0) > 0.0:
-                self.path.dwell(self._cycle.numbers["P"], line=line)
+            self.path.dwell(self._cycle.numbers.get("P", 0.0), line=line)
         elif what in {"stop", "turn"}:
             if self._turning:
                 self.path.say(RowKind.FUNCTION, "M5" if what == "stop" else self._turning, line=line)

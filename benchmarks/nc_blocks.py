@@ -1,0 +1,62 @@
+"""Blocks of an NC program per second of the processor, and memory: read, compensated and written.
+
+    python -m benchmarks.nc_blocks 50000
+
+A surface in lines of 0.5 mm, on the reference machine with drawn errors. In a checkout of another commit, the same file says what
+that one takes.
+"""
+
+from __future__ import annotations
+
+import math
+import resource
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.nc.export import Inverse, compensated_program
+from dbbstation.nc.registry import dialect_named
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import known_sources
+
+SEED = 24
+
+
+def program(blocks: int) -> str:
+    """Return a program of so many blocks."""
+    lines = ["G21 G90 G94 G17", "G0 X0 Y0 Z-990 A0 B0 C0", "F2000", "G1 Z-1000"]
+    for block in range(blocks):
+        row, way = divmod(0.5 * block, 100.0)
+        x, y = (way - 50.0) * (-1.0) ** row, 0.1 * row - 50.0
+        lines.append(f"G1 X{x:.3f} Y{y:.3f} Z{3.0 * math.sin(x / 10.0) * math.cos(y / 10.0) - 1000.0:.3f}")
+    return "\n".join([*lines, "M2"]) + "\n"
+
+
+def main(blocks: int) -> None:
+    """Print blocks per second, and memory before and at most."""
+    drawn, sources = np.random.default_rng(SEED), known_sources()
+    machine = replace(read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml"), acceleration_mm_s2=5e4)
+    struts = Fitted(sources["strut-reference-length"], drawn.normal(0.0, 0.1, 6))
+    model = MachineModel(machine, (struts, Fitted(sources["base-joints"], drawn.normal(0.0, 0.2, 18))))
+    linuxcnc = dialect_named("linuxcnc")
+
+    def done(text: str) -> None:
+        compensated_program(linuxcnc.read(text, "surface.ngc"), linuxcnc, Inverse(model))
+
+    done(program(200))  # compiles
+    text = program(blocks)
+    before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    begin = time.process_time()
+    done(text)
+    took = time.process_time() - begin
+    most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    print(f"{blocks / took:.0f} blocks/s, {most_mb} MB, {before_mb} before")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

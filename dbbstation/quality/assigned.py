@@ -24,10 +24,10 @@ from dbbstation.quality.stated import limit_along
 from dbbstation.quality.together import expected_um, read_um
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from datetime import date
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from dbbstation.quality.knowledge import Planned, Seen
 
@@ -147,10 +147,10 @@ class Assigned:
         return self._known
 
     def _follow(self, labels: tuple[int, ...]) -> None:
-        whole = self._sum(labels, range(len(labels)))
+        beside = _Beside(self, labels)
+        self._known[labels] = beside.log - self._mistakes(labels)
         for runs, instead in self._changes():
-            others = whole - self._sum(labels, runs)
-            for other, log in zip(instead, self._likelihoods(others, runs, instead), strict=True):
+            for other, log in zip(instead, beside.changed(runs, instead), strict=True):
                 changed = _put(labels, dict(zip(runs, other, strict=True)))
                 self._known.setdefault(changed, float(log) - self._mistakes(changed))
 
@@ -187,8 +187,7 @@ class Assigned:
     def score(self, labels: tuple[int, ...]) -> float:
         """Return the log likelihood of an assignment with its mistakes."""
         if labels not in self._known:
-            others = self._sum(labels, range(1, len(labels)))
-            self._known[labels] = float(self._likelihoods(others, [0], [labels[:1]])[0]) - self._mistakes(labels)
+            self._known[labels] = _Beside(self, labels).log - self._mistakes(labels)
         return self._known[labels]
 
     def _mistakes(self, labels: Sequence[int]) -> float:
@@ -207,62 +206,49 @@ class Assigned:
     def _same_way(self, run: int, label: int) -> bool:
         return label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
 
-    def _likelihoods(
-        self, others: NDArray[np.float64], runs: Sequence[int], instead: Sequence[Sequence[int]]
-    ) -> NDArray[np.float64]:
-        """Return the log density of all readings by labels of some runs, machine errors of all sizes alike probable.
-
-        Given the other runs, readings are normal [Rasmussen and Williams (2006), eq. 2.9]: one factor serves all labels.
-        """
-        chosen = list(zip(runs, np.array(instead).T, strict=True))
-        joined = np.concatenate([self._read[run][labels] for run, labels in chosen], axis=1)
-        columns, off = joined[:, :, :-1], joined[:, :, -1]
-        alone = np.zeros((*off.shape, off.shape[1]))
-        for k, (run, labels) in enumerate(chosen):
-            rows = slice(COEFFICIENTS * k, COEFFICIENTS * (k + 1))
-            alone[:, rows, rows] = self._scatter[run][labels]
-        logs = np.zeros((len(SIZES), len(instead)))
-        for k, size in enumerate(SIZES):
-            scale = np.ones(columns.shape[2])
-            scale[: self._of_machine.shape[2]] = size
-            root = np.linalg.cholesky(np.eye(len(scale)) + scale[:, None] * others[:-1, :-1] * scale)
-            right = np.vstack([others[-1:, :-1], columns.reshape(-1, len(scale))]) * scale
-            white = solve_triangular(root, right.T, lower=True, overwrite_b=True, check_finite=False).T
-            pull, known = white[0], white[1:].reshape(columns.shape)
-            inner = np.linalg.cholesky(alone + known @ known.transpose(0, 2, 1))
-            apart = np.linalg.solve(inner, (off - known @ pull)[:, :, None])[:, :, 0]
-            logs[k] = 0.5 * (pull @ pull - np.sum(apart**2, axis=1)) - _log_diagonal(root) - _log_diagonal(inner)
-        return np.asarray(logsumexp(logs, axis=0) - np.log(len(SIZES)) - 0.5 * others[-1, -1])
-
-    def _sum(self, labels: Sequence[int], runs: Iterable[int]) -> NDArray[np.float64]:
+    def information(self, labels: Sequence[int]) -> NDArray[np.float64]:
         """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1).
 
         The readings are the last row and column; their own product has the log determinant of the scatter added.
         """
-        wide = self._of_machine.shape[2] + self._of_session.shape[2] + 1
-        return sum((self._product(run, labels[run]) for run in runs), np.zeros((wide, wide)))
+        return np.sum([self._product(run, label) for run, label in enumerate(labels)], axis=0)
 
     def _product(self, run: int, label: int) -> NDArray[np.float64]:
         if (run, label) not in self._products:
-            root = np.linalg.cholesky(self._scatter[run][label])
-            white = np.linalg.solve(root, self._read[run][label])
+            root = np.linalg.cholesky(self.scatter[run][label])
+            read = np.column_stack([self.effects[self.shows(run, label)], self.off[run][label]])
+            white = np.linalg.solve(root, read)
             self._products[run, label] = white.T @ white
             self._products[run, label][-1, -1] += 2.0 * _log_diagonal(root)
         return self._products[run, label]
 
-    @cached_property
-    def _read(self) -> list[NDArray[np.float64]]:
-        """Return effects of shared causes, and last the reading minus expectation, by label, shape (l + 3, 7, p + 1) each [µm]."""
-        columns = np.concatenate([self._of_machine, self._of_session], axis=2)
-        columns = np.concatenate([columns, np.zeros_like(columns[:1])])
-        expected, every, found = np.array([expected_um(one) for one in self.circles]), range(len(self.circles)), []
-        for one, own in zip(self.runs, self._planned, strict=True):
-            off = read_um(one) - expected[[*every, own, own, own]]
-            found.append(np.concatenate([columns[[*every, own, own, -1]], off[:, :, None]], axis=2))
-        return found
+    def shows(self, run: int, labels: ArrayLike) -> NDArray[np.int64]:
+        """Return the circles whose effects a run has under labels, the last for no circle."""
+        labels = np.asarray(labels)
+        own = np.where(labels == ELSEWHERE, len(self.circles), self._planned[run])
+        return np.where(labels >= 0, labels, own)
 
     @cached_property
-    def _scatter(self) -> list[NDArray[np.float64]]:
+    def effects(self) -> NDArray[np.float64]:
+        """Return effects of shared causes on all circles and on none, shape (l + 1, 7, p) [µm]."""
+        columns = np.concatenate([self._of_machine, self._of_session], axis=2)
+        return np.concatenate([columns, np.zeros_like(columns[:1])])
+
+    def scale(self, size: float) -> NDArray[np.float64]:
+        """Return the standard deviations of shared causes with machine errors of a size, shape (p,)."""
+        return np.repeat([size, 1.0], [self._of_machine.shape[2], self._of_session.shape[2]])
+
+    @cached_property
+    def off(self) -> list[NDArray[np.float64]]:
+        """Return the reading minus expectation by label, shape (l + 3, 7) each [µm]."""
+        expected, every = np.array([expected_um(one) for one in self.circles]), range(len(self.circles))
+        return [
+            read_um(one) - expected[[*every, own, own, own]]
+            for one, own in zip(self.runs, self._planned, strict=True)
+        ]
+
+    @cached_property
+    def scatter(self) -> list[NDArray[np.float64]]:
         """Return the covariance of each reading's own part by label, shape (l + 3, 7, 7) each [µm²]."""
         found = []
         for one, own in zip(self.runs, self._planned, strict=True):
@@ -340,6 +326,72 @@ class Assigned:
         return found
 
 
+class _Beside:
+    """Assignments that differ in few runs from a given one.
+
+    The effects that all runs together leave possible serve all of them; runs are left out and put in by blocks
+    [Rasmussen and Williams (2006), section 5.4.2].
+
+    Attributes:
+        log: log density of all readings under the given labels, machine errors of all sizes alike probable.
+    """
+
+    def __init__(self, sitting: Assigned, labels: Sequence[int]) -> None:
+        self._sitting, self._labels = sitting, labels
+        known, wide = sitting.information(labels), sitting.effects.shape[2]
+        rows = sitting.effects.reshape(-1, wide)
+        logs, covariances, means = [], [], []
+        for size in SIZES:
+            scale = sitting.scale(size)
+            root = np.linalg.cholesky(np.eye(wide) + scale[:, None] * known[:-1, :-1] * scale)
+            right = (np.vstack([known[-1:, :-1], rows]) * scale).T
+            white = solve_triangular(root, right, lower=True, overwrite_b=True, check_finite=False)
+            logs.append(0.5 * (white[:, 0] @ white[:, 0] - known[-1, -1]) - _log_diagonal(root))
+            covariances.append(white[:, 1:].T @ white[:, 1:])
+            means.append(white[:, 1:].T @ white[:, 0])
+        count = len(sitting.effects)
+        self._logs = np.array(logs)[:, None]
+        self._covariance = np.reshape(covariances, (len(SIZES), count, COEFFICIENTS, count, COEFFICIENTS))
+        self._mean = np.reshape(means, (len(SIZES), count, COEFFICIENTS))
+        self.log = float(_mean_of(self._logs)[0])
+
+    def changed(self, runs: Sequence[int], instead: Sequence[Sequence[int]]) -> NDArray[np.float64]:
+        """Return the same with other labels of some runs, one by each of `instead`."""
+        circles, off, scatter = self._of(runs, np.array([[self._labels[run] for run in runs]]))
+        shared = self._between(circles, circles)
+        root = np.linalg.cholesky(scatter - shared)
+        pull = np.linalg.solve(root, (off - self._means(circles))[..., None])
+        logs = self._logs + 0.5 * np.sum(pull**2, axis=(2, 3)) - _log_diagonal(root)
+        logs += _log_diagonal(np.linalg.cholesky(scatter)) * 2.0
+        others, off, scatter = self._of(runs, np.array(instead))
+        turned = np.linalg.solve(root, self._between(circles, others))
+        root = np.linalg.cholesky(scatter + self._between(others, others) + np.swapaxes(turned, -1, -2) @ turned)
+        apart = (off - self._means(others))[..., None] + np.swapaxes(turned, -1, -2) @ pull
+        white = np.linalg.solve(root, apart)
+        return _mean_of(logs - 0.5 * np.sum(white**2, axis=(2, 3)) - _log_diagonal(root))
+
+    def _of(
+        self, runs: Sequence[int], labels: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return circles, shape (m, k), readings minus expectation, (m, 7 k), and their own covariance, (m, 7 k, 7 k)."""
+        circles = np.column_stack([self._sitting.shows(run, labels[:, k]) for k, run in enumerate(runs)])
+        off = np.hstack([self._sitting.off[run][labels[:, k]] for k, run in enumerate(runs)])
+        scatter = np.zeros((*off.shape, off.shape[1]))
+        for k, run in enumerate(runs):
+            rows = slice(COEFFICIENTS * k, COEFFICIENTS * (k + 1))
+            scatter[:, rows, rows] = self._sitting.scatter[run][labels[:, k]]
+        return circles, off, scatter
+
+    def _between(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return covariances of circles, shape (9, m, 7 k, 7 k) [µm²]."""
+        found = self._covariance[:, one[:, :, None], :, other[:, None, :], :]
+        wide = COEFFICIENTS * one.shape[1]
+        return found.transpose(3, 0, 1, 4, 2, 5).reshape(len(SIZES), -1, wide, wide)
+
+    def _means(self, circles: NDArray[np.int64]) -> NDArray[np.float64]:
+        return self._mean[:, circles].reshape(len(SIZES), len(circles), -1)
+
+
 _OTHERWISE = {
     ELSEWHERE: (Name.FORM, "it fits neither its place in the plan nor the other circles"),
     BESIDE: (Name.BORE, "its ball stands elsewhere"),
@@ -349,6 +401,11 @@ _OTHERWISE = {
 
 def _put(labels: tuple[int, ...], changed: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(changed.get(k, label) for k, label in enumerate(labels))
+
+
+def _mean_of(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the log of the mean density over SIZES, shape (m,)."""
+    return np.asarray(logsumexp(logs, axis=0) - np.log(len(SIZES)))
 
 
 def _log_diagonal(roots: NDArray[np.floating]) -> NDArray[np.float64]:

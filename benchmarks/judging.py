@@ -11,19 +11,20 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 from benchmarks.measuring import Row, show  # isort: skip - sets up the environment
 
-from dbbstation.files.recordings.judged import planned_circles, run_of
 from dbbstation.files.recordings.session import read_session
-from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import seen
+from dbbstation.station.events import RunAccepted, RunId
+from dbbstation.station.judging import RunJudge
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
 
 if TYPE_CHECKING:
     from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.files.recordings.session_writer import SessionWriter
 
 SEED = 8
 RATE_HZ = 50.0
@@ -32,15 +33,15 @@ WANTED = 2.2
 
 def cost_s(session: SessionFolder) -> list[float]:
     """Return what each verdict costs: its circle analysed, and judged beside those before it [s]."""
-    planned = planned_circles(session, None)
-    together, known, costs = SessionRuns([]), [], []
+    judge, costs = RunJudge(cast("SessionWriter", SimpleNamespace(session=session, runs=()))), []
     for entry in session.runs:
-        recording = session.load(entry).recording
+        recording, run = (
+            session.load(entry).recording,
+            RunId(entry.test, entry.direction, entry.repeat, entry.mounting or 0),
+        )
         begun = time.process_time()
-        one = seen(run_of(session, entry, recording, None, planned))
-        known.append(one)
-        together = SessionRuns(known, together)
-        together.judge(one)
+        judge.judge(run, recording)
+        judge(RunAccepted(run))
         costs.append(time.process_time() - begun)
     return costs
 

@@ -17,7 +17,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
-from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE, SIZES
+from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
+from dbbstation.quality.forms import SIZES as SHARES
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
 from dbbstation.quality.stated import limit_along
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 
 MISTAKE = LOG_ODDS_LIMIT
 """What a mistake costs, as a logarithm: an operator makes one in a thousand circles."""
+
+SIZES = np.append(0.0, SHARES)
+"""Errors of a machine as shares of their usual size; a simulated machine may have none, and then every circle shows any other equally well."""
 
 WIDE = 3
 """Assignments that are followed at once."""
@@ -243,8 +247,7 @@ class Assigned:
         """Return the reading minus expectation by label, shape (l + 3, 7) each [µm]."""
         expected, every = np.array([expected_um(one) for one in self.circles]), range(len(self.circles))
         return [
-            read_um(one) - expected[[*every, own, own, own]]
-            for one, own in zip(self.runs, self._planned, strict=True)
+            read_um(one) - expected[[*every, own, own, own]] for one, own in zip(self.runs, self._planned, strict=True)
         ]
 
     @cached_property

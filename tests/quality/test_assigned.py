@@ -17,9 +17,8 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.assigned import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER, Assigned, FormerSitting
+from dbbstation.quality.assigned import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER, SIZES, Assigned, FormerSitting
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
-from dbbstation.quality.forms import SIZES
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.together import read_um
 from dbbstation.trace.recording import Recording
@@ -44,11 +43,12 @@ def sitting(tmp_path_factory: pytest.TempPathFactory) -> tuple[tuple[Planned, ..
     return circles, measured(circles, 5)
 
 
-def measured(circles: tuple[Planned, ...], seed: int) -> dict[tuple[str, Direction], Seen]:
-    """Return every circle of a random machine."""
+def measured(circles: tuple[Planned, ...], seed: int | None) -> dict[tuple[str, Direction], Seen]:
+    """Return every circle of a random machine, or of one without errors."""
     machine = read_machine(MACHINE_FILE)
     plan = read_inline_plan(shipped_folder("protocols") / "plans" / "ten-minute-check.yaml")
-    virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, seed)), plan.to_domain(), seed=seed)
+    errors = () if seed is None else random_kinematics(machine, seed)
+    virtual = VirtualMachine(MachineModel(machine, errors), plan.to_domain(), seed=seed or 5)
     runs = {}
     for circle in circles:
         made = virtual.run(circle.test, circle.circle.direction)
@@ -84,6 +84,12 @@ def test_a_sound_sitting_has_no_suspect_and_decides_every_circle(sitting) -> Non
     for one in assigned.runs:
         for name in (Name.TEST, Name.DIRECTION):
             assert assigned.finding(one, undecided(name, "")).verdict is FindingVerdict.GOOD
+
+
+def test_a_machine_without_errors_has_no_suspect(sitting) -> None:
+    circles, _ = sitting
+    for count in (2, 4, 6):
+        assert suspected(shown((circles, measured(circles, None)), {}, count)) == {}
 
 
 def test_the_first_circle_alone_decides_nothing_and_a_session_before_decides_it(sitting) -> None:

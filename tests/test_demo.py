@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 import dbbstation as dbb
-from dbbstation import demo
-from dbbstation.demo import QUICK, run_demo
+from dbbstation.demo import whole_job
+from dbbstation.demo.whole_job import QUICK, run_demo
 from tests.cli.conftest import call
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "examples" / "whole_job.py"
@@ -48,7 +48,7 @@ def test_the_whole_job_on_some_of_its_circles(tmp_path, monkeypatch, tests):
         assert outcome.code == 0, outcome.err
         return outcome.out
 
-    monkeypatch.setattr(demo.DemoJob, "answer", answer)
+    monkeypatch.setattr(whole_job.DemoJob, "answer", answer)
     result = run_demo(tmp_path / "job", 3, told.append, lambda *_: None, tests)
     steps = [line.removeprefix("dbbstation ").split()[0] for line in told]
     assert steps == ["measure", "calibrate", "diagnose", "program", "measure", "evaluate", "evaluate", "report"]

@@ -43,7 +43,7 @@ def demo(*, out: Path | None, seed: int, quick: bool, in_control: str | None, as
       sudo dbbstation demo --quick --control linuxcnc   (needs LinuxCNC; fifteen minutes)
     """
     from dbbstation.cli.output import print_json
-    from dbbstation.demo import QUICK, run_demo
+    from dbbstation.demo.whole_job import QUICK, run_demo
     from dbbstation.errors import OutputError
     from dbbstation.files.places import unused_path
 
@@ -53,7 +53,7 @@ def demo(*, out: Path | None, seed: int, quick: bool, in_control: str | None, as
         raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
     shown = DemoShown()
     if in_control is not None:
-        from dbbstation.demo_in_control import run_ways
+        from dbbstation.demo.in_control import run_ways
 
         try:
             ways = run_ways(folder, seed, shown.tell, shown.progress, tests)

@@ -31,6 +31,7 @@ OF_READERS = {
 """Files whose messages several commands print, with those commands: each has all options that they advise."""
 
 OTHERS = {"--require-hashes", "--no-index", "--find-links", "--headless", "--editable", "--install", "--nthreads"}
+OTHERS |= {"--reuid", "--regid", "--clear-groups"}  # of setpriv
 """Options of other programs."""
 
 

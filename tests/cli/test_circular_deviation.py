@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.cli.demo import _print
 from dbbstation.cli.figures import G_LOW_PASSED, G_WITH_NOISE
-from dbbstation.demo import _side_by_side
+from dbbstation.demo.whole_job import _side_by_side
 from dbbstation.facts.serialise import as_objects
 from dbbstation.results.demo import DemoResult
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dbbstation.demo_in_control import home_mm_of
+from dbbstation.demo.in_control import home_mm_of
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.virtual.linuxcnc import MODULES, NOBODY, alone
 

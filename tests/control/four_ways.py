@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.control.parameters import FITTED, TRIED, drawn_poses, refitted, tool_errors
-from dbbstation.demo_in_control import genhexkins, made_kins
+from dbbstation.demo.in_control import genhexkins, made_kins
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.shipped import shipped_folder

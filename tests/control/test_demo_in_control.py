@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from dbbstation.demo_in_control import run_ways
+from dbbstation.demo.in_control import run_ways
 from dbbstation.virtual.linuxcnc import missing
 from tests.cli.conftest import call
 from tests.nc.planner.required import needs

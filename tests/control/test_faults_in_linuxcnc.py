@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dbbstation.control.kinematics import component
-from dbbstation.demo_in_control import made_kins
+from dbbstation.demo.in_control import made_kins
 from dbbstation.files.shipped import package_text
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.demo_in_control import made_kins
+from dbbstation.demo.in_control import made_kins
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.linuxcnc import missing, run
 from tests.control.in_linuxcnc import NAME, circle_of, circle_program, installed

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.demo import QUICK
-from dbbstation.demo_in_control import DIAGNOSED, run_ways
+from dbbstation.demo.in_control import DIAGNOSED, run_ways
+from dbbstation.demo.whole_job import QUICK
 
 if TYPE_CHECKING:
     from dbbstation.results.demo import ControlWay

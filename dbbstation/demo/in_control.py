@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.control.parameters import Values, hal_lines, home_mm, tables
-from dbbstation.demo import DemoJob, write_plan, write_truth
+from dbbstation.demo.whole_job import DemoJob, write_plan, write_truth
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import as_objects
 from dbbstation.files.atomic import write_text

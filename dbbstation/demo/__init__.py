@@ -1,0 +1,1 @@
+"""The whole job on a virtual machine, and four corrections of it under LinuxCNC."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
 from dbbstation.model.expected import SECTORS, expected_circle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
@@ -42,3 +44,17 @@ def test_all_base_joints_raised_are_read_by_the_sine_of_the_bar(reference, eleva
     expected = expected_circle(observed(elevation_deg, Direction.CCW), model, [])
     assert expected.centre_mm == pytest.approx([0.0, 0.0], abs=1e-6)
     assert expected.radial_mm == pytest.approx(0.1 * np.sin(np.radians(elevation_deg)), abs=1e-4)
+
+
+def test_struts_reverse_where_their_lengths_are_longest_and_shortest(reference) -> None:
+    """Against lengths at every hundredth of a degree: as many reversals, each within half a step of a quarter degree."""
+    observation = observed(0.0, Direction.CCW)
+    stated = expected_circle(observation, MachineModel(reference), []).reversals_deg
+    fine_deg = np.arange(0.0, 360.0, 0.01)
+    length_mm = strut_lengths(
+        reference.hexapod, Frames.from_poses(observation.raw.circle.poses(fine_deg), reference.hexapod.rotation)
+    )
+    grows = np.diff(length_mm, axis=0, append=length_mm[:1]) > 0.0
+    true = [fine_deg[k] for strut in grows.T for k in np.flatnonzero(strut != np.roll(strut, 1))]
+    assert len(stated) == len(true) >= 12
+    assert np.sort(stated) == pytest.approx(np.sort(true), abs=0.26)

@@ -45,7 +45,7 @@ def test_after_is_what_the_model_leaves(reference):
 
 def test_a_base_that_is_turned_makes_the_plane_slope(reference):
     turn = 1e-4
-    for axis, flatness, parallelism in ((0, 380 * turn, 0.0), (2, 0.0, 380 * turn)):
+    for axis, flatness, parallelism in ((0, 380 * turn, 0.0), (1, 380 * turn, 0.0), (2, 0.0, 380 * turn)):
         shift = np.cross(turn * np.eye(3)[axis], reference.hexapod.base_joints_mm).ravel()
         model = MachineModel(reference, (Fitted(known_sources()["base-joints"], shift),))
         figures = plane_figures(model, -1008.0)

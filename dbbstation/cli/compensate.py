@@ -86,8 +86,8 @@ def compensate(
     \b
     Examples:
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
-      dbbstation compensate part.ngc --model model.yaml --out true.ngc --angles 0,0,0 --offset G54=20,-35,-1000 --tool-length 1=52.1
-      dbbstation compensate part.nc --written-in linuxcnc --model model.yaml --out true.ngc --parameters linuxcnc.var --tools tool.tbl
+      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles 0,0,0 --offset G54=20,-35,-1000 --tool-length 1=52.1
+      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles 0,0,0 --parameters linuxcnc.var --tools tool.tbl
       dbbstation compensate part.ngc --model model.yaml --out true.ngc --strict
     """
     from dbbstation.cli.output import say

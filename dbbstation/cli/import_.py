@@ -90,9 +90,10 @@ def import_(
 
     \b
     Examples:
-      dbbstation import old/*.csv --out session --plan plan.yaml --machine machine.yaml --mapping old-program.yaml
-      dbbstation import a.csv --out session --plan plan.yaml --machine machine.yaml --run a.csv=a-ccw \
-        --columns Winkel=angle:deg --columns Abw=deviation:µm --zero-mm 150.0003 --angle-grows ccw --angle-zero-deg 0 \
+      dbbstation import old/*.csv --out imported --plan table2.yaml --machine machine.yaml --mapping old-program.yaml \
+        --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --yes
+      dbbstation import a.csv --out imported --plan table2.yaml --machine machine.yaml --run a.csv=a-ccw \
+        --columns Winkel=angle:deg --columns Abweichung=deviation:µm --zero-mm 150 --angle-grows ccw --angle-zero-deg 0 \
         --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --dry-run
     """
     from dbbstation.cli.asking import Asker

@@ -46,7 +46,7 @@ def plot(
     \b
     Examples:
       dbbstation plot session --tests a --out a.svg
-      dbbstation plot session --tests a,b --kind deviation --out ab.pdf
+      dbbstation plot session --tests a,g --kind deviation --out ab.pdf
       dbbstation plot before after --tests a --kind compare --out a.png
     """
     from dbbstation.circles.path import Filter

@@ -39,7 +39,7 @@ def predict(
     \b
     Examples:
       dbbstation predict --model model.yaml commanded.csv --table actual.csv
-      dbbstation predict --model model.yaml excel.csv --decimal , --table actual.csv
+      dbbstation predict --model model.yaml poses.csv --decimal , --table actual.csv
     """
     from dbbstation.cli.model_warnings import say_model_warnings
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_result, say

@@ -72,8 +72,8 @@ def calibrate(
     \b
     Examples:
       dbbstation calibrate 2026-11-20-hexapod-7
-      dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml --figure circles.svg
-      dbbstation calibrate monday tuesday --exclude h --json
+      dbbstation calibrate 2026-11-20-hexapod-7 --out hexapod-7.yaml --figure circles.svg
+      dbbstation calibrate monday tuesday --exclude g --json
       dbbstation calibrate standard-test --method conv-a
       dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
       dbbstation calibrate monday --source-files scale_bow.py --sources strut-reference-length,base-joints,scale-bow

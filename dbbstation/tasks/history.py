@@ -47,7 +47,7 @@ def history(
     Examples:
       dbbstation history sessions
       dbbstation history sessions --page history.html --table history.csv
-      dbbstation history sessions --tests a,f --false-alarms 0.0001 --json
+      dbbstation history sessions --tests a,g --false-alarms 0.0001 --json
 
     Args:
         tolerances: limits of circles.

@@ -160,11 +160,11 @@ def mismatch(
 
     \b
     Examples:
-      dbbstation mismatch run.csv --measured measured_mm --simulated model_mm
-      dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
+      dbbstation mismatch axis.csv --measured measured_mm --simulated simulated_mm
+      dbbstation mismatch axis.csv --measured measured_mm --simulated simulated_mm --figure where.svg
       dbbstation mismatch excel.csv --measured y_um --simulated y_sim_um --decimal ,
       dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
-      dbbstation mismatch run.csv --simulator model.yaml --out missing.py --figure before_after.svg
+      dbbstation mismatch pendulum.csv --simulator pendulum.yaml --allow --out missing.py
       dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
 
     Args:

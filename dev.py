@@ -31,14 +31,14 @@ STAMP = ENVIRONMENT / "dbbstation-stamp"
 VERSIONS = ((3, 11), (3, 13))
 
 CHECKS = (
+    ("docs", ["sphinx-build", "-q", "-W", "-b", "html", "docs", "docs/_build"]),
     ("format", ["ruff", "format", "--check", "."]),
     ("lint", ["ruff", "check", "."]),
     ("encodings", ["ruff", "check", "--preview", "--select", "PLW1514", "."]),
     ("types", ["mypy"]),
     ("walls", ["lint-imports"]),
-    ("docs", ["sphinx-build", "-q", "-W", "-b", "html", "docs", "docs/_build"]),
 )
-"""What `test` runs before the tests, two at a time: none of them needs the other, and each has one core."""
+"""What `test` runs before the tests, two at a time, the longest first: none of them needs the other, and each has one core."""
 
 TESTS = ["pytest", "-q", "-n", "auto", "--dist", "worksteal"]
 

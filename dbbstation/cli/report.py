@@ -64,8 +64,8 @@ def report(
     Examples:
       dbbstation report session --page report.html
       dbbstation report verified --before measured --model joint.yaml --page report.html
-      dbbstation report session --certificate --place "hall 3" --out report.html --pdf report.pdf
-      dbbstation report session --job "spindle exchanged" --out report.html --pdf report.pdf
+      dbbstation report session --certificate --place "hall 3" --page report.html --pdf report.pdf
+      dbbstation report session --job "spindle exchanged" --page report.html --pdf report.pdf
     """
     from dbbstation.cli.asking import Asker
     from dbbstation.cli.output import COVERAGE_FACTOR, print_result, say

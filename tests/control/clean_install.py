@@ -112,7 +112,7 @@ def main() -> None:
             raise SystemExit("a dbbkins is installed already")
         shown("sudo halcompile --install dbbkins.comp", shop)
         machine = read_machine(shop / "dbbkins.machine.yaml")
-        mill = configured(EXAMPLE.read_text(), printed, home_mm_of(machine))
+        mill = configured(EXAMPLE.read_text(encoding="utf-8"), printed, home_mm_of(machine))
         (shop / "mill.ini").write_text(mill)
         for name in ("hexapod.var", "hexapod.tbl"):
             (shop / name).touch()

@@ -18,7 +18,8 @@ from studies import coverage_calibration, coverage_feed
 from studies.coverage_circles import CELLS, GAUSSIAN, SHARP, _drawn
 
 MODULES = (
-    *(f"results/{name}" for name in ("circle_figures", "circles", "report", "prediction", "evaluation", "effects")),
+    *(f"results/{name}" for name in ("circle_figures", "circles", "report", "prediction", "evaluation")),
+    "diagnosis/effects",
     *(f"circles/{name}" for name in ("reversals", "budget", "quick_look")),
     *(
         f"calibration/{name}"

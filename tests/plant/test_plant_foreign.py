@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from tests.diagnosis.foreign_levels import calibration_of, levels_of, table_of
 from tests.plant.foreign.judge import judge
-from tests.plant.foreign.levels import calibration_of, levels_of, table_of
 from tests.plant.foreign.score import compare
 from tests.plant.foreign.sessions import KINDS, LEAST_SIZE, kind_of, make, small_machine
 from tests.plant.machine import reference_machine

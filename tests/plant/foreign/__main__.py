@@ -15,8 +15,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.diagnosis.foreign_levels import calibration_of, table_of
 from tests.plant.foreign.judge import commit_of, judge
-from tests.plant.foreign.levels import calibration_of, table_of
 from tests.plant.foreign.score import as_table, scored
 from tests.plant.foreign.sessions import make
 

@@ -308,7 +308,7 @@ def _printed(folder: Path, patience_s: float) -> str:
     if is_root():
         user, group = (os.environ.get(name, NOBODY) for name in ("SUDO_UID", "SUDO_GID"))
         for path in (folder, *folder.iterdir()):
-            os.chown(path, int(user), int(group))
+            shutil.chown(path, int(user), int(group))
         command = ["setpriv", f"--reuid={user}", f"--regid={group}", "--clear-groups", *command]
     running = subprocess.Popen(  # noqa: S603 - LinuxCNC itself
         command,

@@ -22,11 +22,12 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.gateway import content_of
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.source_text import text_of
 from dbbstation.machine.geometry import STRUTS, Hexapod
 from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames, Rotation
+from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.travel import middle
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.results.demo import ControlWay
@@ -113,8 +114,8 @@ def run_ways(
     given = replace(
         plain,
         offset_mm=plain.offset_mm + np.array(json.loads(answer)["home_mm"]),
-        hal=tuple(_text(folder / "genhexkins" / "genhexkins.hal").splitlines()),
-        tables=tuple(_text(path) for path in sorted((folder / "genhexkins").glob("joint-*.comp"))),
+        hal=tuple(text_of(folder / "genhexkins" / "genhexkins.hal").splitlines()),
+        tables=tuple(text_of(path) for path in sorted((folder / "genhexkins").glob("joint-*.comp"))),
     )
     driven = _driven(job, machine, "parameters", given, "programs")
     ways.append(_way(job, "parameters", driven, seed, machine="genhexkins/machine.yaml"))
@@ -148,7 +149,7 @@ def _driven(job: DemoJob, machine: Machine, way: str, kins: ControlKins, program
     for done, program in enumerate(given):
         if not (driven / program.name).exists():
             job.progress(f"LinuxCNC, {way}", done, len(given))
-            ran = run(_text(program), faster=FASTER, kins=kins)
+            ran = run(text_of(program), faster=FASTER, kins=kins)
             text = driven_program(machine, ran)
             write_text(driven / program.name, f"{text}(LinuxCNC took {ran.duration_s:.3f} s)\n")
     return driven
@@ -176,23 +177,17 @@ def _way(job: DemoJob, name: str, driven: Path, seed: int, **more: str) -> Contr
     if not kept.exists():
         _session(job, name, driven, seed, **more)
         write_text(kept, job.answer(["evaluate", name, "--model", "truth.yaml"]))
-    took = sum(float(said) for path in sorted(driven.glob("*.ngc")) for said in _SECONDS.findall(_text(path)))
-    return ControlWay(name, tuple(as_objects(json.loads(_text(kept))).runs), took)
-
-
-def _text(path: Path) -> str:
-    return content_of(path).decode()
+    took = sum(float(said) for path in sorted(driven.glob("*.ngc")) for said in _SECONDS.findall(text_of(path)))
+    return ControlWay(name, tuple(as_objects(json.loads(text_of(kept))).runs), took)
 
 
 def home_mm_of(machine: Machine) -> NDArray[np.float64]:
     """Return the driven lengths in the middle of the travel, where the machine is switched on, shape (6,)."""
-    pose = np.array([[0.0, 0.0, _middle_mm(machine), 0.0, 0.0, 0.0]])
-    lengths = strut_lengths(machine.hexapod, Frames.from_poses(pose, machine.hexapod.rotation))
-    return (lengths - machine.reference_length_error_mm)[0]
+    return (strut_lengths(machine.hexapod, middle(machine)) - machine.reference_length_error_mm)[0]
 
 
 def _middle_mm(machine: Machine) -> float:
-    return sum(machine.travel.z_mm) / 2.0
+    return float(middle(machine).position_mm[0, 2])
 
 
 def made_kins(machine: Machine, name: str, *hal: str) -> ControlKins:

@@ -1,7 +1,7 @@
 """LinuxCNC without a screen as a function: a program in, what it commands in every servo cycle out.
 
-Needs the Debian packages `linuxcnc-uspace` and, for a kinematics, `linuxcnc-uspace-dev`. LinuxCNC refuses to run as root: root starts
-it as the user who called sudo, or as nobody.
+Needs the Debian packages `linuxcnc-uspace` and, for a kinematics, `linuxcnc-uspace-dev`. LinuxCNC refuses to run as root. Called
+by root, this module starts it as the user who called sudo, else as the user `nobody`.
 
 LinuxCNC runs in real time. With `faster` its clock runs that many times as fast: the servo period and all times are divided
 by it, speeds multiplied by it, accelerations by its square, so that every servo cycle calculates with the same way per
@@ -25,10 +25,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.files.gateway import content_of
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.source_text import text_of
 from dbbstation.machine.kinematics import forward
 from dbbstation.machine.rotation import Frames
+from dbbstation.machine.travel import middle
 from dbbstation.system.children import end_tree, is_root
 from dbbstation.system.handles import open_to_change
 from dbbstation.system.locks import lock
@@ -172,7 +173,7 @@ def run_once(
 ) -> PlannerRun:
     """Run a program with this clock, or raise; arguments as for `run`."""
     with started(text, mm_s2, faster, kins, patience_s=patience_s) as (folder, printed):
-        ended = _text(folder / "ended.txt") if (folder / "ended.txt").exists() else ""
+        ended = text_of(folder / "ended.txt") if (folder / "ended.txt").exists() else ""
         if ended == BEHIND:
             raise BehindError(BEHIND)
         if ended != "ended":
@@ -205,8 +206,8 @@ def started(
 def driven_program(machine: Machine, ran: PlannerRun) -> str:
     """Return the program by which a nominal control would drive the struts as LinuxCNC drove them."""
     rows = np.unique([*range(0, len(ran.poses), EVERY), len(ran.poses) - 1])
-    middle = np.array([[0.0, 0.0, sum(machine.travel.z_mm) / 2.0, 0.0, 0.0, 0.0]])
-    near = Frames.from_poses(np.repeat(middle, len(rows), axis=0), machine.hexapod.rotation)
+    start = middle(machine)
+    near = Frames(*(np.repeat(of, len(rows), axis=0) for of in (start.position_mm, start.rotation)))
     frames = forward(machine.hexapod, ran.poses[rows] + machine.reference_length_error_mm, near)
     poses, took = frames.to_poses(machine.hexapod.rotation), np.diff(ran.time_s[rows])
     feeds = 60.0 * np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1) / took
@@ -225,7 +226,7 @@ def _configure(folder: Path, mm_s2: float, faster: int, kins: ControlKins | None
         "deg_s2": GREATEST_DEG_S2 * faster**2,
         "ramp_hz": RAMP_HZ * faster,
     }
-    ini = [_text(shipped / "planner.ini").format(**limits)]
+    ini = [text_of(shipped / "planner.ini").format(**limits)]
     if kins is not None:
         ini[0] = ini[0].replace("trivkins coordinates=XYZABC", kins.name)
         ini[0] = ini[0].replace("[TRAJ]\n", f"[TRAJ]\nHOME = 0 0 {kins.home_z_mm} 0 0 0\n")
@@ -246,20 +247,16 @@ def _configure(folder: Path, mm_s2: float, faster: int, kins: ControlKins | None
                 (folder / f"joint-{joint}.comp").write_text(kins.tables[joint], encoding="utf-8")
                 homed += f"COMP_FILE = joint-{joint}.comp\nCOMP_FILE_TYPE = 1\n"
         ini.append(f"[AXIS_{axis}]\n{both}[JOINT_{joint}]\nTYPE = {kind}\n{both}{homed}")
-    hal = [_text(shipped / "planner.hal"), *(() if kins is None else kins.hal), ""]
+    hal = [text_of(shipped / "planner.hal"), *(() if kins is None else kins.hal), ""]
     files = {
         "planner.ini": "".join(ini),
         "planner.tbl": "T1 P1 D0.1 Z0\n",
         "planner.var": "",
         "planner.hal": "\n".join(hal),
-        "drive.py": _text(shipped / "drive.py"),
+        "drive.py": text_of(shipped / "drive.py"),
     }
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
-
-
-def _text(path: Path) -> str:
-    return content_of(path).decode()
 
 
 def _quickened(text: str, faster: int) -> str:

@@ -1,7 +1,7 @@
 """Four ways on one machine, measured by its bar: `python -m tests.control.through_the_bar FOLDER [--store]`.
 
-What `dbbstation demo --quick --control linuxcnc` does, once with the model that a session of its own diagnoses and once with the
-machine itself as the model, so that the model's error is no part of what is left. An interrupted call goes on in its folder.
+It does what `dbbstation demo --quick --control linuxcnc` does, twice: with the model that another session diagnoses, and with the
+simulated machine as the model. The second has no error of a model. An interrupted call goes on in its folder.
 """
 
 from __future__ import annotations

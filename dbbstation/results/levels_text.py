@@ -137,8 +137,9 @@ def _followed(one: Followed, unit: str, values: Mapping[str, Mapping[str, Value]
         yield f"  {one.name} carries the difference itself: it may be its cause, or result from it. These rows cannot tell."
     if one.form is not None:
         yield f"  {_law(one.form, values, rows)}"
-        sloped = any("slope" in values.get(name, {}) for name in one.form.names)
-        if one.slope is not None and one.straight >= LIKELY and not sloped:
+        # A law that is straight states its own slope; beside another law it is only a part of the line.
+        stated = len(one.form.names) == 1 and "slope" in values.get(one.form.names[0], {})
+        if one.slope is not None and one.straight >= LIKELY and not stated:
             yield f"  The straight line through it over {one.variables[0][0]} has {one.slope.in_words}: {100.0 * one.straight:.0f} % of its squares."
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
@@ -361,3 +362,20 @@ def test_what_fitted_parameters_hide_is_said_with_what_shows_it(concealed, said)
     gravity = Detectable("gravity", 4.0, concealed, "Measure f at two heights.")
     differs = DifferenceFound(Differs.NO, "", 0.1, 1.0, False, 900.0, (gravity,))  # noqa: FBT003
     assert said in " ".join(level_sentences(Levels(differs, (), None), "µm", {}))
+
+
+@pytest.mark.parametrize(
+    ("form", "lines"),
+    [
+        (LawForm("linear in y", (), ()), 0),
+        (LawForm(None, (), (), ("linear in y", "product of x and y")), 1),
+        (LawForm("curve over y", (), ()), 1),
+    ],
+)
+def test_the_whole_line_is_said_where_no_law_alone_states_it(form, lines):
+    """A product that is zero at an end of its range carries a part of the shear, so that its neighbour's slope is too small."""
+    shear = Value(-3.9e-5, 1e-6, "mm/mm")
+    one = replace(followed(FollowsAnswer.FOLLOWS), variables=(("y",),), form=form, slope=shear, straight=0.9)
+    levels = Levels(DifferenceFound(Differs.YES, "", 1.0, 1.0, False, 900.0, ()), (one,), None)  # noqa: FBT003
+    said = " ".join(level_sentences(levels, "mm", {"linear in y": {"slope": Value(-2e-5, 2e-6, "mm/mm")}}))
+    assert said.count("-3.9e-05 ± 1e-06 mm/mm") == lines

@@ -25,7 +25,7 @@ from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -128,11 +128,10 @@ class CircleChannel:
         """Return the source of a form."""
         return self.sources[name, variant.law]
 
-    def forms(self, but_for: Collection[str]) -> Iterator[tuple[Variant, float]]:
+    def forms(self) -> Iterator[tuple[Variant, float]]:
         """Return initial forms of named causes with their relative inaccuracy."""
         for (name, law), variants in self._laid.items():
-            if name not in but_for:
-                yield from ((variant, self.sources[name, law].form_uncertainty) for variant in variants)
+            yield from ((variant, self.sources[name, law].form_uncertainty) for variant in variants)
 
     def happens_once(self, name: str) -> bool:
         """Return whether a cause acts once in a session."""
@@ -347,16 +346,18 @@ class CircleChannel:
             samples[rows, place : place + count] = derivative
         columns = self.columns.add(samples)
         plausible = np.tile([p.plausible for p in amplitudes], len(sets))
-        whole = Variant(columns, plausible, nonlinear, law=source.law)
+        positive = tuple(p.positive for p in amplitudes) * len(sets)
+        whole = Variant(columns, plausible, nonlinear, law=source.law, positive=positive)
         found = []
         for part in parts_of(amplitudes, len(sets)):
             form = replace(whole, label=part.label, log_weight=part.log_weight)
             if part.alike:
                 alike = self.columns.add(samples.sum(axis=1, keepdims=True))
-                form = replace(form, columns=alike, plausible=plausible[:1], whole=columns)
+                form = replace(form, columns=alike, plausible=plausible[:1], whole=columns, positive=positive[:1])
             elif part.label:
                 some = list(part.amplitudes)
-                form = replace(form, columns=columns[some], plausible=plausible[some], whole=columns)
+                signs = tuple(positive[k] for k in some)
+                form = replace(form, columns=columns[some], plausible=plausible[some], whole=columns, positive=signs)
             found.append(form)
         return found
 

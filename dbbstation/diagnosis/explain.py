@@ -21,7 +21,6 @@ from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, search
-from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.settle import SEEDS
 from dbbstation.inference.verdict import SURE
@@ -128,7 +127,6 @@ class _Settling:
         self._laid_out: set[tuple[str, str]] = set()
         self._tried: set[frozenset[tuple[str, str]]] = set()
         self._seeds: dict[frozenset[str], tuple[Member, ...]] = {}
-        self._refused: dict[str, str] = {}
         self._given_up: set[tuple[str, str]] = set()
         self._likely = CLOSE  # the most probable set alone is wanted, until nothing changes
 
@@ -161,7 +159,7 @@ class _Settling:
         self._noise_mm = float(np.sqrt(noise.power[0]))
         self._beside = channel.beside_base(self._noise_mm, self._scatter)
         comparison = self._beside.comparison(target)
-        causes = _listed(channel, unmodelled, comparison, self._refused, self._given_up)
+        causes = _listed(channel, unmodelled, comparison, self._given_up)
         posterior = search(comparison, causes, self._seeds.values(), most_members=MOST_MEMBERS, likely=self._likely)
         best = _steady(posterior, self._fitted)
         self._seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
@@ -174,7 +172,6 @@ class _Settling:
             unmodelled,
             noise,
             misfit_of(self._fit, noise),
-            self._refused,
             scatter=self._scatter,
         )
 
@@ -191,9 +188,7 @@ class _Settling:
         joint = _joint(self._channel, settled.comparison, settled.best)
         if joint is None:
             return True
-        impossible, idle = _negative(joint, self._channel), _idle_laws(joint, self._channel)
-        if impossible or idle:
-            self._refused |= impossible
+        if idle := _idle_laws(joint, self._channel):
             self._given_up |= idle
             return False
         if not self._fitted:
@@ -229,17 +224,14 @@ def _listed(
     channel: CircleChannel,
     unmodelled: Unmodelled,
     comparison: ModelComparison,
-    refused: Collection[str],
     given_up: Collection[tuple[str, str]],
 ) -> tuple[Cause, ...]:
     """Return the compared causes: named causes, set-up faults and unnamed effects. Abandoned laws are left out."""
     forms = [variant for cause in unmodelled.causes for variant in cause.variants]
-    known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms(but_for=refused)), strict=True))
+    known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms()), strict=True))
     nameless = [cause for cause in map(partial(_but_for, known=known), unmodelled.causes) if cause.variants]
     lawful = (
-        replace(c, variants=tuple(v for v in c.variants if (c.name, v.law) not in given_up))
-        for c in channel.named
-        if c.name not in refused
+        replace(c, variants=tuple(v for v in c.variants if (c.name, v.law) not in given_up)) for c in channel.named
     )
     return (*lawful, *channel.set_up, *nameless)
 
@@ -249,22 +241,6 @@ def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
     if [v.label for v in kept] == [EACH]:
         kept = []
     return cause if len(kept) == len(cause.variants) else replace(cause, variants=tuple(kept))
-
-
-def _negative(fit: Calibration, channel: CircleChannel) -> dict[str, str]:
-    base = {term.source.name for term in channel.calibration.layout.terms}
-    found = {}
-    for term in fit.layout.terms:
-        if term.source.name in base:
-            continue
-        for k, parameter in enumerate(term.parameters):
-            column = term.columns.start + k
-            value, variance = float(fit.x[column]), float(fit.solution.covariance[column, column])
-            sigma = float(np.sqrt(max(variance, 0.0) + (term.source.form_uncertainty * value) ** 2))
-            why = impossibly_negative(parameter.name, value, sigma, parameter.unit) if parameter.positive else ""
-            if why:
-                found[term.source.name] = why
-    return found
 
 
 def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:

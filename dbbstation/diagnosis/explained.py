@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +10,6 @@ import numpy as np
 from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.channel import CircleChannel
@@ -44,7 +42,6 @@ class SettledCircles:
     unmodelled: Unmodelled
     noise: Spectrum
     left: Misfit
-    refused: Mapping[str, str] = field(default_factory=dict)
     scatter: float = 1.0
     stopped: bool = False
 

@@ -78,7 +78,6 @@ def outcome_of(explained: Explained) -> Settled:
         causes=settled.causes,
         comparison=settled.comparison,
         posterior=replace(posterior, hypotheses=(best, *others)),
-        refused=settled.refused,
         stopped=settled.stopped,
     )
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
-from dbbstation.diagnosis.held import uncertainties, unseen
+from dbbstation.diagnosis.held import held_variance, unseen
 from dbbstation.inference.alternatives import standing_out
 from dbbstation.inference.concealment import concealment
+from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts
+from dbbstation.inference.verdict import ABSENT, OUT, SURE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -58,15 +59,6 @@ class _CircleJudge(CauseJudge):
     def findings(self) -> tuple[SourceFinding, ...]:
         """Return all findings."""
         found = [self._source_finding(cause) for cause in self._named.values()]
-        nothing: Any = dict.fromkeys(
-            ("concealed", "signature_rms_um", "unconcealed_rms_um", "gain", "log_evidence"), 0.0
-        )
-        found += [
-            SourceFinding(
-                name=name, verdict=Verdict.RULED_OUT, **nothing, probability=0.0, acts=Acts.ALWAYS, sigmas=0.0, text=why
-            )
-            for name, why in self._settled.refused.items()
-        ]
         return tuple(sorted(found, key=lambda f: (f.verdict.rank, -(f.gain or 0.0))))
 
     def _source_finding(self, cause: Cause) -> SourceFinding:
@@ -193,9 +185,23 @@ class _CircleJudge(CauseJudge):
             for k, p in enumerate(amplitudes)
         }
 
+    def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
+        source, found = (
+            self._circles.source_of(shown.cause.name, shown.variant),
+            self._values_of(shown, values, covariance),
+        )
+        positive = {p.name: found[p.name] for p in source.parameters(self._circles.machine) if p.positive}
+        sigma = {n: float(np.hypot(v.uncertainty, source.form_uncertainty * v.value)) for n, v in positive.items()}
+        each = (impossibly_negative(n, v.value, sigma[n], v.unit) for n, v in positive.items())
+        return next(filter(None, each), "")
+
     def _fitted(self, name: str) -> dict[str, Value]:
         after = self._joint.after
-        variance = uncertainties(after, unseen(after)) ** 2 + after.layout.formula_variance(after.x)
+        found, seen = after.x.copy(), np.maximum(after.solution.variance, 0.0)
+        own, shift, beside = self._beside_nameless(name)
+        found[own] += shift
+        seen[own] = beside
+        variance = seen + held_variance(after, unseen(after)) + after.layout.formula_variance(after.x)
         values: dict[str, Value] = {}
         for term in after.layout.terms:
             if term.source.name != name:
@@ -203,8 +209,22 @@ class _CircleJudge(CauseJudge):
             for k, parameter in enumerate(term.parameters):
                 column = term.columns.start + k
                 key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
-                values[key] = Value(float(after.x[column]), float(np.sqrt(variance[column])), parameter.unit)
+                values[key] = Value(float(found[column]), float(np.sqrt(variance[column])), parameter.unit)
         return values
+
+    def _beside_nameless(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return amplitudes' columns, what effects without a name change, and variances beside these."""
+        amplitudes = self._joint.after.layout.columns_of(name)[0]
+        if self._best.members == self._joint.members:
+            return amplitudes[:0], np.zeros(0), np.zeros(0)
+        first = sum(
+            len(m.columns) for m in self._joint.members[: [m.cause.name for m in self._joint.members].index(name)]
+        )
+        width, spread = len(self._members[name].variant.columns), self._circles.to_whole(self._members[name].variant)
+        alone = self._settled.comparison.estimates(self._joint.members).values[first : first + width]
+        values, covariance = self._values[name]
+        variances = np.diag(spread @ covariance[:width, :width] @ spread.T)
+        return amplitudes, spread @ (values[:width] - alone), variances
 
 
 def _form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:

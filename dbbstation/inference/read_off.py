@@ -307,14 +307,16 @@ class CauseJudge:
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Return why a law cannot replace its equivalent; may be empty."""
-        law = self._settled.bank.laws.get(cause.name)
-        if law is None or not any(law.positive):
+        shown = replace(self._beside[cause.name][1], scale=float(SCALES[-1]))
+        if not any(shown.variant.positive):
             return ""
         alike = [name for name, equal in self._classes.items() if cause.name in equal]
-        shown = replace(self._beside[cause.name][1], scale=float(SCALES[-1]))
         found = self._settled.comparison.estimates([shown, *self._best.without(*alike)])
         width = len(shown.variant.columns)
-        return impossible(law, found.values[:width], np.diag(found.covariance)[:width])
+        return self._impossible(shown, found.values[:width], found.covariance[:width, :width])
+
+    def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
+        return impossible(self._settled.bank.laws[shown.cause.name], values, np.diag(covariance))
 
     def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
         seen = self._seen(cause, self._best.members)

@@ -524,7 +524,7 @@ class ErrorSource(ABC):
 
     @property
     def simpler_law(self) -> str | None:
-        """Return the law without nonlinear parameters, or None."""
+        """Return the law that this one contains, or None."""
         return None
 
     @property

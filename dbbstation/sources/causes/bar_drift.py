@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,6 +56,13 @@ class BarDrift(ErrorSource):
 
     def by_temperature(self) -> ErrorSource:
         return _ByTemperature()
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return (_InTwoStages(), *super().other_laws())
+
+
+class _InTwoStages(InTwoStages, cause=BarDrift):
+    """The same part, heated through another one."""
 
 
 class _ByTemperature(FollowsTemperature, cause=BarDrift):

@@ -10,7 +10,7 @@ from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -76,6 +76,13 @@ class SpindleGrowth(ErrorSource):
 
     def by_temperature(self) -> ErrorSource:
         return _ByTemperature()
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return (_InTwoStages(), *super().other_laws())
+
+
+class _InTwoStages(InTwoStages, cause=SpindleGrowth):
+    """The same part, heated through another one."""
 
 
 class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):

@@ -8,7 +8,7 @@ from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -63,6 +63,13 @@ class ThermalFrame(ErrorSource):
 
     def by_temperature(self) -> ErrorSource:
         return _ByTemperature()
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return (_InTwoStages(), *super().other_laws())
+
+
+class _InTwoStages(InTwoStages, cause=ThermalFrame):
+    """The same part, heated through another one."""
 
 
 class _ByTemperature(FollowsTemperature, cause=ThermalFrame):

@@ -49,7 +49,7 @@ class Problem:
 
 
 MOST_FAULTS = 20
-"""Faults of one kind that are listed one by one; nobody reads the ten thousandth."""
+"""Faults of one kind that are listed one by one."""
 
 
 MOST_LISTED = 200

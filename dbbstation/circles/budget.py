@@ -96,9 +96,9 @@ def _budget(
 
 
 TOO_FEW = f"fewer than {FEWEST_SAMPLES} samples do not separate noise from form"
-"""Why a figure of few samples has no uncertainty: nobody knows its noise."""
+"""Why a figure of few samples has no uncertainty: its noise is unknown."""
 
-NO_PLACE = "not absolute, because nobody knows where the ball stands"
+NO_PLACE = "not absolute, because the ball's place is unknown"
 """Why the centre about a ball that was put up under the spindle has no uncertainty."""
 
 NO_HEIGHT = "not absolute, because a raised bar does not tell the radius from the height of the tool tip"

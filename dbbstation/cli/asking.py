@@ -50,7 +50,7 @@ class Asker:
             self.text(question, option)
             return None
         while True:
-            answer = self.text(question if needed else f"{question}, Enter where nobody knows", option, default="")
+            answer = self.text(question if needed else f"{question}, Enter if it is unknown", option, default="")
             try:
                 if answer or not needed:
                     return float(answer.replace(",", ".")) if answer else None

@@ -386,7 +386,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequ
             by_text.setdefault(text, []).append(one.name)
     for text, names in by_text.items():
         found.append(f"{text} ({'every run' if len(names) == len(runs) else ', '.join(names)})")
-    return [*found, *(f"nobody knows: {one}" for one in unknown)]
+    return [*found, *(f"not stated: {one}" for one in unknown)]
 
 
 def _show(found: _Import) -> None:

@@ -19,7 +19,7 @@ GROUP = "dbbstation.instruments"
 """Entry points of this group name packages; every `.yaml` file in the folder of one is an instrument."""
 
 HOW_TO_ADD = "or give a .yaml file of your own, or install its package"
-"""What a name that nobody knows may lack."""
+"""What an unknown name may lack."""
 
 
 def instruments_folder() -> Path:

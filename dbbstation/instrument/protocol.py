@@ -247,7 +247,7 @@ class Protocol(Schema):
         whole = self.whole()
         if not whole.by_width and not whole.terminator:
             raise ValueError(
-                "every frame ends in the same literal, or every frame has a fixed width: otherwise nobody knows where one ends"
+                "every frame ends in the same literal, or every frame has a fixed width: otherwise the end of a frame is unknown"
             )
         if self.line.data_bits == 7 and any(frame.binary for frame in whole.frames):  # noqa: PLR2004 (bits)
             raise ValueError("binary parts need 8 data bits")

@@ -19,7 +19,7 @@ GROUP = "dbbstation.dialects"
 """Entry points of this group name classes that derive from `Dialect`."""
 
 HOW_TO_ADD = "one of your own is given as its file, FILE.py, or its package installed"
-"""What a name that nobody knows may lack."""
+"""What an unknown name may lack."""
 
 
 @cache

@@ -14,7 +14,7 @@ class Conformity(StrEnum):
     EXCEEDED = "exceeded"
     """The limit is passed, whatever the figure is within U."""
     UNDECIDED = "cannot tell"
-    """The limit lies within U of the figure, or nobody knows U."""
+    """The limit lies within U of the figure, or U is unknown."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ FEWEST = 3
 """Machines from which on one of them can be unlike: the others have a scatter."""
 
 MOST_UNLIKE = 4
-"""One machine in so many may be unlike: where more are, they are a kind of their own, and nobody knows which is which."""
+"""One machine in so many may be unlike: where more are, they are a kind of their own."""
 
 _STEPS = 100
 """Newton's steps for the scatter; it comes from one side and takes a dozen."""

@@ -19,7 +19,7 @@ GROUP = "dbbstation.sources"
 """Entry points of this group name classes that derive from `ErrorSource`."""
 
 HOW_TO_ADD = "one of your own is given with --source-files FILE.py, or its package installed"
-"""What a name that nobody knows may lack."""
+"""What an unknown name may lack."""
 
 
 def known_sources() -> Mapping[str, ErrorSource]:

@@ -92,15 +92,15 @@ def test_each_term_has_its_size():
 
 
 def test_what_nobody_stated_is_named_and_leaves_absolute_figures_without_u():
-    found = budgets(analyse(measured(form)), SetUpKnowledge(not_absolute="not absolute, because nobody knows the bar"))
+    found = budgets(analyse(measured(form)), SetUpKnowledge(not_absolute="not absolute, because the bar is unknown"))
     assert {str(BudgetTerm.BAR), str(BudgetTerm.TEMPERATURE)} <= set(found[BudgetQuantity.F_MAX].missing)
     assert str(BudgetTerm.MOUNTING) in found[BudgetQuantity.X].missing
     assert str(BudgetTerm.BAR) not in found[BudgetQuantity.G].missing
     without = {quantity for quantity, budget in found.items() if budget.u_um is None}
     assert without == ABSOLUTE - {BudgetQuantity.D} | {BudgetQuantity.X, BudgetQuantity.Y}
-    assert found[BudgetQuantity.X].why_not == "not absolute, because nobody knows where the ball stands"
+    assert found[BudgetQuantity.X].why_not == "not absolute, because the ball's place is unknown"
     pair = analyse_pair(analyse(measured(form, CCW)), analyse(measured(form, CW)))
-    both = pair_budgets(pair, SetUpKnowledge(not_absolute="not absolute, because nobody knows the bar"))
+    both = pair_budgets(pair, SetUpKnowledge(not_absolute="not absolute, because the bar is unknown"))
     assert both[BudgetQuantity.D].u_um is None
     assert both[BudgetQuantity.D].why_not.startswith("not absolute")
 

@@ -66,7 +66,7 @@ def test_german_tables_are_a_session_with_the_circular_deviation_of_their_ellips
     assert told["inputs"]["a_links.csv"] == hashlib.sha256(GERMAN[0].read_bytes()).hexdigest()
     notes = [note.text for note in read_session(out).notes]
     assert any("computed from the angles at the plan's feed of 1000 mm/min" in text for text in notes)
-    assert any("nobody knows: operator" in text for text in notes)
+    assert any("not stated: operator" in text for text in notes)
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_other_faults_of_words_are_answered(run, tmp_path):
 
 
 def test_on_a_terminal_everything_that_is_missing_is_asked_for(run, tmp_path, monkeypatch):
-    """Answers as they are typed, a decimal comma, a test that is none, and Enter where nobody knows."""
+    """Answers as they are typed, a decimal comma, a test that is none, and Enter where the answer is unknown."""
     rows = [f"{a:g},{d:g}" for a, d in zip(ANGLES, ellipse(), strict=True)]
     file = table(tmp_path / "old.csv", rows, "Winkel,Abweichung [µm]")
     answers = ["deg", "ccw", "0", "150", str(PLAN), str(MACHINE), "20,5", "Mori", "order 7", "", "zz", "a-ccw", "y"]
@@ -283,7 +283,7 @@ def test_on_a_terminal_everything_that_is_missing_is_asked_for(run, tmp_path, mo
     assert dict(conditions(session, [], ""))["job"] == "order 7"
     assert dict(conditions(session, [], "typed later"))["job"] == "typed later"
     assert [one.label for one in session.runs] == ["a ccw 1"]
-    assert {note.text for note in session.notes} >= {"imported: nobody knows: bar"}
+    assert {note.text for note in session.notes} >= {"imported: not stated: bar"}
     assert "the plan's tests: a, b" in done.err
 
 

@@ -30,7 +30,7 @@ COUNT = int(os.environ.get("DBBSTATION_FUZZ", "400"))
 FIRST = int(os.environ.get("DBBSTATION_FUZZ_FROM", "0"))
 
 ONLY_BY_US = {
-    "where the machine stands": "nobody knows where",
+    "where the machine stands": "the program does not state the place of",
     "percent sign not closed": "the % that closes it",
     "F in the line that changes units": "counts in the units before it",
     "code that is not read": r"[GM][\d.]+ is not read",

@@ -177,7 +177,7 @@ def test_a_start_pose_lets_a_program_begin_anywhere(tmp_path, model_file):
     part.write_text("G91 G1 X10 F100\nM2\n")
     with pytest.raises(StationError, match="no NC dialect"):
         run(compensate, part, "--model", model_file, "--out", out)
-    with pytest.raises(InputError, match="nobody knows where"):
+    with pytest.raises(InputError, match="the program does not state the place of"):
         run(compensate, part, "--written-in", "linuxcnc", "--model", model_file, "--out", out)
     run(compensate, part, "--written-in", "linuxcnc", "--start", "0,0,-1000,0,0,0", "--model", model_file, "--out", out)
     moves = [line for line in out.read_text().splitlines() if line.startswith("G1 ")]

@@ -93,7 +93,7 @@ NC_FILES = Path("/usr/share/linuxcnc/ncfiles")
 
 REFUSED = (
     r"G4[12](\.1)? is not read|G38\.\d is not read|G33 is not read|G7[0-9.]+ is not read|G[578](\.\d)? is not read"
-    r"|M70 is not read|nobody knows where|is not in this file|runs Python|are not read|is read before|moves nothing|is the control's own|M\d+ is not read"
+    r"|M70 is not read|the program does not state the place of|is not in this file|runs Python|are not read|is read before|moves nothing|is the control's own|M\d+ is not read"
 )
 
 

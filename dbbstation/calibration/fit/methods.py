@@ -95,8 +95,8 @@ def _check_places(observations: Sequence[Observation]) -> None:
     unknown = [observation.test for observation in observations if not observation.setup.place_known]
     if unknown:
         raise CalibrationError(
-            f"the ball was put up under the spindle in test {', '.join(dict.fromkeys(unknown))}: nobody knows where it "
-            "stands in the machine's coordinates, which the jig method needs",
+            f"the ball was put up under the spindle in test {', '.join(dict.fromkeys(unknown))}: its place in the "
+            "machine's coordinates is unknown, and the jig method needs it",
             remedy="calibrate with --method conv-a, or conv-b where set-up errors were measured; or measure on a jig plate",
         )
 

@@ -60,7 +60,7 @@ def _balls(pairs: Sequence[Pair]) -> list[str]:
         )
     lost = sorted({pair.test for pair in pairs for run in (*pair.a, *pair.b) if not run.setup.place_known})
     if lost:
-        notes.append(f"nobody knows where the balls of {', '.join(lost)} stood: centre shifts there count for nothing")
+        notes.append(f"the places of the balls of {', '.join(lost)} are unknown: centre shifts there do not count")
     return notes
 
 

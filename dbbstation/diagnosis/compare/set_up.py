@@ -41,7 +41,7 @@ NOTHING = 1e-9
 """Answer of a reading to a shift of a ball below which it does not see it: a level bar, and the height."""
 
 ANYWHERE_MM = 1.0
-"""Scatter of a ball whose place nobody knows [mm]."""
+"""Scatter of a ball of unknown place [mm]."""
 
 
 def base_of(sides: Sides) -> Base:

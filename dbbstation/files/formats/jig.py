@@ -16,7 +16,7 @@ from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_documen
 from dbbstation.files.yaml.text import Location, YamlDocument, parse_yaml
 
 BY_CMM, UNDER_SPINDLE = "cmm", "under-spindle"
-"""How a ball is placed: where a CMM measured it, or where nobody knows."""
+"""How a ball is placed: where a CMM measured it, or at an unknown place."""
 
 _CLOSEST_BORES_MM = 5.0
 
@@ -65,7 +65,7 @@ class BallSchema(Schema):
 
     placed: Literal["cmm", "under-spindle"] = "cmm"
     """`cmm`: a CMM measured where it stands; `under-spindle`: the machine drives there and it is put up at the tool tip,
-    as the standard circular test does: nobody knows where it stands."""
+    as the standard circular test does: its place is unknown."""
     bore: int | None = None
     """Bore that it stands in; null for a ball that stands in none."""
     holder: str | None = None

@@ -105,7 +105,7 @@ class _Interpreter(Moves):
                 raise BadLine(self.flow.cut_short())
         unknown = [letter for letter, value in zip(AXES, self._state.pose, strict=True) if math.isnan(value)]
         if unknown and self._moved:
-            raise unknown_place(block, unknown, "in this program")
+            raise unknown_place(block, unknown, "")
 
     def _ran_lines(self, first: int) -> bool:
         """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""

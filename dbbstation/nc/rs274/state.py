@@ -164,14 +164,14 @@ class ControlState:
 
     def _known(self, axis: int, block: ProgramBlock, word: Word) -> float:
         if np.isnan(self.pose[axis]):
-            what = f"{name('G', word.value)} counts from where {AXES[axis]} stands, which nobody knows yet"
+            what = f"{name('G', word.value)} counts from the place of {AXES[axis]}, which the program does not state yet"
             raise block.place.fault(word.column, what, f"move {AXES[axis]} to a place before, or give --start")
         return float(self.pose[axis])
 
 
-def unknown_place(block: ProgramBlock, axes: list[str], when: str = "before this move") -> BadLine:
+def unknown_place(block: ProgramBlock, axes: list[str], when: str = " before this move") -> BadLine:
     """Return the fault of a block that needs a known place of axes."""
-    what = f"nobody knows where {', '.join(axes)} stand{'s' if len(axes) == 1 else ''} {when}"
+    what = f"the program does not state the place of {', '.join(axes)}{when}"
     remedy = (
         "--angles A,B,C states at which a program without them runs"
         if set(axes) <= set("ABC")

@@ -164,7 +164,9 @@ class ControlState:
 
     def _known(self, axis: int, block: ProgramBlock, word: Word) -> float:
         if np.isnan(self.pose[axis]):
-            what = f"{name('G', word.value)} counts from the place of {AXES[axis]}, which the program does not state yet"
+            what = (
+                f"{name('G', word.value)} counts from the place of {AXES[axis]}, which the program does not state yet"
+            )
             raise block.place.fault(word.column, what, f"move {AXES[axis]} to a place before, or give --start")
         return float(self.pose[axis])
 

@@ -35,7 +35,7 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
         held_back.append(np.zeros(len(outcome.channel.residual), dtype=bool))
         for rows, own in zip(channel.runs, groups, strict=True):
             held_back[-1][rows] = own == group
-    target = outcome.bank.target
+    target = settled.target
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     # What was laid out before it was laid out better is asked for by nobody.
     variants = [variant for cause in settled.causes for variant in cause.variants]
@@ -51,10 +51,11 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
         found = search(comparison, settled.causes, begin, most_members=MOST_MEMBERS, likely=CLOSE, thorough=False)
         return found.best.members
 
-    of_all = channel.beside_base(noise_mm, settled.scatter).comparison(target)
     follow = follow_of(outcome)
     classes = [one.wanted for one in classes_of(outcome, VariableProbabilities(outcome))]
-    anew = chosen_anew(of_all, of_others(), choose, lambda name: (name,), lambda cause: cause.named, (classes, follow))
+    anew = chosen_anew(
+        settled.comparison, of_others(), choose, lambda name: (name,), lambda cause: cause.named, (classes, follow)
+    )
     names = [m.cause.name for m in settled.best.members if not m.cause.setup]
     without = {wanted: {name for name in names if follow(name) & wanted} for wanted in classes}
     errors = predicted_without(explained, [(), *without.values(), names])

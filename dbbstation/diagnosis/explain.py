@@ -143,6 +143,7 @@ class _Settling:
                 if self._is_done(settled):
                     break
                 self._likely = self._likely if left else LIKELY
+                del settled  # its products fill as much memory as the next ones will
                 settled = self._compared()
         except KeyboardInterrupt:
             if not until_interrupted:
@@ -168,6 +169,7 @@ class _Settling:
             posterior,
             best,
             comparison,
+            target,
             causes,
             unmodelled,
             noise,

@@ -10,6 +10,8 @@ import numpy as np
 from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.channel import CircleChannel
@@ -29,6 +31,7 @@ class SettledCircles:
     Attributes:
         after: joint fit of base and named causes.
         posterior: about that fit.
+        target: of the comparison, shape (n,).
         noise: beside all causes.
         scatter: of balls in stated sizes.
         stopped: interrupted.
@@ -38,6 +41,7 @@ class SettledCircles:
     posterior: Posterior
     best: Hypothesis
     comparison: ModelComparison
+    target: NDArray[np.float64]
     causes: tuple[Cause, ...]
     unmodelled: Unmodelled
     noise: Spectrum

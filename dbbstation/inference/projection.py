@@ -7,11 +7,12 @@ condition.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve
+from scipy.linalg.blas import dsyrk
 
 from dbbstation.inference.model_comparison import ModelComparison, cholesky
 from dbbstation.inference.square_root import free_directions
@@ -117,6 +118,10 @@ class CauseColumns:
         self._renew()
         return self._products
 
+    def own_gram(self) -> NDArray[np.float64]:
+        """Return all products in an array that the caller may change."""
+        return self.gram.copy()
+
     def _renew(self) -> None:
         changed, self._changed = np.array(self._changed, dtype=np.int64), []
         for known, products in ((len(self._products), True), (self._along.shape[1], False)):
@@ -178,9 +183,13 @@ class CauseColumns:
 
     def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> RowProducts:
         """Return products of rows, shape (n,), with all or some columns, shape (q,)."""
+        part = self._rows_of(rows, only)
+        return replace(part, of_columns=part.columns @ part.columns.T, columns=NO_COLUMNS)
+
+    def _rows_of(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None) -> RowProducts:
         own = np.arange(self.count) if only is None else only
         axes, columns = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
-        return RowProducts(rows, only, axes.T @ axes, (columns @ axes).T, columns @ columns.T)
+        return RowProducts(rows, only, axes.T @ axes, (columns @ axes).T, NO_COLUMNS, columns)
 
     def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
         """Return the causes without some rows, where targets must be zero.
@@ -188,22 +197,31 @@ class CauseColumns:
         Args:
             only: rising, shape (q,); None: all.
         """
-        return self.without(self.part(rows, only))
+        return _Without(self, self._rows_of(rows, only))
 
     def without(self, part: RowProducts) -> CauseColumns:
         """Return the causes without a part, as `but_for`."""
         return _Without(self, part)
 
 
+NO_COLUMNS = np.zeros((0, 0))
+
+
 @dataclass(frozen=True, eq=False)
 class RowProducts:
-    """Products over some rows, for subtraction."""
+    """Products over some rows, for subtraction.
+
+    Attributes:
+        of_columns: empty if `columns` are given.
+        columns: shape (q, rows), where products of all of them are not worth their memory.
+    """
 
     rows: NDArray[np.bool_]
     numbers: NDArray[np.int64] | None
     of_axes: NDArray[np.float64]
     across: NDArray[np.float64]
     of_columns: NDArray[np.float64]
+    columns: NDArray[np.float64] = field(default_factory=lambda: NO_COLUMNS)
 
     def __add__(self, other: RowProducts) -> RowProducts:
         """Return disjoint parts together."""
@@ -225,13 +243,8 @@ class _Without(CauseColumns):
         turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
         self._turned = turned / size
         self.on_axes = (turned * size).T @ whole.on_axes
-        along = whole.along
-        if part.numbers is None:
-            self._gram_left = whole.gram - part.of_columns
-        else:
-            along = along[:, part.numbers]
-            self._gram_left = whole.gram[np.ix_(part.numbers, part.numbers)]
-            self._gram_left -= part.of_columns  # as many products fill tens of megabytes
+        self._part = part
+        along = whole.along if part.numbers is None else whole.along[:, part.numbers]
         self._along_left = self._turned.T @ (along - part.across)
 
     @property
@@ -240,7 +253,15 @@ class _Without(CauseColumns):
 
     @property
     def gram(self) -> NDArray[np.float64]:
-        return self._gram_left
+        return self.own_gram()
+
+    def own_gram(self) -> NDArray[np.float64]:
+        gram, part = self._whole.gram, self._part
+        left = gram.copy() if part.numbers is None else gram[np.ix_(part.numbers, part.numbers)]
+        if len(part.columns):
+            return _less(left, part.columns.T)
+        left -= part.of_columns
+        return left
 
     @property
     def along(self) -> NDArray[np.float64]:
@@ -249,6 +270,27 @@ class _Without(CauseColumns):
     def towards(self, target: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         of_columns, of_axes = self._whole.towards(target)
         return of_columns if self.numbers is None else of_columns[self.numbers], self._turned.T @ of_axes
+
+
+def _less(products: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Take the products of columns, shape (m, q), off those given, shape (q, q), in their memory.
+
+    As many products as columns times columns fill tens of megabytes.
+    """
+    if not columns.size:
+        return products
+    found = np.asarray(dsyrk(-1.0, columns, beta=1.0, c=products.T, trans=1, overwrite_c=1), dtype=np.float64)
+    for first in range(0, len(found), STRIP):
+        # Above the diagonal are the products; below it are those that came in.
+        strip, behind = slice(first, first + STRIP), slice(first + STRIP, None)
+        upper = np.triu(found[strip, strip])
+        found[strip, strip] = upper + np.triu(upper, 1).T
+        found[behind, strip] = found[strip, behind].T
+    return found.T
+
+
+STRIP = 256
+"""Columns that are mirrored at once: half a megabyte on the diagonal."""
 
 
 def _orthonormal(base: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -285,15 +327,13 @@ class BesideBase:
         """Compare causes on a target, shape (n,)."""
         causes = self._causes
         if only is None:
-            along, products, (of_columns, of_axes) = causes.along, causes.gram, causes.towards(target)
+            along, products, (of_columns, of_axes) = causes.along, causes.own_gram(), causes.towards(target)
         else:
             columns = causes.of(only)
             along, products = causes.axes.T @ columns, columns.T @ columns
             of_columns, of_axes = columns.T @ target, causes.axes.T @ target
         of_base = self._taken @ along
-        # As many products as columns times columns fill tens of megabytes: one array of them is worked on in place.
-        gram = of_base.T @ of_base
-        np.subtract(products, gram, out=gram)
+        gram = _less(products, np.asfortranarray(of_base))
         towards = of_columns - of_base.T @ (self._taken @ of_axes)
         gram /= self._noise**2
         return ModelComparison(gram, towards / self._noise**2, causes.numbers if only is None else only)

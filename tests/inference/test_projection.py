@@ -211,3 +211,22 @@ def test_columns_take_the_places_of_those_that_were_given_back(samples, rng):
     columns.add(more[:, :1])
     assert columns.samples[:, 0] == pytest.approx(now[:, 0])
     assert other.samples[:, 0] == pytest.approx(now[:, 0])
+
+
+@pytest.mark.parametrize("only", [None, np.array([0, 2, 3])])
+def test_a_comparison_leaves_the_products_of_the_next_as_they_were(samples, rng, only):
+    """Products are worked on where they are; a second comparison about the same causes is a least-squares fit as well."""
+    base, causes, target = samples
+    held, out = held_rows(rng, 1), np.arange(SAMPLES) % 3 == 0
+    columns = CauseColumns(base)
+    columns.add(causes)
+    own = np.arange(causes.shape[1]) if only is None else only
+    kept = BesideBase(columns.but_for(out, only), KNOWN, held, NOISE)
+    left = left_by_base(base * ~out[:, None], held, causes[:, own] * ~out[:, None])
+    for whole in (False, True):
+        beside = BesideBase(columns, KNOWN, held, NOISE) if whole else kept
+        expected = left_by_base(base, held, causes) if whole else left
+        for _ in range(2):
+            comparison = beside.comparison(target if whole else np.where(out, 0.0, target))
+            gram = comparison.beside([], np.arange(causes.shape[1]) if whole else own)
+            assert np.allclose(gram, expected.T @ expected / NOISE**2, rtol=1e-8)

@@ -104,22 +104,27 @@ def _kept(context: click.Context) -> Iterator[None]:
 
 
 def _log_beginning(context: click.Context) -> None:
-    from importlib.metadata import PackageNotFoundError, version
-
     from dbbstation.files.inputs import inputs_so_far
 
     given = context.obj if isinstance(context.obj, tuple) else shlex.split(command_of(context))[1:]
     LOG.info("$ %s", shlex.join(["dbbstation", *given]))
     LOG.info("%s, Python %s, %s, in %s", PROGRAM, platform.python_version(), platform.platform(), Path.cwd())
-    versions = []
-    for package in _VERSIONS:
-        with suppress(PackageNotFoundError):
-            versions.append(f"{package} {version(package)}")
-    LOG.info(", ".join(versions))
+    LOG.info(_versions())
     for name, digest in inputs_so_far().items():
         LOG.info("settings %s, sha256 %s", name, digest)
     if command_of(context) != shlex.join(["dbbstation", *given]):
         LOG.info("with settings, files without folders: %s", command_of(context))
+
+
+@functools.cache  # reading what each package says of itself takes as long as a short command
+def _versions() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    found = []
+    for package in _VERSIONS:
+        with suppress(PackageNotFoundError):
+            found.append(f"{package} {version(package)}")
+    return ", ".join(found)
 
 
 def _to_screen() -> logging.Handler:

@@ -122,10 +122,36 @@ def keep_compiled(package):
         shutil.copy(made, installed.with_name("__pycache__"))
 
 
-def test_it_is_imported_and_does_the_whole_job(installed, tmp_path):
+EVERYTHING = """
+import importlib, pkgutil, dbbstation
+for module in pkgutil.walk_packages(dbbstation.__path__, "dbbstation."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
+print(dbbstation.__version__, dbbstation.__file__)
+"""
+
+
+def test_every_module_of_it_is_imported(installed, tmp_path):
+    done = run(installed, tmp_path, "python", "-c", EVERYTHING)
+    assert done.returncode == 0, done.stderr
+    version, place = done.stdout.split(maxsplit=1)
+    assert version == releasing.VERSION
+    assert Path(place.strip()).is_relative_to(installed.parent)
+
+
+def test_it_computes_and_writes_a_report(installed, tmp_path):
+    shipped_session = shipped(installed, tmp_path, "fixtures") / "sessions" / "small"
+    keep_compiled(shipped_session.parents[2])
+    done = run(installed, tmp_path, "dbbstation", "calibrate", shipped_session, "--out", "model.yaml")
+    assert done.returncode == 0, done.stderr
+    done = run(installed, tmp_path, "dbbstation", "report", shipped_session, "--model", "model.yaml", "--page", "a.html")
+    assert done.returncode == 0, done.stderr
+    assert "<html" in (tmp_path / "a.html").read_text("utf-8")
+
+
+@pytest.mark.nightly  # `demo --quick` runs in tests/test_demo.py; `releasing.py try` runs it from the wheel, too
+def test_it_does_the_whole_job(installed, tmp_path):
     keep_compiled(shipped(installed, tmp_path, "protocols").parent)
-    done = run(installed, tmp_path, "python", "-c", "import dbbstation; print(dbbstation.__version__)")
-    assert done.stdout == f"{releasing.VERSION}\n"
     done = run(installed, tmp_path, "dbbstation", "demo", "--quick", "--out", "demo", timeout_s=900)
     assert done.returncode == 0, done.stderr
     assert re.search(r"(?m)^mean +\d", done.stdout)

@@ -144,7 +144,9 @@ def test_it_computes_and_writes_a_report(installed, tmp_path):
     keep_compiled(shipped_session.parents[2])
     done = run(installed, tmp_path, "dbbstation", "calibrate", shipped_session, "--out", "model.yaml")
     assert done.returncode == 0, done.stderr
-    done = run(installed, tmp_path, "dbbstation", "report", shipped_session, "--model", "model.yaml", "--page", "a.html")
+    done = run(
+        installed, tmp_path, "dbbstation", "report", shipped_session, "--model", "model.yaml", "--page", "a.html"
+    )
     assert done.returncode == 0, done.stderr
     assert "<html" in (tmp_path / "a.html").read_text("utf-8")
 

@@ -40,6 +40,9 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 )
 @keeping_options
 @click.option(
+    "--unexplained", is_flag=True, help="Correct an error of unknown cause, too, that a diagnosis kept in the model."
+)
+@click.option(
     "--time-s",
     type=Finite(),
     metavar="S",
@@ -66,6 +69,7 @@ def compensate(
     chord_um: float,
     prefer: str,
     strict: bool,
+    unexplained: bool,
     time_s: float | None,
     largest_mm: float,
     machine: Path | None,
@@ -112,6 +116,7 @@ def compensate(
         chord_um=chord_um,
         prefer=prefer,
         strict=strict,
+        unexplained=unexplained,
         time_s=time_s,
         largest_correction_mm=largest_mm,
         machine=machine,

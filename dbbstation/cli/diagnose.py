@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-import click
-
 from dbbstation.cli.declared import CommandOutput, command, figure, save
 from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.output import echo
@@ -34,9 +32,6 @@ def show(result: DiagnosisResult, *, effects: Annotated[bool, Option(EFFECTS)] =
 
 
 def _further() -> dict[str, object]:
-    given = click.get_current_context().params
-    if given.get("keep_unexplained") and given.get("out") is None:
-        raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
     return {"until_interrupted": True}
 
 

@@ -13,6 +13,7 @@ RENAMED_FLAGS = {
     "bar --calibrator": "--calibrator-serial",
     "circles --csv": "--table",
     "compensate --from": "--written-in",
+    "diagnose --keep-unexplained": "--out, which keeps it",
     "export --state": "--states",
     "fleet --do": "--task",
     "history --csv": "--table",

@@ -21,7 +21,15 @@ from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.registry import dialect_of_file
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.programs import ProgramsResult, programs_result
-from dbbstation.tasks.programs import ProgramText, inverse_of, origin_of, program_text, setup_of, sha256_of
+from dbbstation.tasks.programs import (
+    NOT_CORRECTED,
+    ProgramText,
+    inverse_of,
+    origin_of,
+    program_text,
+    setup_of,
+    sha256_of,
+)
 from dbbstation.tasks.telling import Telling, silent
 
 if TYPE_CHECKING:
@@ -60,6 +68,7 @@ def compensate(
     chord_um: float = 1e3 * CHORD_MM,
     prefer: str = "accuracy",
     strict: bool = False,
+    unexplained: bool = False,
     time_s: float | None = None,
     largest_correction_mm: float = LARGEST_CORRECTION_MM,
     machine: str | PathLike[str] | None = None,
@@ -85,6 +94,7 @@ def compensate(
         chord_um: greatest distance of a move from the path.
         prefer: `accuracy`, or `position-only` to leave A, B and C as they are.
         strict: refuse a program that misses the chord error or a feed.
+        unexplained: correct an error of unknown cause, too, that a diagnosis kept in the model.
         time_s: start of the program after the session's, for models that depend on time.
         largest_correction_mm: models that shift a point by more are refused.
         machine: file of the machine as it is now, whose control may correct already; None: as the model has it.
@@ -127,12 +137,17 @@ def compensate(
         largest_mm=largest_correction_mm,
         prefer=prefer,
         strict=strict,
+        unexplained=unexplained,
     )
     own = inverse.model.machine
     now = own if machine is None else read_machine(Path(machine))
     check_model_is_of(now, own)
     refuse_second_correction(now)
     telling = Telling(say=say)
+    left_out = (name for key, name in inverse.origin.items() if key.startswith(NOT_CORRECTED))
+    telling.note(
+        *(f"the cause of {name} is unknown, and it is not corrected; --unexplained corrects it" for name in left_out)
+    )
     warnings = () if inverse.identified is None else model_warnings(inverse.identified)
     telling.note(*warnings)
     if not path.units_said:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dbbstation.errors import ModelError
+from dbbstation.errors import CalibrationError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
@@ -40,12 +40,6 @@ def diagnose(
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),
     exclude: o.Exclude = (),
-    keep_unexplained: Annotated[
-        bool,
-        Option(
-            "Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown."
-        ),
-    ] = False,
     held_out: o.HeldOut = True,
     until_interrupted: bool = False,
     known: Mapping[str, ErrorSource] | None = None,
@@ -61,6 +55,8 @@ def diagnose(
     five standard deviations out, and a gain in tests that were held back), happened (acts once), does-not-predict,
     ambiguous, ruled-out, not-testable.
 
+    The model also keeps an effect of unknown cause over strut length or force, if other tests confirm it.
+
     \b
     Examples:
       dbbstation diagnose 2026-11-20-hexapod-7
@@ -68,7 +64,6 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
       dbbstation diagnose 2026-11-20-hexapod-7 --effects
       dbbstation diagnose 2026-11-20-hexapod-7 --source-files scale_bow.py
-      dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
 
     Args:
         until_interrupted: a KeyboardInterrupt ends the comparison with the best set so far.
@@ -101,13 +96,14 @@ def diagnose(
     how = partial(search.diagnose, hold_out=held_out, until_interrupted=until_interrupted)
     diagnosed = diagnosed_of(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, how)
     found = diagnosed.diagnosis
-    unnamed = _kept(found, telling) if keep_unexplained else None
-    fit = found.after if unnamed is None else unnamed.fit
+    unnamed = _unnamed(found)
+    kept = found.after if unnamed is None else unnamed.fit
     figures = diagnosis_figures(found, diagnosed.lacking)
-    report = report_of(calibration_figures(fit, evaluate(fit.model, fit.observations)), diagnosis=kept_of(figures))
+    report = report_of(calibration_figures(kept, evaluate(kept.model, kept.observations)), diagnosis=kept_of(figures))
     of_sessions = diagnosed.recorded.sessions
-    model = identified_model(fit, report, of_sessions) if unnamed is None else unnamed.identified(report, of_sessions)
+    model = identified_model(kept, report, of_sessions) if unnamed is None else unnamed.identified(report, of_sessions)
     telling.stage("effects of causes")
+    fit = found.after
     names = fit.layout.names
     of_formulas = fit.layout.formula_variance(fit.x)
     covariance = fit.solution.covariance + np.diag(of_formulas)
@@ -123,13 +119,16 @@ def diagnose(
     return replace(result, recorded=diagnosed.recorded)
 
 
-def _kept(found: Diagnosis, telling: Telling) -> JointFitWithCurve | None:
-    from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
+def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
+    """Return the fit with an effect that the machine owns and other tests confirm, or None."""
+    from dbbstation.diagnosis.unexplained_model import KEPT_AS, keep_unexplained
 
+    curve = found.unexplained.curve
+    if curve is None or curve.follows not in KEPT_AS or curve.follows.variable not in found.levels.corrects:
+        return None
     try:
-        return keeping(found.unexplained.curve, found.after)
-    except ModelError as error:
-        telling.note(f"the model is written without it: {error.what}")
+        return keep_unexplained(curve, found.after)
+    except CalibrationError:
         return None
 
 

@@ -96,7 +96,7 @@ def diagnosed_of(
     for source in named:
         if not source.candidate:
             what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
-            raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
+            raise ModelError(what, remedy="leave it out; the model of a diagnosis keeps what is left")
     recorded = loaded(sessions, *chosen, telling)
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
     found = how(recorded.machine, recorded.observations, usable, telling.stage)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,6 +41,10 @@ Program = ProgramText
 """As scripts call it."""
 
 
+NOT_CORRECTED = "cause unknown, not corrected"
+"""How a program's header names errors of the model that it leaves as they are."""
+
+
 def inverse_of(
     model: Model,
     known: Mapping[str, ErrorSource] | None = None,
@@ -49,8 +53,12 @@ def inverse_of(
     largest_mm: float,
     prefer: str,
     strict: bool,
+    unexplained: bool = True,
 ) -> Inverse:
     """Return the model to compensate with; the header names its file and sessions by hash.
+
+    Args:
+        unexplained: with errors of unknown cause.
 
     Raises:
         InputError: every fault with its place.
@@ -58,6 +66,11 @@ def inverse_of(
     """
     identified = model_of(model, known)
     origin = {"model file": hashed(Path(model))} if isinstance(model, str | PathLike) else {}
+    if not unexplained:
+        unknown = unknown_causes(identified.model)
+        origin |= {f"{NOT_CORRECTED} {k}": name for k, name in enumerate(unknown, start=1)}
+        known_ones = tuple(one for one in identified.model.sources if one.source.name not in unknown)
+        identified = replace(identified, model=replace(identified.model, sources=known_ones))
     origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
     origin |= {f"model warning {k}": text for k, text in enumerate(model_warnings(identified), start=1)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,10 +26,10 @@ from dbbstation.diagnosis.shifts import shifts_between
 from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import judge
+from dbbstation.diagnosis.verdicts import form_uncertainty, judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
-from dbbstation.inference.alternatives import EVEN
+from dbbstation.inference.alternatives import EVEN, Alternatives
 from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.diagnosis.explained import Explained, SettledCircles
-    from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.machine.geometry import Machine
@@ -84,7 +84,7 @@ def diagnose(
 
 def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out: bool) -> Diagnosis:
     progress("verdicts")
-    explained, findings = judged(explained)
+    explained = without_doubtful(explained)
     progress("held-out tests")
     stopped = explained.settled.stopped
     outcome = outcome_of(explained)
@@ -142,26 +142,28 @@ def _widened(explained: Explained) -> Explained:
     return replace(explained, before=before, settled=replace(settled, after=after))
 
 
-def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:
-    """Judge named causes, removing improbable ones from the joint model until stable."""
-    findings = judge(explained, outcome_of(explained))
+def without_doubtful(explained: Explained) -> Explained:
+    """Remove improbable named causes from the joint model until stable."""
     given_up: set[str] = set()
-    while rather_not := doubtful(explained, findings):
+    while rather_not := doubtful(explained):
         given_up |= rather_not
         explained = without(explained, given_up)
-        findings = judge(explained, outcome_of(explained))
-    return explained, findings
+    return explained
 
 
-def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str]:
+def doubtful(explained: Explained) -> set[str]:
     """Return improbable named causes of the best set.
 
     The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous
     causes remain.
     """
-    members = {member.cause.name for member in explained.settled.members}
-    doubted = {f.name for f in findings if (f.probability or 0.0) < EVEN and not (f.ambiguous_with or f.equivalent)}
-    return members & doubted
+    settled, found = explained.settled, set()
+    of = partial(form_uncertainty, explained.channel.sources)
+    every = Alternatives(settled.comparison, settled.causes, settled.posterior, settled.best, of, settled.members)
+    for name, equal in every.classes.items():
+        if len(equal) == 1 and every.probability(equal) < EVEN and not every.ambiguity(name):
+            found.add(name)
+    return found
 
 
 def _unexplained(explained: Explained, left: Misfit) -> Unexplained:

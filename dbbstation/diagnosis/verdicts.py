@@ -15,7 +15,7 @@ from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.verdict import ABSENT, OUT, SURE
+from dbbstation.inference.verdict import OUT, SURE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -33,24 +33,23 @@ TESTABLE_SHARE = 0.5
 """Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
 
 
-def judge(
-    explained: Explained, outcome: Settled, anew: ChosenAnew | None = None, levels: Levels | None = None
-) -> tuple[SourceFinding, ...]:
+def judge(explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> tuple[SourceFinding, ...]:
     """Return a finding per named cause, present ones first.
 
     Args:
         anew: results of held-out tests; None: not tested.
-        levels: source of the verdicts; None: before they are known.
     """
     return _CircleJudge(explained, outcome, anew, levels).findings()
 
 
 class _CircleJudge(CauseJudge):
-    def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels | None) -> None:
+    is_catalogue = True
+
+    def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> None:
         self._circles, self._joint, self._found = explained.channel, explained.settled, levels
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
         # A method of this would keep it, and all columns, alive in a ring.
-        super().__init__(outcome, Trial(anew), levels, partial(_form_uncertainty, explained.channel.sources))
+        super().__init__(outcome, Trial(anew), levels, partial(form_uncertainty, explained.channel.sources))
         shown = [self._members.get(name) or self._beside[name][1] for name in self._named]
         # One compression of all runs serves the signatures of all causes.
         self._columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in shown)]))
@@ -108,15 +107,9 @@ class _CircleJudge(CauseJudge):
             return verdict, others, f"These tests cannot tell it from {', '.join(self._in_words(others))}."
         return Verdict.NOT_TESTABLE, (), "These tests leave it open: they neither show nor exclude it."
 
-    def _alike(self, name: str) -> str:
-        """Return an equivalent, as for any channel; for absent causes only one identical to a member."""
-        equal = any(name in names for names in self._classes.values())
-        return super()._alike(name) if equal or self._alternatives.probability((name,)) > ABSENT else ""
-
     def _group_of(self, name: str) -> tuple[str, ...]:
         """Return the group of causes of which one is present."""
-        follows = () if self._found is None else self._found.follows
-        groups = [(*one.form.names, *one.form.not_worse) for one in follows if one.form is not None]
+        groups = [(*one.form.names, *one.form.not_worse) for one in self._found.follows if one.form is not None]
         groups += [equal for equal in self._classes.values() if len(equal) > 1]
         groups += [(own, *others) for own, others in self._alternatives.ambiguities.items()]
         return next((tuple(n for n in group if JOINED not in n) for group in groups if name in group), ())
@@ -227,7 +220,7 @@ class _CircleJudge(CauseJudge):
         return amplitudes, spread @ (values[:width] - alone), variances
 
 
-def _form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
+def form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
     """Return the relative inaccuracy of a cause's formula; zero for an unnamed cause."""
     source = sources.get((member.cause.name, member.variant.law))
     return 0.0 if source is None else source.form_uncertainty

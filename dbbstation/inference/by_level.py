@@ -11,7 +11,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.levels import JOINED, FollowsAnswer
 from dbbstation.inference.pushes import too_many, within_a_step
 from dbbstation.inference.seen import IN_TIME
-from dbbstation.inference.verdict import OUT, Acts, Verdict
+from dbbstation.inference.verdict import OUT, SURE, Acts, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,11 +45,15 @@ class VerdictsByLevel:
     ) -> None:
         self._settled, self._levels, self._values, self._worse = settled, levels, values, worse
 
-    def of_member(self, name: str, sigmas: float, acts: Acts) -> Said:
-        """Return the verdict on a member, given its size in standard deviations."""
+    def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
+        """Return the verdict on a member, given its size in standard deviations.
+
+        A class may be sure without any of its members: then held-out parts refute none of them.
+        """
         classes = [one for one in self._levels.follows if name in one.members]
         answers = {one.answer for one in classes}
-        if FollowsAnswer.UNDECIDED in answers:
+        unsure = probability < SURE and FollowsAnswer.DOES_NOT_PREDICT in answers
+        if unsure or FollowsAnswer.UNDECIDED in answers:
             return Verdict.AMBIGUOUS, (), f"These {self._settled.channel.rows_are} do not decide it."
         if sigmas < OUT:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
@@ -117,9 +121,8 @@ def _of_laws(classes: Sequence[Followed], name: str, rows: str) -> Said:
     """Return the verdict on a member of followed classes: each must name it."""
     if all(_named(one, name) for one in classes):
         return Verdict.IDENTIFIED, (), ""
-    open_to = [
-        (*one.form.names, *one.form.not_worse) for one in classes if one.form is not None and not _named(one, name)
-    ]
+    forms = [one.form for one in classes if one.form is not None and not _named(one, name)]
+    open_to = [form.rivals.get(name) or (*form.names, *form.not_worse) for form in forms]
     others = tuple(dict.fromkeys(n for names in open_to for n in names if n != name and JOINED not in n))
     text = f"These {rows} cannot tell it from {', '.join(others)}." if others else "No single law was named here."
     return Verdict.AMBIGUOUS, others, text

@@ -56,7 +56,8 @@ def law_form(
     if whole.name is not None or len(one.members) == 1:
         return whole
     each = {name: _place(settled, {name}, one.wanted, parts, barred) for name in sorted(one.members)}
-    return replace(whole, together=tuple(name for name, form in each.items() if form.name == name))
+    rivals = {name: form.not_worse for name, form in each.items() if form.name != name}
+    return replace(whole, together=tuple(name for name in each if name not in rivals), rivals=rivals)
 
 
 def _place(
@@ -183,4 +184,5 @@ def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Membe
 
 
 def _count(members: Sequence[Member]) -> int:
-    return sum(len(member.variant.columns) for member in members)
+    """Return the numbers that some members have, nonlinear ones too: by each of them a law can bend to a part."""
+    return sum(len(member.variant.columns) + len(member.variant.nonlinear) for member in members)

@@ -5,11 +5,12 @@ Each has own probability over all sets and held-out gain. An uncertain level tak
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping  # noqa: TC003 - types of fields are read when results are written
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.facts.serialise import Absent
+from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.facts.value import Value  # noqa: TC001 - types of fields are read when results are written
 from dbbstation.inference.verdict import ABSENT, SURE
 
@@ -110,12 +111,14 @@ class LawForm:
         name: None if open.
         not_worse: causes as good as it or the best, with equivalents.
         together: laws each named in its own place, if a sum is best.
+        rivals: of each other member of that sum, causes as good in its own place.
     """
 
     name: str | None
     not_worse: tuple[str, ...]
     scored: tuple[ScoredLaw, ...]
     together: tuple[str, ...] = ()
+    rivals: Annotated[Mapping[str, tuple[str, ...]], Kept] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:

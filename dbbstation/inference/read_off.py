@@ -17,7 +17,7 @@ from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Verdict
+from dbbstation.inference.verdict import ABSENT, OUT, Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -116,27 +116,30 @@ class Trial:
         return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
 
-def read_off(settled: Settled, trial: Trial | None = None, levels: Levels | None = None) -> tuple[CauseFinding, ...]:
+def read_off(settled: Settled, trial: Trial | None, levels: Levels) -> tuple[CauseFinding, ...]:
     """Return a finding per law and pattern, present ones first, by size.
 
     Args:
         trial: evidence of parts; None: not tested.
-        levels: source of the verdicts; None: sure causes are identified.
+        levels: source of the verdicts.
     """
-    judge = CauseJudge(settled, trial, levels)
-    found = [judge.finding(cause) for cause in settled.causes]
-    found += [judge.refused(name, why) for name, why in settled.refused.items()]
-    return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
+    return CauseJudge(settled, trial, levels).every()
 
 
 class CauseJudge:
-    """Findings on causes; a client subclasses it for its own words and values."""
+    """Findings on causes; a client subclasses it for its own words and values.
+
+    Attributes:
+        is_catalogue: causes are asked for by name; what level 3 leaves open and is improbable by itself is judged as absent.
+    """
+
+    is_catalogue = False
 
     def __init__(
         self,
         settled: Settled,
         trial: Trial | None,
-        levels: Levels | None,
+        levels: Levels,
         form_uncertainty: Callable[[Member], float] | None = None,
     ) -> None:
         self._trial, self._rows = trial, settled.channel.rows_are
@@ -163,12 +166,18 @@ class CauseJudge:
             if estimates is not None:
                 self._values[name] = (estimates.values[own], estimates.covariance[own, own])
         worse = trial is not None and trial.is_worse
-        self._levels = None if levels is None else VerdictsByLevel(settled, levels, self._values, worse=worse)
+        self._levels = VerdictsByLevel(settled, levels, self._values, worse=worse)
         absent = [cause for cause in settled.causes if cause.name not in self._members]
         scan = settled.comparison.scan(self._best.members, absent)
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
 
-    def refused(self, name: str, why: str) -> CauseFinding:
+    def every(self) -> tuple[CauseFinding, ...]:
+        """Return a finding per cause and refused law, present ones first, by size."""
+        found = [self.finding(cause) for cause in self._settled.causes]
+        found += [self._refused(name, why) for name, why in self._settled.refused.items()]
+        return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
+
+    def _refused(self, name: str, why: str) -> CauseFinding:
         """Return the finding of an impossible law."""
         blocks = (0.0,) * len(self._settled.channel.blocks)
         return CauseFinding(
@@ -266,15 +275,13 @@ class CauseJudge:
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
-        if self._levels is not None and (member is not None or self._instead_of(cause.name)):
-            return self._levels.of_member(cause.name, sigmas, self._acts(cause.name))
-        if member is not None and self._alternatives.probability(self._equal(cause.name)) >= SURE:
-            return self._claimed(probability, sigmas)
-        if member is None and (why := self._impossible_in_place(cause)):
+        if member is not None or self._instead_of(cause.name):
+            return self._levels.of_member(cause.name, probability, sigmas, self._acts(cause.name))
+        if why := self._impossible_in_place(cause):
             return Verdict.RULED_OUT, (), why
-        if member is None and (alike := self._alike(cause.name)):
+        if alike := self._alike(cause.name):
             return Verdict.AMBIGUOUS, (alike,), f"Nothing measured here tells it from {alike}."
-        if member is None and probability < EVEN:
+        if probability < EVEN:
             return self._absent(cause, probability)
         others = self._alternatives.ambiguity(cause.name)
         text = (
@@ -285,38 +292,34 @@ class CauseJudge:
         return Verdict.AMBIGUOUS, others, text
 
     def _instead_of(self, name: str) -> frozenset[str]:
-        return frozenset() if self._levels is None or name in self._members else self._levels.instead_of(name)
+        return frozenset() if name in self._members else self._levels.instead_of(name)
 
     def _alike(self, name: str) -> str:
         """Return a member equivalent to a cause, alone or among others; may be empty."""
-        if self._levels is not None and (found := self._levels.alike(name)):
+        equal = any(name in names for names in self._classes.values())
+        if self.is_catalogue and not equal and self._alternatives.probability((name,)) <= ABSENT:
+            return ""
+        if found := self._levels.alike(name):
             return found
         unsure = self._alternatives.ambiguities
         return next((one for of in (self._classes, unsure) for one, names in of.items() if name in names), "")
 
-    def _claimed(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
-        """Return the verdict on a surely present cause before a client has levels."""
-        if probability < SURE:
-            return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
-        if sigmas < OUT:
-            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
-        return Verdict.IDENTIFIED, (), ""
-
     def _equal(self, name: str) -> tuple[str, ...]:
-        return (self._levels is not None and self._levels.equivalent(name)) or self._classes.get(name, (name,))
+        return self._levels.equivalent(name) or self._classes.get(name, (name,))
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Return why a law cannot replace its equivalent; may be empty."""
         shown = replace(self._beside[cause.name][1], scale=float(SCALES[-1]))
-        if not any(shown.variant.positive):
-            return ""
         alike = [name for name, equal in self._classes.items() if cause.name in equal]
+        if not alike and not any(shown.variant.positive):
+            return ""
         found = self._settled.comparison.estimates([shown, *self._best.without(*alike)])
         width = len(shown.variant.columns)
         return self._impossible(shown, found.values[:width], found.covariance[:width, :width])
 
     def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
-        return impossible(self._settled.bank.laws[shown.cause.name], values, np.diag(covariance))
+        law = self._settled.bank.laws.get(shown.cause.name)
+        return impossible(law, values, np.diag(covariance)) if law is not None and any(law.positive) else ""
 
     def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
         seen = self._seen(cause, self._best.members)

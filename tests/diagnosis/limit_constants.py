@@ -15,7 +15,7 @@ from typing import Any
 from unittest import mock
 
 from dbbstation.diagnosis import explain, shape_look, shapes
-from dbbstation.diagnosis.diagnose import judged, usable_sources
+from dbbstation.diagnosis.diagnose import usable_sources, without_doubtful
 from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
@@ -44,7 +44,7 @@ def found(folder: Path) -> tuple[str, float, float]:
     runs = [thinned(one, sectors_for(len(recorded.observations))) for one in recorded.observations]
     known = known_sources()
     usable, _ = usable_sources(recorded.machine, runs, sources_named(default_candidates(known), known))
-    explained, _ = judged(explain.explain(recorded.machine, runs, usable, lambda _: None))
+    explained = without_doubtful(explain.explain(recorded.machine, runs, usable, lambda _: None))
     settled = explained.settled
     named = sorted(f"{m.cause.name} ({m.variant.law})" for m in settled.members)
     others = len(settled.best.members) - len(named)

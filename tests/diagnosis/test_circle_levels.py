@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.chosen_anew import without_tests
-from dbbstation.diagnosis.diagnose import judged
+from dbbstation.diagnosis.diagnose import without_doubtful
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.levels import circle_levels, outcome_of
@@ -39,7 +39,7 @@ def both(tmp_path_factory):
     record(folder / "s", seed=51, plan=plan, mechanisms=[kinematics, *hidden], rate_hz=5.0)
     recorded = load_sessions([folder / "s"])
     runs = [thinned(one) for one in recorded.observations]
-    explained, _ = judged(explain(recorded.machine, runs, sources_named(FEW), lambda _: None))
+    explained = without_doubtful(explain(recorded.machine, runs, sources_named(FEW), lambda _: None))
     outcome = outcome_of(explained)
     gains = without_tests(explained, outcome)
     return explained, outcome, gains, circle_levels(explained, outcome, gains)

@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 
 from dbbstation.facts.value import Value
-from dbbstation.inference.left_over import left_over
-from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.pushes import distinct_sizes, most_of_one_size, too_many, within_a_step
-from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import Verdict
+from tests.inference.reading import read_by_levels
 from tests.inference.tables import table
 from tests.inference.test_channel import channel
-
-
-def told(settled):
-    """Findings of rows of which no part was held back."""
-    return read_off(settled, Trial(), levels_of(settled, left_over(settled), None, None))
 
 
 def sizes(*values, sigma=0.1):
@@ -56,7 +49,7 @@ def test_rounding_of_a_slow_value_is_no_event():
         step=0.25,
         least_noise=0.25 / np.sqrt(12.0),
     )
-    found = told(settle(rounded, thorough=False))
+    found = read_by_levels(settle(rounded, thorough=False))
     assert not [one.name for one in found if one.verdict is Verdict.HAPPENED and one.family == "pulses"]
 
 
@@ -67,7 +60,7 @@ def test_a_dozen_pulses_happened_only_where_they_are_of_one_size(equal):
     heights = np.ones(12) if equal else np.random.default_rng(3).permutation(np.linspace(0.7, 4.0, 12))
     pulses = np.repeat(heights, 50) * (np.arange(600) % 50 >= 30)
     settled = settle(replace(whole, residual=whole.residual + pulses), thorough=False)
-    found = [one for one in told(settled) if one.name in settled.best.names]
+    found = [one for one in read_by_levels(settled) if one.name in settled.best.names]
     in_time = [one for one in found if one.family == "pulses"]
     assert sum(len(one.values) for one in in_time) >= 10
     wanted = Verdict.HAPPENED if equal else Verdict.AMBIGUOUS

@@ -14,9 +14,9 @@ from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pieces import Fitting, Left, LeftBesideOthers
-from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.stretches import SHORTEST, _pattern, _squares_of_edges, refined
+from tests.inference.reading import read_by_levels
 
 ROWS = 1200
 
@@ -188,5 +188,5 @@ def test_a_single_row_is_no_stretch(rng):
     base = Base.flat(("offset",), np.ones((rows, 1)))
     time = np.arange(rows, dtype=np.float64)
     channel = Channel(residual, "", (slice(0, rows),), ("one",), (), base, time=time)
-    for finding in read_off(settle(channel)):
+    for finding in read_by_levels(settle(channel)):
         assert all(last - first + 1 >= SHORTEST for first, last in finding.rows)

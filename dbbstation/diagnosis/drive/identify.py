@@ -130,7 +130,7 @@ def identify(
         if limits.several_speeds and limits.reverses and VISCOUS in values
         else {},
         locations=locate(put_together, force - base_n, noise, follows) if mismatch else (),
-        sources=tuple(_with_weight(finding, values) for finding in verdicts.findings()),
+        sources=tuple(_with_weight(finding, values) for finding in verdicts.findings),
         unexplained=rest,
         cancelling=cancelling_of(settled, "N", {name: verdicts.source_of(name) for name in settled.best.names}),
         cannot_tell=sentences(limits, explained, known),

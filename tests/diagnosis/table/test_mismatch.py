@@ -18,7 +18,7 @@ from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.levels import FollowsAnswer
-from dbbstation.inference.read_off import Trial, read_off
+from dbbstation.inference.read_off import Trial
 from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.variables import Kind, Variable
@@ -27,6 +27,7 @@ from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables
 from tests.diagnosis.table import plant
 from tests.diagnosis.table.plant import PULSE_S, Truth, record
+from tests.inference.reading import read_by_levels
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -112,7 +113,7 @@ def test_what_is_measured_late_has_a_delay_that_is_positive(rng):
     channel = Channel(
         measured - value(seconds), "N", blocks, ("one",), (simulated,), base, time=seconds, simulated=simulated
     )
-    (finding,) = [one for one in read_off(settle(channel)) if one.verdict is Verdict.IDENTIFIED]
+    (finding,) = [one for one in read_by_levels(settle(channel)) if one.verdict is Verdict.IDENTIFIED]
     assert finding.name == "lag of model"
     assert finding.values["delay"].value == pytest.approx(0.03, rel=0.05)
 
@@ -275,7 +276,7 @@ def test_uncertainties_are_not_less_than_those_of_parts_that_differ():
     settled = settle(channel, look=False)
     refits = refits_without(settled, [rows // 60 == k for k in range(10)])
     plain, told = (
-        next(one for one in read_off(settled, trial) if one.name == "linear in warm").values["slope"]
+        next(one for one in read_by_levels(settled, trial) if one.name == "linear in warm").values["slope"]
         for trial in (Trial(), Trial(refits=refits))
     )
     # Ten slopes that differ, each known to a hundredth, say their mean to a root of ten less than their spread.

@@ -18,8 +18,9 @@ from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_M
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import parts_of
 from dbbstation.diagnosis.shapes import variables
-from dbbstation.inference.bank import DRAWS, spacing_of
+from dbbstation.inference.bank import spacing_of
 from dbbstation.inference.blocks import Block, compress, with_random
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
@@ -49,10 +50,6 @@ SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 OUTSIZE = 20.0
 """Size of such an effect in units of the stated one, one standard deviation."""
 
-ROOM = 4096
-"""Columns of causes for which room is made: thirty circles have 1100 to 1500, and some 2200 where causes are laid out anew several times.
-More would be copied, and a copy holds all of them twice for a moment: 0.4 GB at 25,000 samples."""
-
 
 class CircleChannel:
     """All that a diagnosis compares.
@@ -69,7 +66,7 @@ class CircleChannel:
         self.readings = [calibration.model.bar(motion) for motion in self.motions]
         ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
         self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self.columns = CauseColumns(self._base(), room=ROOM)
+        self.columns = CauseColumns(self._base(), room=BOUNDS.room)
         self.sources = {(source.name, source.law): source for source in sources}
         self.set_up = self._outsize()
         self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
@@ -179,7 +176,7 @@ class CircleChannel:
                 sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
         rng = np.random.default_rng(self.columns.count)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
-        white = rng.standard_normal((len(target), DRAWS))
+        white = rng.standard_normal((len(target), BOUNDS.noise_draws))
         left = self.beside_base(noise_mm).left(np.column_stack([target, white]), sd)
         phases = [np.radians(o.raw.theta_deg) for o in self.observations]
         return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.explained import MOST_MEMBERS
 from dbbstation.diagnosis.left_out import groups_of, predicted_without
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import KnownGains, chosen_anew
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.hypotheses import CLOSE, search
@@ -48,7 +48,7 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         begin = [settled.best.members]
-        found = search(comparison, settled.causes, begin, most_members=MOST_MEMBERS, likely=CLOSE, thorough=False)
+        found = search(comparison, settled.causes, begin, most_members=BOUNDS.members, likely=CLOSE, thorough=False)
         return found.best.members
 
     follow = follow_of(outcome)

@@ -30,6 +30,7 @@ from dbbstation.diagnosis.verdicts import form_uncertainty, judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN, Alternatives
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
@@ -43,10 +44,6 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
-
-
-RIVALS = 6
-"""Named causes of the greatest evidence that compete in each draw of a part of the tests."""
 
 
 @with_one_thread
@@ -95,7 +92,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     findings = judge(explained, outcome, anew, levels)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
-    rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[:RIVALS]]
+    rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[: BOUNDS.found_again]]
     again = {} if stopped else found_again(explained, rivals)
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
     rest = _unexplained(explained, settled.left)

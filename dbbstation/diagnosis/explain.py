@@ -16,13 +16,13 @@ from dbbstation.calibration.outliers.robust import MOST, calibrate_robust
 from dbbstation.calibration.outliers.strange_runs import in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, SettledCircles
+from dbbstation.diagnosis.explained import Explained, SettledCircles
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
+from dbbstation.inference.bounds import BOUNDS, CIRCLES
 from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, search
 from dbbstation.inference.model_comparison import SCALES
-from dbbstation.inference.settle import SEEDS
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -38,18 +38,12 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
-MOST_ROUNDS = 10
-"""Times that hypotheses and joint fit may settle against each other."""
-
 GRID = 0.3
 """Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
 
 IDLE = 0.9
 """Share of its prior standard deviation above which a nonlinear parameter is not determined: the runs say less than a quarter of what
 was known before."""
-
-STEPS = 2
-"""Times that the nonlinear parameters of a rival are improved."""
 
 
 def explain(
@@ -139,7 +133,7 @@ class _Settling:
         self._unmodelled.look(self._fit, (), self._noise_mm)
         stopped, settled = False, self._compared()
         try:
-            for left in reversed(range(MOST_ROUNDS - 1)):
+            for left in reversed(range(CIRCLES.rounds - 1)):
                 if self._is_done(settled):
                     break
                 self._likely = self._likely if left else LIKELY
@@ -161,9 +155,9 @@ class _Settling:
         self._beside = channel.beside_base(self._noise_mm, self._scatter)
         comparison = self._beside.comparison(target)
         causes = _listed(channel, unmodelled, comparison, self._given_up)
-        posterior = search(comparison, causes, self._seeds.values(), most_members=MOST_MEMBERS, likely=self._likely)
+        posterior = search(comparison, causes, self._seeds.values(), most_members=BOUNDS.members, likely=self._likely)
         best = _steady(posterior, self._fitted)
-        self._seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
+        self._seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[: BOUNDS.seeds])}
         return SettledCircles(
             self._fit,
             posterior,
@@ -374,7 +368,7 @@ def _lay_out(
     others = best.without(member.cause.name)
     name, law = rival.cause.name, rival.variant.law
     sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
-    for _ in range(STEPS if rival.variant.nonlinear else 1):
+    for _ in range(BOUNDS.steps_of_rivals if rival.variant.nonlinear else 1):
         hypothesis = Hypothesis((*others, rival), 0.0)
         values = _estimated(channel, beside.comparison(target), hypothesis)[-1]
         if values is None or not values.any():

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.harmonics import Misfit, Spectrum
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
-
-MOST_MEMBERS = 12
-"""Causes of a hypothesis at the most: it grows no further. Sessions that the list explains have at most 8."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +49,7 @@ class SettledCircles:
 
     def second_start_agrees(self) -> bool:
         """Return whether a search from nothing agrees."""
-        anew = search(self.comparison, self.causes, most_members=MOST_MEMBERS, likely=CLOSE)
+        anew = search(self.comparison, self.causes, most_members=BOUNDS.members, likely=CLOSE)
         return anew.best.names == self.posterior.best.names
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.explained import MOST_MEMBERS
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import LEAST_PARTS
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn, numbered
 from dbbstation.inference.harmonics import LOW
@@ -82,7 +82,7 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
         max(settled.noise_mm, SMALLEST_NOISE_MM),
         np.random.default_rng(len(channel.observations)),
         settled.best.members,
-        MOST_MEMBERS,
+        BOUNDS.members,
     )
 
 

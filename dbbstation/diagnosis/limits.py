@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import remainder_of
-from dbbstation.diagnosis.explained import MOST_MEMBERS
 from dbbstation.diagnosis.left_where import where_left
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.limit_reached import LimitReached
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:
     if settled.posterior.at_limit:
         _, where = where_left(settled.after.observations, remainder_of(settled.after, settled.noise))
         text = (
-            f"The search ended at sets of {MOST_MEMBERS} causes, and a larger set is more probable. What is named stays. "
+            f"The search ended at sets of {BOUNDS.members} causes, and a larger set is more probable. What is named stays. "
             f"The named causes leave {1e3 * settled.left.rms:.2g} µm rms beyond noise. {where}"
         )
         found.append(LimitReached("search", "", text))

@@ -8,8 +8,9 @@ import numpy as np
 
 from dbbstation.diagnosis.findings import Location
 from dbbstation.diagnosis.variables import SESSION_TIME
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import smooth
-from dbbstation.inference.left_over import COUNTS_SIGMA, MOST_LOCATIONS
+from dbbstation.inference.left_over import COUNTS_SIGMA
 from dbbstation.model.machine_model import MachineModel
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def locate(
                 )
             )
     found.sort(key=lambda location: -location.share)
-    return tuple(found[:MOST_LOCATIONS])
+    return tuple(found[: BOUNDS.locations])
 
 
 def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[NDArray[np.float64] | None]:

@@ -11,6 +11,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.findings import NextTest, Verdict
 from dbbstation.diagnosis.foreseen import ForeseenTests
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.verdict import OUT
 from dbbstation.plan.circle import Direction
@@ -31,10 +32,6 @@ if TYPE_CHECKING:
 
 PROPOSED = frozenset({Need.POSE, Need.PATH, Need.TIME})
 """What is known of a test before it is measured."""
-
-MOST_PROPOSED = 3
-CLOSER_LOOK = 12
-"""Proposals that are looked at in both directions each time that one is chosen."""
 
 HALVED = 0.5
 """Share of an uncertainty that tests must come down to where they change no verdict. Repeating every test once gives 0.7."""
@@ -75,7 +72,7 @@ def next_tests(
 
 
 def propose(
-    could_be: ForeseenTests, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
+    could_be: ForeseenTests, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = BOUNDS.proposed
 ) -> tuple[NextTest, ...]:
     """Return the fewest tests that change a source's verdict or halve its uncertainty.
 
@@ -112,7 +109,7 @@ def propose(
     chosen: list[Proposal] = []
     sigmas = [_sigmas(covariance[own, own], variant)]
     for _ in range(min(most, len(one_way))):
-        closer = sorted(one_way, key=lambda k: left(one_way[k]))[:CLOSER_LOOK]
+        closer = sorted(one_way, key=lambda k: left(one_way[k]))[: BOUNDS.closer_look]
         for k in closer:
             both_ways.setdefault(k, seen(proposals[k], slice(None)))
         _, k = min((left(both_ways[k]), k) for k in closer)

@@ -27,8 +27,8 @@ from dbbstation.diagnosis.shapes import (
     Samples,
     Shape,
 )
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.forms import Form, Lobes, PlaneStep, Ringing, Wave, WaveOfTurn
-from dbbstation.inference.looks import STRONGEST
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.sums import Sums, bumps, peaks, steps
 from dbbstation.machine.geometry import STRUTS
@@ -40,18 +40,11 @@ if TYPE_CHECKING:
 
     from dbbstation.inference.blocks import Columns
 
-MADE_FINER = 6
-"""Waves of a grid that are looked at more finely: one that falls between two points of the grid loses a fifth there, and
-the side lobes of gaps between runs may stand out more."""
-
 PIECE_MM = 0.5
 """Of strut length, for waves down to 4 mm [mm]."""
 
 SHORTEST_MM = 4.0
 """Shortest wave of strut length that is looked for [mm]."""
-
-PIECES = 8192
-"""Of time, at the most."""
 
 SHORTEST_S = 3.0
 """Shortest wave of time that is looked for; four pieces where the recordings last longer than that allows [s]."""
@@ -167,7 +160,7 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
             found += _best("strut-force", "step", strut, EVERY, sums, steps(low, high, _STEPS), 1.0)
     if "time" in extent.low:
         low, high = float(extent.low["time"]), float(extent.high["time"])
-        wide = max(SHORTEST_S / 4.0, (high - low) / PIECES)
+        wide = max(SHORTEST_S / 4.0, (high - low) / BOUNDS.pieces_of_travel)
         movers: list[tuple[int | None, str]] = [(None, READING), (None, BALL)]
         movers += [(strut, EVERY) for strut in range(1, STRUTS + 1)]
         for own, moves in movers:
@@ -264,7 +257,8 @@ def _best(
 ) -> list[Shape]:
     tried = max(len(forms) / apart, 1.0)
     return [
-        Shape(variable, kind, strut, moves, form, tried, explained) for explained, form in sums.best(forms, STRONGEST)
+        Shape(variable, kind, strut, moves, form, tried, explained)
+        for explained, form in sums.best(forms, BOUNDS.strongest)
     ]
 
 
@@ -276,6 +270,8 @@ def _waves(
     grid: NDArray[np.float64],
     explained: NDArray[np.float64],
 ) -> list[Shape]:
-    found = sums.finer([float(grid[k]) for k in peaks(explained, MADE_FINER)], float(np.ptp(sums.at)))
+    found = sums.finer([float(grid[k]) for k in peaks(explained, BOUNDS.made_finer)], float(np.ptp(sums.at)))
     tried = len(grid) / 2.0
-    return [Shape(variable, "wave", strut, moves, wave, tried, explained) for explained, wave in found[:STRONGEST]]
+    return [
+        Shape(variable, "wave", strut, moves, wave, tried, explained) for explained, wave in found[: BOUNDS.strongest]
+    ]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.triangle import RANK
 from dbbstation.inference.verdict import SURE
 
@@ -24,14 +25,8 @@ EQUIVALENT = 0.999
 """Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
 other, unless it is so large that even this decides: what is left of one beside the other is 4.5 % of it."""
 
-MOST_ALTERNATIVES = 6
-"""Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
-
 NEGLIGIBLE = 30.0
 """Log odds against the best set of causes from which on a set counts for nothing, however many there are of them."""
-
-RIVALS = 3
-"""Causes in the place of each member that are laid out at their own best values before they are compared."""
 
 
 class Alternatives:
@@ -81,7 +76,7 @@ class Alternatives:
             if other not in chosen and both[k] < EVEN * self.probability((name,))
         }
         for other in sorted(alone, key=lambda n: -alone[n]):
-            if self.probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
+            if self.probability(chosen) >= SURE or len(chosen) > BOUNDS.alternatives:
                 break
             chosen.append(other)
         return tuple(other for other in chosen if other != name) if self.probability(chosen) >= SURE else ()
@@ -158,7 +153,7 @@ def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause],
     """Return the best replacements of a member that are not much worse."""
     scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)
-    return [scan.best[k] for k in np.argsort(-scan.log_factor)[:RIVALS] if scan.log_factor[k] > enough]
+    return [scan.best[k] for k in np.argsort(-scan.log_factor)[: BOUNDS.rivals] if scan.log_factor[k] > enough]
 
 
 def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ from scipy.sparse import diags_array
 from scipy.stats import chi2
 
 from dbbstation.inference.blocks import compress
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.coloured import (
     FEWEST_INDEPENDENT,
     Bands,
@@ -52,9 +53,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.pieces import Left
-
-DRAWS = 4
-"""Draws of white noise from which it is seen how much of the noise a model takes out."""
 
 TANGENT = 1e-3
 """Step of a nonlinear parameter for its tangent, in units of the spacing of its grid."""
@@ -192,11 +190,11 @@ class Bank:
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches
-        for _ in range(NOISE_ROUNDS):
+        for _ in range(BOUNDS.noise_rounds):
             beside = self.beside()
             target = self.target
             rng = np.random.default_rng(len(target))
-            draws = rng.standard_normal((len(target), DRAWS))
+            draws = rng.standard_normal((len(target), BOUNDS.noise_draws))
             sd = self._taking_part(beside) if members is None else self._sizes(members)
             left = beside.left(np.column_stack([target, draws]), sd)
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
@@ -499,9 +497,6 @@ HARDLY_TAKEN = 0.95
 
 ALIKE_AT = 65
 """Frequencies at which spectra are compared."""
-
-NOISE_ROUNDS = 8
-"""Times that the noise is measured, each time beside what the last level lets in."""
 
 TIE = 1e-3
 """Log odds by which a variable is less probable than the one before it in the table: of two that say the same, the first is named."""

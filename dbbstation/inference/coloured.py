@@ -15,6 +15,8 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -34,9 +36,6 @@ STEADY = 0.999
 
 LEAST_NEW = 1e-3
 """Share of the standard deviation of a row that is new in it, at the least: a recording has digits, and rounds."""
-
-FREQUENCIES = 4096
-"""Frequencies of a spectrum from which predictions are worked out: a line of one in a thousand rows keeps its height."""
 
 DECAYS = np.concatenate([np.arange(0.1, 0.9, 0.1), 1.0 - np.geomspace(0.1, 0.005, 12)])
 """Correlations of a first-order process from one row to the next that are tried: neighbours resemble each other over 200 rows at the
@@ -157,12 +156,12 @@ class Coloured:
         536; Priestley 1981, sec. 5.3.2].
         """
         power = np.exp(
-            self.log_power((np.arange(FREQUENCIES, dtype=np.float64) + 0.5) / (2.0 * FREQUENCIES))
+            self.log_power((np.arange(BOUNDS.frequencies, dtype=np.float64) + 0.5) / (2.0 * BOUNDS.frequencies))
             - 2.0 * np.log(self.innovation)
         )
         total = 0.0
         for count in (stretch.stop - stretch.start for stretch in stretches):
-            together = min(2 ** max(int(np.log2(2.0 * FREQUENCIES / count)), 0), FREQUENCIES)
+            together = min(2 ** max(int(np.log2(2.0 * BOUNDS.frequencies / count)), 0), BOUNDS.frequencies)
             averaged = power.reshape(-1, together).mean(axis=1)
             total += count * float(averaged.mean() ** 2 / np.mean(averaged**2))
         return total
@@ -362,7 +361,7 @@ def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np
         bands: rising [cycles per row], shape (b,).
         taken: log of the remaining share, shape (b,).
     """
-    frequency = np.linspace(0.0, 0.5, FREQUENCIES + 1)
+    frequency = np.linspace(0.0, 0.5, BOUNDS.frequencies + 1)
     power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))
     covariance = np.fft.irfft(power)[: LONGEST + 1]
     variance = float(covariance[0])

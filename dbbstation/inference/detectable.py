@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import Detectable
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
@@ -27,9 +28,6 @@ MARGIN = 1.25
 """Factor on the size that is found so often: the noise and the odds of the whole search are known about so well. Of 20
 effects injected at the size with the margin the whole answer was "yes" to 17; their probability alone was sure of 9, 10 and 10 of ten at 1,
 1.25 and 1.5."""
-
-DRAWS = 100
-"""Random effects that are asked about: the share found is known to 3 %."""
 
 ENTIRELY = 1e-9
 """Share of the squares that the base must leave: what leaves less is concealed by it wholly."""
@@ -107,7 +105,7 @@ def least_seen(
         products: information beside base and others, shape (p, p).
     """
     rng = np.random.default_rng(SEED)
-    directions = rng.standard_normal((DRAWS, len(plausible)))
+    directions = rng.standard_normal((BOUNDS.detectable_draws, len(plausible)))
     size = np.sqrt(np.mean(np.square(directions @ samples.T), axis=1))
     information, axes = np.linalg.eigh(plausible[:, None] * products * plausible)
     information = np.maximum(information, 0.0)

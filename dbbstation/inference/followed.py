@@ -10,6 +10,7 @@ from scipy.special import logsumexp
 
 from dbbstation.inference.alternatives import NEGLIGIBLE
 from dbbstation.inference.bank import LOOKED_FOR
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.levels import RUN, TIME
 from dbbstation.inference.model_comparison import FLEXIBLE
 from dbbstation.inference.patterns import Family
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.settled import Settled
-
-MOST_VARIABLES = 5
-"""Variables of a class at the most: one of more says nothing to anybody."""
 
 LEAST_ADDED = 0.02
 """Probability that a variable must add to a class to be named in it: less changes no figure that is printed with two digits."""
@@ -137,7 +135,7 @@ class VariableProbabilities:
         chosen = [name]
         every = sorted(frozenset[str]().union(*self._sets))
         unsure = [other for other in every if self.of([other]) < SURE]
-        while self.of(chosen) < SURE and len(chosen) < MOST_VARIABLES:
+        while self.of(chosen) < SURE and len(chosen) < BOUNDS.variables_of_class:
             added = {other: self.of([*chosen, other]) - self.of(chosen) for other in unsure if other not in chosen}
             best = max(added, key=lambda other: added[other], default=None)
             if best is None or added[best] < LEAST_ADDED:

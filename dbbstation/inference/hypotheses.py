@@ -14,18 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, with_slack_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from dbbstation.inference.model_comparison import Around, Cause, ModelComparison, Scan, Variant
-
-PAIRS = 3
-"""Best pairs of named causes that are looked at together."""
-
-MOST_PAIRED = 60
-"""Named causes of which all pairs are looked at, at the most: those that are worth most alone."""
 
 LIKELY = 8.0
 """Log odds against the best hypothesis within which the neighbours of another one are looked at: what is less likely has a
@@ -35,26 +30,9 @@ CLOSE = 1.0
 """The same where the most probable hypothesis alone is wanted: what is clearly less probable seldom has a neighbour that is more probable
 than all that the best one leads to. With 1, 3 and 8 ten groups of tests of the slowest session that is known chose the same."""
 
-MOST_EXPANDED = 40
-"""Hypotheses whose neighbours are looked at, at the most."""
-
-SWEEPS = 2
-"""Times that every member is given the variant and size that suit it best beside the others."""
-
 NEGLIGIBLE = 40.0
 """Log odds against the best hypothesis from which on a first score is not kept: a million of such sets have a probability of
 4e-12 together, and their names are what a search without end fills the memory with."""
-
-MOST_SCORES = 20_000
-"""First scores that are kept before those that became negligible meanwhile are dropped."""
-
-MANY = 6
-"""Members from which on their sizes are settled all at once where each has one form only: one inversion for all of them."""
-
-
-MOST_REPLACED = 28
-"""Pairs of members in the place of which one cause is tried, at the most: all pairs of eight members, which is as many as sessions have
-that the list explains. Of more members those pairs are taken that are worth least: what is worth much, another cause seldom does as well."""
 
 
 @dataclass(eq=False)
@@ -143,7 +121,7 @@ def search(
     comparison: ModelComparison,
     causes: Sequence[Cause],
     seeds: Iterable[Sequence[Member]] = (),
-    most_expanded: int = MOST_EXPANDED,
+    most_expanded: int = BOUNDS.expanded,
     most_members: int | None = None,
     likely: float = LIKELY,
     *,
@@ -183,7 +161,7 @@ class _Search:
         self._most, self._likely, self._work = most_expanded, likely, work
         self._most_members = np.inf if most_members is None else most_members
         self._beyond = -np.inf  # log posterior of the most probable set that is too large
-        self._room = MOST_SCORES
+        self._room = BOUNDS.scores
         self._top = -np.inf  # log posterior of the most probable hypothesis so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
@@ -245,7 +223,7 @@ class _Search:
         """Return the least valuable pairs of members, at most as many as may be replaced."""
         worth = dict(zip((m.cause.name for m in hypothesis.members), hypothesis.log_factors, strict=True))
         pairs = combinations(sorted(worth), 2)
-        return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[:MOST_REPLACED]
+        return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[: BOUNDS.replaced]
 
     def _around(self, hypothesis: Hypothesis) -> Around:
         return self._comparison.around(hypothesis.members, self._causes.values())
@@ -271,7 +249,7 @@ class _Search:
     def _drop_negligible(self) -> None:
         """Forget negligible first scores."""
         self._scored = {key: score for key, score in self._scored.items() if score > self._top - NEGLIGIBLE}
-        self._room = max(MOST_SCORES, 2 * len(self._scored))
+        self._room = max(BOUNDS.scores, 2 * len(self._scored))
 
     def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
         hidden = {
@@ -283,9 +261,9 @@ class _Search:
             for member in (*scan.best, *scan.narrow)
             if member is not None and member.cause.named
         ]
-        if len(named) > MOST_PAIRED:
+        if len(named) > BOUNDS.paired:
             worth = dict(zip((c.name for c in scan.causes), scan.log_factor.tolist(), strict=True))
-            named = sorted(named, key=lambda member: -worth[member.cause.name])[:MOST_PAIRED]
+            named = sorted(named, key=lambda member: -worth[member.cause.name])[: BOUNDS.paired]
         evidences = self._comparison.log_evidence_of_pairs(members, named)
         both = [
             (evidence + named[a].cause.log_prior_odds + named[b].cause.log_prior_odds, a, b)
@@ -296,7 +274,7 @@ class _Search:
         slim = [pair for pair in both if max(len(named[k].variant.columns) for k in pair[1:]) < FLEXIBLE]
         alone = self._comparison.log_evidence(members)
         for pairs in (both, slim):
-            for evidence, a, b in sorted(pairs, reverse=True)[:PAIRS]:
+            for evidence, a, b in sorted(pairs, reverse=True)[: BOUNDS.paired_hypotheses]:
                 if self._may_be_likely(members, alone, evidence - alone):
                     self._look_at([*members, named[a], named[b]])
 
@@ -328,9 +306,9 @@ class _Search:
             self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))
 
     def _settled(self, members: list[Member]) -> Hypothesis:
-        many = len(members) > MANY
+        many = len(members) > BOUNDS.many
         beside = _Beside(self._comparison, members)
-        for _ in range(SWEEPS if len(members) > 1 else 1):
+        for _ in range(BOUNDS.sweeps if len(members) > 1 else 1):
             at_once = [one for one, _, _ in beside.local.each_beside_others(members)] if many else members
             for k, member in enumerate(members):
                 if many and _single(member):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.alternatives import EQUIVALENT
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
 from dbbstation.inference.triangle import left_by
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.followed import VariableClass
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
-
-MOST_CANDIDATES = 12
-"""Causes that are scored in one place: worse ones by evidence of all rows predict no better."""
 
 SURELY = float(np.log(SURE / ABSENT))
 
@@ -116,7 +114,7 @@ def _candidates(
     rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & set(wanted) and c.name not in taken]
     scan = comparison.scan(others, rivals)
     worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-    best = {scan.causes[k].name: k for k in np.argsort(-worth)[:MOST_CANDIDATES].tolist()}
+    best = {scan.causes[k].name: k for k in np.argsort(-worth)[: BOUNDS.candidates].tolist()}
     best |= {scan.causes[k].name: k for k in range(len(worth)) if len(names) == 1 and scan.causes[k].name in names}
     found: dict[str, tuple[Member, ...]] = {name: (scan.best[k],) for name, k in best.items()}
     # A set that was compared has what its formulas may be off by in it.

@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 SIGNIFICANT = 0.001
 """Probability by chance, over all tests, below which something is left."""
 
-MOST_LOCATIONS = 12
-"""Places of a misfit that are listed, the largest first."""
-
 COUNTS_SIGMA = 4.0
 """A smoothed deviation counts as misfit above this many of its standard deviations."""
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.curves import Spline
 from dbbstation.inference.forms import Bump, StepForm, Wave
 from dbbstation.inference.patterns import Family, Pattern, log_odds
@@ -28,32 +29,17 @@ if TYPE_CHECKING:
 PLACED = (Family.WAVE, Family.BUMP, Family.STEP)
 """Patterns whose place, width or frequency is a nonlinear parameter."""
 
-STRONGEST = 2
-"""Forms of each kind over each variable that are kept."""
-
-STRONGEST_COLOURED = 6
-"""The same where noise is not white: a first look does not know there how much of each form whitening leaves."""
-
-PIECES = 2048
-"""Of a variable, at the most."""
-
 ROWS_PER_PIECE = 4
 """Rows in a piece of a variable, at the least, on average."""
 
 PIECES_PER_WAVE = 4
 """Pieces in the shortest wave."""
 
-MOST_CYCLES = 400
-"""Periods over the range of a variable, at the most."""
-
 WIDTHS = (64.0, 32.0, 16.0, 8.0)
 """Standard deviations of bumps: shares of the range, one over."""
 
 FINER_CURVES = (14, 28)
 """Functions of curves that bend more often than the usual one."""
-
-STEPS = 40
-"""Places where a step is looked for."""
 
 NEIGHBOUR = 0.7
 """Share of what the best form about one of a list explains that this one explains itself, at the least: a wave half a step of
@@ -69,13 +55,13 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
     found: list[Pattern] = []
     for variable in variables:
         values = variable.values[kept]
-        pieces = min(PIECES, len(np.unique(values)) // 2, len(values) // ROWS_PER_PIECE)
+        pieces = min(BOUNDS.pieces, len(np.unique(values)) // 2, len(values) // ROWS_PER_PIECE)
         if pieces < 2 * PIECES_PER_WAVE:
             continue
         sums = _sums(left, values, pieces, size)
         # Where noise is not white, a first look does not know how much of each form whitening leaves.
         roughly = left.whitening is not None
-        most = STRONGEST_COLOURED if roughly else STRONGEST
+        most = BOUNDS.strongest_coloured if roughly else BOUNDS.strongest
         found += _waves(variable, sums, float(np.ptp(values)), pieces, most, roughly=roughly)
         finer = [n for n in FINER_CURVES if n * PIECES_PER_WAVE <= pieces]
         found += [
@@ -85,7 +71,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
             widths = [variable.extent / w for w in WIDTHS if w <= pieces / 2]
             for family, forms, apart in (
                 (Family.BUMP, bumps(variable.low, variable.high, widths), 3.0),
-                (Family.STEP, steps(variable.low, variable.high, STEPS), 1.0),
+                (Family.STEP, steps(variable.low, variable.high, BOUNDS.step_places), 1.0),
             ):
                 tried = max(len(forms) / apart, 1.0)  # of neighbours every so many-th counts as a try
                 least = 0.0 if roughly else _least(tried)
@@ -121,7 +107,7 @@ def _waves(
 ) -> list[Pattern]:
     """Return waves from twice the range to four pieces, refined."""
     length = 2 * (int(sums.place[-1]) + 1)
-    last = min(int(2.0 * min(MOST_CYCLES, pieces / PIECES_PER_WAVE)), length // 4)
+    last = min(int(2.0 * min(BOUNDS.cycles, pieces / PIECES_PER_WAVE)), length // 4)
     if last <= 1:
         return []
     explained, tried = sums.of_waves(length, 1, last), (last - 1) / 2.0

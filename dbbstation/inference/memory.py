@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Law
 from dbbstation.inference.patterns import Family, log_odds, odds_of_driven
 from dbbstation.inference.variables import Kind
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 
     from dbbstation.inference.variables import Variable
 
-LENGTHS = 10
-"""Time constants, and dead times, that are tried at first. Each is then moved to where it fits best."""
-
 SHORTEST_ROWS = 2.0
 """Rows in the shortest time constant: what is over within a row is no memory."""
 
@@ -32,9 +30,6 @@ LONGEST_SHARE = 1.0 / 3.0
 
 LONGEST_DELAY_SHARE = 0.1
 """Share of the longest block that the longest dead time is: the rows before it say nothing about it."""
-
-MOST_STARTS = 5
-"""Runs that have a start each. Of more, all are taken to begin alike: a law has no more columns than it has use for."""
 
 LATE = 0.1
 """Probability that an effect that follows a variable does so late enough to be seen, by either of both ways: a linear effect over what
@@ -101,7 +96,7 @@ def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:
 
 
 def _grid(shortest: float, longest: float) -> tuple[float, ...]:
-    return tuple(np.geomspace(shortest, longest, LENGTHS).tolist()) if longest > 2.0 * shortest else ()
+    return tuple(np.geomspace(shortest, longest, BOUNDS.memory_lengths).tolist()) if longest > 2.0 * shortest else ()
 
 
 def _lag(
@@ -120,7 +115,7 @@ def _lag(
 
 def starts_of(blocks: Sequence[slice]) -> int:
     """Return initial states of a law: one per run, or one for all if there are many runs."""
-    return len(blocks) if len(blocks) <= MOST_STARTS else 1
+    return len(blocks) if len(blocks) <= BOUNDS.memory_starts else 1
 
 
 def _delay(

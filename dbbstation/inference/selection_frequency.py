@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.blocks import spread_over
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import CLOSE, search
 from dbbstation.inference.projection import BesideBase, CauseColumns
 
@@ -23,12 +24,6 @@ if TYPE_CHECKING:
 
 SHARE = 0.7
 """Of the groups of blocks that each draw keeps."""
-
-DRAWS = 20
-"""Draws: a frequency of one half is known to a tenth."""
-
-AT_ONCE = 128
-"""Columns that are laid out at once: all of them would take as much memory as columns and blocks once more."""
 
 
 def selection_frequency(
@@ -57,12 +52,12 @@ def selection_frequency(
     group_of = np.repeat(groups, [len(block.target) for block in blocks])
     rows = spread_over(blocks, np.arange(base))
     every, target = CauseColumns(rows[:, :-1].copy(), room=columns - base), rows[:, -1].copy()
-    for first in range(base, columns, AT_ONCE):
-        every.add(spread_over(blocks, np.arange(first, min(first + AT_ONCE, columns)))[:, :-1])
+    for first in range(base, columns, BOUNDS.selection_columns):
+        every.add(spread_over(blocks, np.arange(first, min(first + BOUNDS.selection_columns, columns)))[:, :-1])
     del rows, blocks  # these fill as much memory as all causes
     parts = {name: every.part(group_of == name) for name in names.tolist()}
     times = dict.fromkeys((cause.name for cause in causes), 0)
-    for _ in range(DRAWS):
+    for _ in range(BOUNDS.selection_draws):
         kept = set(rng.choice(names, kept_groups, replace=False).tolist())
         out = [part for name, part in parts.items() if name not in kept]
         # Products of a group are worked out once, however many draws leave it out.
@@ -72,7 +67,7 @@ def selection_frequency(
         found = search(comparison, causes, [begin], most_members=most_members, likely=CLOSE, thorough=not begin)
         for name in found.best.names:
             times[name] += 1
-    return {name: count / DRAWS for name, count in times.items()}
+    return {name: count / BOUNDS.selection_draws for name, count in times.items()}
 
 
 def renumbered(causes: Sequence[Cause]) -> tuple[NDArray[np.int64], list[Cause]]:

@@ -9,12 +9,13 @@ import numpy as np
 
 from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
 from dbbstation.inference.impossible import beyond_reach, impossible
 from dbbstation.inference.model_comparison import amplitude_size
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
-from dbbstation.inference.settled import MOST_EXPANDED, Beginning, Settled
+from dbbstation.inference.settled import Beginning, Settled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -26,23 +27,8 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.projection import BesideBase
 
-MOST_ROUNDS = 12
-"""Times that hypotheses, noise and looks may settle against each other."""
-
-MOST_LOOKS = 15
-"""Scans of the residual, one beside what the other brought, at the most."""
-
 BETTER = 3.0
 """Log probability that another look must add, noise included, to be followed by one more: odds of twenty."""
-
-SEEDS = 3
-"""Most probable hypotheses that are looked at again after each change."""
-
-MOST_GROWN = 40
-"""Causes that are taken in one after the other before the search begins, at the most."""
-
-MOST_PLACED = 3
-"""Times that what was looked for is moved to better places in the noise that is left, at the most."""
 
 
 def settle(
@@ -50,8 +36,8 @@ def settle(
     *,
     look: bool = True,
     static: bool = True,
-    most_expanded: int = MOST_EXPANDED,
-    most_looks: int = MOST_LOOKS,
+    most_expanded: int = BOUNDS.expanded_of_table,
+    most_looks: int = BOUNDS.looks,
     in_time: bool = True,
     thorough: bool = True,
     beginnings: Sequence[Beginning] = tuple(Beginning),
@@ -189,7 +175,7 @@ def _settled(
     blank = not best
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
-    for number in range(MOST_ROUNDS):
+    for number in range(BOUNDS.rounds):
         bank.measure(best)
         starts: list[tuple[Member, ...]] = []
         if looking:
@@ -202,7 +188,7 @@ def _settled(
         causes = bank.but_for(refused)
         starts = [grown(comparison, causes, members) for members in (*starts, best)]
         posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded, work=work)
-        seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
+        seeds |= {h.names: h.members for h in posterior.hypotheses[: BOUNDS.seeds]}
         settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
         compared = settled if looking else None
@@ -213,7 +199,7 @@ def _settled(
         if cannot := _impossible(settled):
             refused |= cannot
             continue
-        if times_placed < MOST_PLACED and (moved := _placed(bank, best)):
+        if times_placed < BOUNDS.placed and (moved := _placed(bank, best)):
             times_placed += 1
             best = moved
             continue
@@ -324,7 +310,7 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
         for m in start
         if m.cause.name in there and any(v is m.variant for v in there[m.cause.name].variants)
     ]
-    while len(members) < MOST_GROWN:
+    while len(members) < BOUNDS.grown:
         taken = {member.cause.name for member in members}
         scan = comparison.scan(members, [cause for cause in causes if cause.name not in taken])
         if not scan.causes:
@@ -368,7 +354,7 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
     begun = (
         _between_points(bank, beside, others, member) if len(law.grids) == 1 and not len(member.variant.slack) else None
     )
-    for number in range(STEPS if law.grids or law.at else 1):
+    for number in range(BOUNDS.steps if law.grids or law.at else 1):
         values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]
         width = len(member.variant.columns)
         if not values[:width].any():
@@ -402,17 +388,11 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
     at = int(np.argmin(np.abs(np.subtract(grid, value))))
     low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
     for _ in range(2):
-        places = [value, *np.linspace(low, high, PLACES).tolist()]
+        places = [value, *np.linspace(low, high, BOUNDS.places).tolist()]
         value = places[int(np.argmax([explained(one) for one in places]))]
-        step = (high - low) / (PLACES - 1)
+        step = (high - low) / (BOUNDS.places - 1)
         low, high = max(value - step, grid[0]), min(value + step, grid[-1])
     return (value,)
-
-
-PLACES = 17
-"""Values between the neighbours of a point of a grid that are tried, and again between the neighbours of the best of these: a place is
-known to a sixty-fourth of the way to the next point, less than a row where points lie sixty rows apart. With 9 and 33 the dead times
-of `tests/inference/test_memory.py` are within 3 u of the truth as well."""
 
 
 def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:
@@ -435,10 +415,6 @@ def growth(member: Member, values: NDArray[np.float64]) -> float:
         return 1.0
     size = amplitude_size(member, values[: len(member.variant.columns)])
     return size / member.variant.slack_at if size > 0.0 else 1.0
-
-
-STEPS = 3
-"""Times that the nonlinear parameters of a law are improved, and amplitudes to which its effect is not proportional."""
 
 
 def _impossible(settled: Settled) -> dict[str, str]:

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
     from dbbstation.inference.model_comparison import Cause, ModelComparison
 
-MOST_EXPANDED = 8
-"""Hypotheses whose neighbours are looked at in a search, at the most: a table may have dozens of members, each with neighbours."""
-
 
 class Beginning(Enum):
     """What noise is first measured beside.

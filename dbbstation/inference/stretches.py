@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family, Pattern
 
@@ -23,15 +24,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.pieces import Left
     from dbbstation.inference.variables import Variable
-
-PIECES = 4096
-"""Pieces of rows that a stretch may begin and end at, at the most, in the first look."""
-
-LENGTHS_PER_OCTAVE = 2
-"""Lengths that are tried from one to twice its length."""
-
-MOST = 40
-"""Stretches in one look, at the most."""
 
 SHORTEST = 3
 """Rows of the shortest stretch: one row alone is a wrong value, which no effect of the object explains."""
@@ -70,7 +62,7 @@ def stretches(
     for family, over, factor in kinds:
         look = _Look(left, blocks, kept, size, clock, factor[kept])
         found: list[tuple[float, float]] = []
-        while len(found) < MOST:
+        while len(found) < BOUNDS.stretches:
             best = look.best()
             if best is None or best.worth <= 0.0:
                 break
@@ -199,12 +191,12 @@ class _Look:
         self.tried = max(float(len(self._windows)) / INDEPENDENT, 1.0)
 
     def _all_windows(self) -> NDArray[np.int64]:
-        per = max(1, int(np.ceil(len(self._rows) / PIECES)))
+        per = max(1, int(np.ceil(len(self._rows) / BOUNDS.pieces_of_time)))
         found = [np.zeros((0, 2), dtype=np.int64)]
         for first, last in self._blocks:
             many = (last - first) // per
-            octaves = int(np.log2(max(many, 1)) * LENGTHS_PER_OCTAVE) + 1
-            lengths = np.unique(np.round(2.0 ** (np.arange(octaves) / LENGTHS_PER_OCTAVE)).astype(np.int64))
+            octaves = int(np.log2(max(many, 1)) * BOUNDS.lengths_per_octave) + 1
+            lengths = np.unique(np.round(2.0 ** (np.arange(octaves) / BOUNDS.lengths_per_octave)).astype(np.int64))
             for length in lengths[(lengths * per >= SHORTEST) & (lengths < many)]:
                 begin = np.arange(0, many - length + 1, max(1, int(length) // 8)) * per + first
                 found.append(np.column_stack([begin, begin + length * per]))
@@ -218,8 +210,8 @@ class _Look:
 
     def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
         own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
-        for many in range(0, len(starts), AT_ONCE):
-            rows = slice(many, many + AT_ONCE)
+        for many in range(0, len(starts), BOUNDS.stretches_at_once):
+            rows = slice(many, many + BOUNDS.stretches_at_once)
             own[rows] -= _squares(along[ends[rows]] - along[starts[rows]])
         return np.asarray(own)
 
@@ -230,7 +222,7 @@ class _Look:
         along = self._total[self._windows[:, 1]] - self._total[self._windows[:, 0]]
         first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
         sought = None
-        for _ in range(ENDS_MOVED):
+        for _ in range(BOUNDS.ends_moved):
             low, high = self._within(first, last)
             if high - low < SHORTEST:
                 return None
@@ -335,7 +327,7 @@ class _Growing:
         """Add a column, shape (n,)."""
         count = self.columns.shape[1]
         if count == self._room.shape[1]:
-            self._room = np.empty((len(column), count + MOST))
+            self._room = np.empty((len(column), count + BOUNDS.stretches))
             self._room[:, :count] = self.columns
         self._room[:, count] = column
         self.columns = self._room[:, : count + 1]
@@ -344,14 +336,8 @@ class _Growing:
 INDEPENDENT = 4.0
 """Windows that are about the same: only every so many-th counts as another try."""
 
-ENDS_MOVED = 3
-"""Times that either end of the best window is moved to where it is best."""
-
 FINER = (0.25, 0.25, 0.06, 0.06, 0.015)
 """Steps in which either edge is moved to where it is best, in rows: an edge of a hundred times the noise shows to a hundredth of one."""
-
-AT_ONCE = 4096
-"""Windows whose columns are held in memory at once."""
 
 ALIKE = 1e-12
 """Relative difference that is none."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.fft import rfft
 from scipy.special import jv
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.forms import Bump, Form, StepForm, Wave
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ class Sums:
             return np.asarray(rfft(wide, axis=0)[step * first : step * last : step])
 
         of_base = np.zeros((last - first, 2 * directions, 2 * directions))
-        for column in range(0, width, AT_ONCE):
-            some = self.base[:, :, column : column + AT_ONCE].reshape(pieces, -1)
+        for column in range(0, width, BOUNDS.sums_at_once):
+            some = self.base[:, :, column : column + BOUNDS.sums_at_once].reshape(pieces, -1)
             of_base += taken(sides(transformed(some, 1).reshape(last - first, directions, -1)))
         twice = transformed(self.gains.reshape(pieces, -1), 2).reshape(last - first, directions, directions)
         return solved(sides(transformed(self.rest, 1)), of_base, squares(self.gains.sum(axis=0), twice))
@@ -94,9 +95,6 @@ class Sums:
 FINER = (1.0 / 30.0, 1.0 / 450.0)
 """Steps of frequency about the best one, as shares of one over the extent: the last keeps a wave's phase to a degree from one end to the
 other."""
-
-AT_ONCE = 32
-"""Directions of the base whose transforms are held at once: a hundred megabytes with all of a joint fit."""
 
 
 def peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-SLAB = 512
-"""Rows that are made a triangle at once: with 32 columns 128 kB, which stay in a core's cache."""
 
 RANK = 1e-9
 """Share of the largest singular value or eigenvalue of columns below which a direction says nothing."""
@@ -23,7 +22,7 @@ def triangle_of(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
     A206].
     """
     columns = stacked.shape[1]
-    slab = max(SLAB, 4 * columns)  # each round leaves a quarter of the rows at most
+    slab = max(BOUNDS.slab, 4 * columns)  # each round leaves a quarter of the rows at most
     while len(stacked) >= 2 * slab:
         whole = len(stacked) // slab * slab
         triangles = np.asarray(np.linalg.qr(stacked[:whole].reshape(-1, slab, columns), mode="r"), dtype=np.float64)

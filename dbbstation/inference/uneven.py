@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -16,9 +18,6 @@ GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 
 TAILS = (2.5, 3.0, 4.0, 6.0, 10.0)
 """Degrees of freedom of Student's t that are tried."""
-
-TAIL_ROUNDS = 12
-"""Times that weights and scale are settled against each other."""
 
 
 def most_probable_variance(
@@ -77,7 +76,7 @@ def _likelihood(new: NDArray[np.float64], tails: float, scale: float) -> float:
 def _scale_of(squares: NDArray[np.float64], tails: float) -> float:
     """Return the best squared scale by expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
     scale = 1.0
-    for _ in range(TAIL_ROUNDS):
+    for _ in range(BOUNDS.tail_rounds):
         weight = (tails + 1.0) / (tails + squares / scale)
         scale = max(float(np.mean(weight * squares)), 1e-300)
     return scale

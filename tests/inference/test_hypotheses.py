@@ -7,7 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from dbbstation.inference.hypotheses import CLOSE, LIKELY, MOST_REPLACED, NEGLIGIBLE, search
+from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.hypotheses import CLOSE, LIKELY, NEGLIGIBLE, search
 from dbbstation.inference.model_comparison import FLEXIBLE, Around, Member
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import inclusion, log_posteriors
@@ -186,10 +187,10 @@ def test_pairs_that_are_replaced_are_counted(rng, monkeypatch):
     causes = one_column_each(14)
     whole = search(problem.comparison(), causes).best
     assert whole.names == {f"c{k}" for k in range(12)}
-    assert len(replaced) == MOST_REPLACED < 66
+    assert len(replaced) == BOUNDS.replaced < 66
     worth = dict(zip((m.cause.name for m in whole.members), whole.log_factors, strict=True))
     sums = sorted(worth[a] + worth[b] for a, b in combinations(worth, 2))
-    assert max(worth[a] + worth[b] for a, b in replaced) <= sums[MOST_REPLACED - 1] + 1e-6
+    assert max(worth[a] + worth[b] for a, b in replaced) <= sums[BOUNDS.replaced - 1] + 1e-6
     replaced.clear()
     again = search(problem.comparison(), causes, [whole.members], thorough=False)
     assert again.best.names == whole.names

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.blocks import Columns, compress
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import Variant
-from dbbstation.inference.selection_frequency import DRAWS, SHARE, renumbered, selection_frequency
+from dbbstation.inference.selection_frequency import SHARE, renumbered, selection_frequency
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import log_posteriors
 
@@ -83,7 +84,9 @@ def test_each_group_is_kept_in_seven_of_ten_draws():
         frequencies(np.random.default_rng(seed), targets, range(10), columns=columns)["sine"] for seed in range(10)
     ]
     assert np.mean(found) == pytest.approx(SHARE, abs=0.11)  # 200 draws: known to 0.03
-    assert all(DRAWS * share == pytest.approx(round(DRAWS * share)) for share in found)
+    assert all(
+        BOUNDS.selection_draws * share == pytest.approx(round(BOUNDS.selection_draws * share)) for share in found
+    )
 
 
 def test_draws_never_split_a_group():

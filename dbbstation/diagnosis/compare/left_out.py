@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.blocks import Columns, compress
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import LEAST_PARTS, KnownGains, chosen_anew
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
@@ -14,7 +15,6 @@ from dbbstation.inference.held_out import held_out
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.read_off import Trial
-from dbbstation.inference.settled import MOST_EXPANDED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -51,7 +51,7 @@ def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool
             yield bank.beside(but_for=rows[kept]).comparison(np.where(rows[kept], 0.0, bank.target))
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
-        return search(comparison, settled.causes, [settled.best.members], MOST_EXPANDED).best.members
+        return search(comparison, settled.causes, [settled.best.members], BOUNDS.expanded_of_table).best.members
 
     follow = follow_of(settled)
     classes = [one.wanted for one in classes_of(settled, VariableProbabilities(settled))]

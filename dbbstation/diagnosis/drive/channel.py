@@ -12,6 +12,7 @@ from dbbstation.diagnosis.drive.naming import acts
 from dbbstation.diagnosis.drive.recordings import with_waves
 from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
@@ -303,13 +304,10 @@ def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Sc
     return with_waves(scale, tuple(found), len(waves) * WAVE_STEP), 1e3 / float(waves[-1])
 
 
-_AT_ONCE = 200
-
-
 def _power(waves: NDArray[np.float64], position: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate(
         [
-            np.abs(np.exp(2j * np.pi * np.outer(waves[k : k + _AT_ONCE], position)) @ left)
-            for k in range(0, len(waves), _AT_ONCE)
+            np.abs(np.exp(2j * np.pi * np.outer(waves[k : k + BOUNDS.waves_at_once], position)) @ left)
+            for k in range(0, len(waves), BOUNDS.waves_at_once)
         ]
     )

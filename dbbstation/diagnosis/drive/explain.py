@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS, drive_channel
 from dbbstation.diagnosis.drive.fit import DriveFit, fit, log_possible, measured
+from dbbstation.inference.bounds import BOUNDS, DRIVES
 from dbbstation.inference.hypotheses import LIKELY, Posterior
 from dbbstation.inference.settle import settle
 
@@ -17,19 +18,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.settled import Settled
-
-MOST_ROUNDS = 6
-"""Times that something impossible is refused and all is compared again."""
-
-MOST_EXPANDED = 4
-"""Hypotheses whose neighbours are looked at in a search, at the most: causes of a drive are few, and their rivals are looked at
-by the challenge of the most probable hypothesis too."""
-
-MOST_LOOKS = 2
-"""Looks for pulses in each round, at the most; each takes dozens. Where more are left, it is the law that is wrong."""
-
-LOOKED_AT = 60
-"""Hypotheses, most probable first, that are asked whether they can be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +36,13 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
     """Compare sets of causes, refusing impossible ones."""
     refused: dict[str, str] = {}
     dropped: dict[str, str] = {}
-    for number in range(MOST_ROUNDS):
+    for number in range(DRIVES.rounds):
         base = [name for name in (MASS, VISCOUS) if name not in dropped]
         drive = drive_channel(recordings, sources, base, refused)
         settled = settle(
             drive.channel,
-            most_expanded=MOST_EXPANDED,
-            most_looks=MOST_LOOKS,
+            most_expanded=DRIVES.expanded_of_table,
+            most_looks=DRIVES.looks,
             rivals=False,
             progress=progress,
         )
@@ -62,7 +50,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
         after = fit(drive, settled, settled.best.members)
         if number == 0:
             first = fit(drive, settled, ())
-        last = number == MOST_ROUNDS - 1
+        last = number == DRIVES.rounds - 1
         impossible = _impossible(drive, after)
         if impossible and not last:
             refused |= impossible
@@ -95,7 +83,7 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
     weights = dict(posterior.weights)
     hypotheses = list(posterior.hypotheses)
     top = -float("inf")
-    for number, hypothesis in enumerate(posterior.hypotheses[:LOOKED_AT]):
+    for number, hypothesis in enumerate(posterior.hypotheses[: BOUNDS.looked_at]):
         if hypothesis.log_posterior < top - LIKELY:
             break  # none of those that follow can be probable
         less = log_possible(fit(drive, settled, hypothesis.members))

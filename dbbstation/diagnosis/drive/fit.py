@@ -11,6 +11,7 @@ from scipy.special import log_ndtr
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.impossible import NEGATIVE_SIGMA
 from dbbstation.inference.settle import growth, moved
 from dbbstation.inference.triangle import RANK, triangle_of
@@ -278,7 +279,7 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
     """Return base parameters with uncertainty over likely hypotheses."""
     posterior = settled.posterior
     likely: list[tuple[float, Hypothesis]] = [
-        (posterior.probability_of(h.names.__eq__), h) for h in posterior.hypotheses[:MOST]
+        (posterior.probability_of(h.names.__eq__), h) for h in posterior.hypotheses[: BOUNDS.likely_sets]
     ]
     fits = [(p, measured(drive, settled, h.members).base) for p, h in likely if p > LIKELY and h is not settled.best]
     found = {}
@@ -291,7 +292,3 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
         sigma = float(np.sqrt(value.uncertainty**2 + between + (share * value.value) ** 2))
         found[name] = Value(value.value, sigma, value.unit)
     return found
-
-
-MOST = 12
-"""Hypotheses, most probable first, that may count for an uncertainty."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.findings import ForceLocation
-from dbbstation.inference.left_over import COUNTS_SIGMA, MOST_LOCATIONS
+from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.left_over import COUNTS_SIGMA
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,7 +50,7 @@ def locate(
             share = float(own[rows] @ own[rows]) / total
             found.append(ForceLocation(t_s, mm, way, turns, variable or None, share, peak, text))
     found.sort(key=lambda location: -location.share)
-    return tuple(found[:MOST_LOCATIONS])
+    return tuple(found[: BOUNDS.locations])
 
 
 def _stretches(marked: NDArray[np.bool_], direction: NDArray[np.float64]) -> list[NDArray[np.int64]]:

@@ -11,6 +11,7 @@ from scipy.interpolate import BSpline
 
 from dbbstation.diagnosis.simulator.terms import DEGREE, IN_PLACE, Term, TermForm, bends
 from dbbstation.diagnosis.simulator.work import sizes
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.patterns import DRIVEN_ODDS, log_odds
 
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
 ROUNDINGS = (0.01, 0.1)
 """Shares of a signal's greatest value within which a sign turns: an integrator steps over anything sharper, and what turns less sharply
 is a curve."""
-
-LENGTHS = 5
-"""Time constants, widths and places that answers are taken at, at the most; between them they are interpolated."""
 
 REACH = 10.0
 """Factor by which a time constant or a width may be beyond the ends of its grid."""
@@ -132,7 +130,7 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
             if form is not TermForm.DRAG or values.min() < 0.0 < values.max():
                 found.append(_candidate(port, form, (name,), ("coefficient",), (_per(port.unit, unit, power),)))
         longest = span[1] / 3.0
-        if len(inside := inner_quantiles(values, LENGTHS)):
+        if len(inside := inner_quantiles(values, BOUNDS.answer_lengths)):
             found.append(_candidate(port, TermForm.CURVE, (name,), *_curve(port, values)))
             hinge = _candidate(
                 port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=inside
@@ -140,7 +138,7 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
             # Beyond what the signal reached a hinge does nothing, and its numbers could be anything.
             reached = (float(values.min()), float(values.max()))
             found.append(replace(hinge, term=replace(hinge.term, bounds=(reached,))))
-        constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), LENGTHS).tolist())
+        constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), BOUNDS.answer_lengths).tolist())
         found.append(
             _candidate(
                 port, TermForm.MEMORY, (name,), ("gain", "time constant"), (_per(port.unit, unit), "s"), grid=constants
@@ -149,13 +147,13 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
         if values.min() < 0.0 < values.max():
             turns = tuple(share * size for share in ROUNDINGS)
             found.append(_candidate(port, TermForm.SIGN, (name,), ("size", "rounding"), (port.unit, unit), grid=turns))
-            widths = tuple((size * np.geomspace(0.03, 0.6, LENGTHS)).tolist())
+            widths = tuple((size * np.geomspace(0.03, 0.6, BOUNDS.answer_lengths)).tolist())
             found.append(
                 _candidate(
                     port, TermForm.LIMIT, (name,), ("slope", "half width"), (_per(port.unit, unit), unit), grid=widths
                 )
             )
-        widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, LENGTHS)).tolist())
+        widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, BOUNDS.answer_lengths)).tolist())
         found.append(_candidate(port, TermForm.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
         if unit == port.unit:
             found += _in_place(port, name, values, span, widths)
@@ -174,7 +172,7 @@ def _in_place(
 ) -> list[Candidate]:
     """Return forms that replace a signal, shape (calls,)."""
     unit = port.signals[name]
-    whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
+    whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), BOUNDS.answer_lengths + 1).tolist())
     forms = [
         (TermForm.DELAY, "dead time", "s", whiles),
         (TermForm.LAG, "time constant", "s", whiles),

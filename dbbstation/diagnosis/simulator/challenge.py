@@ -16,6 +16,7 @@ from dbbstation.diagnosis.simulator.laws import discrepancy, form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import Challenge
 from dbbstation.diagnosis.simulator.noise_left import log_probability_of, noise_left
 from dbbstation.diagnosis.simulator.terms import TermForm
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -26,10 +27,6 @@ if TYPE_CHECKING:
 
 SHARES = (0.0, 0.3, 1.0)
 """How closely an object follows its forms, in units of what is stated: exactly, or as loosely as stated at the most."""
-
-FIRST = 6
-"""Terms that are each tried as the first of a pair, at the most: those that do best alone."""
-
 
 WORTH = math.log(SURE / ABSENT)
 """Log odds that a term must have once it is refitted, those without it being one, to stay."""
@@ -94,7 +91,7 @@ def _best_named(settled: Settled, others: list[Member], outside: dict[str, Candi
 
     causes = [cause for cause in settled.causes if cause.name in outside]
     best: tuple[float, list[Member]] = (0.0, [])
-    for worth, member in scanned(others, causes)[:FIRST]:
+    for worth, member in scanned(others, causes)[: BOUNDS.challenged]:
         rest = [cause for cause in causes if cause.name != member.cause.name]
         more, second = scanned([*others, member], rest)[0] if rest else (-np.inf, member)
         for found in ((worth, [member]), (worth + more, [member, second])):

@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
@@ -24,17 +25,8 @@ if TYPE_CHECKING:
 
     Weigh = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-STARTS = 12
-"""Places that a fit from several starts looks at, spread evenly over what the parameters may be [Sobol]; the best are gone on from."""
-
-GONE_ON = 3
-"""Starts that are gone on from; that which the model states is one of them."""
-
 SPREAD = 0.3
 """Share of its value by which a parameter is started elsewhere, where neither uncertainty nor bounds are stated."""
-
-MOST_STEPS = 40
-"""Steps of a fit at the most."""
 
 CLOSE = 1e-5
 """Relative change of the sum of squares from which on a fit has ended: for a thousand rows, a tenth of a standard uncertainty."""
@@ -104,7 +96,7 @@ def fit(
     *,
     sigma: float = 0.0,
     several: bool = False,
-    most_steps: int = MOST_STEPS,
+    most_steps: int = BOUNDS.fit_steps,
 ) -> SimulatorFit:
     """Fit all numbers [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
 
@@ -211,10 +203,10 @@ def _elsewhere(
     spread = np.array([2.0 * p.uncertainty if p.uncertainty else SPREAD * p.size for p in parameters])
     low = np.maximum(np.array([p.low for p in parameters]), np.array(start.values) - spread)
     high = np.minimum(np.array([p.high for p in parameters]), np.array(start.values) + spread)
-    draws = qmc.Sobol(len(parameters), scramble=True, rng=1).random(16)[:STARTS]
+    draws = qmc.Sobol(len(parameters), scramble=True, rng=1).random(16)[: BOUNDS.starts]
     states = [FittedState(tuple((low + (high - low) * draw).tolist()), start.terms) for draw in draws]
     found = squares(states)
-    order = np.argsort(found)[: GONE_ON - 1]
+    order = np.argsort(found)[: BOUNDS.gone_on - 1]
     return [states[int(k)] for k in order if np.isfinite(found[int(k)])]
 
 

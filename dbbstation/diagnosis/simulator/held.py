@@ -15,7 +15,7 @@ from dbbstation.diagnosis.simulator.density import log_density
 from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
-from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import KnownGains
 from dbbstation.inference.folds import Fold, HeldOutError, beside, part_numbers
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
@@ -141,4 +141,4 @@ def predicted_parts(
 
 def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
     """Return the comparison without rows, shape (n,)."""
-    return compared_quickly(channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)
+    return compared_quickly(channel.without(out).thinned(BOUNDS.fold_rows), found.settled.beginning)

@@ -28,6 +28,7 @@ from dbbstation.diagnosis.simulator.laws import (
 from dbbstation.diagnosis.simulator.noise_left import channel_of, noise_left
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
 from dbbstation.inference.bank import alike
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.named_values import named_values
 
@@ -43,9 +44,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
-
-MOST_NOISES = 4
-"""Refits with the same terms, each in the noise that the one before leaves, at the most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +313,7 @@ class Nodes:
         fitted, before = fit(self.work, state), None
         if _rms(fitted.residual) > most:
             return None
-        for _ in range(MOST_NOISES):
+        for _ in range(BOUNDS.noises):
             bank = noise_left(self.work, fitted.residual, fitted.columns)
             if before is not None and alike(bank.noise, before):
                 break

@@ -14,7 +14,7 @@ from dbbstation.diagnosis.simulator.laws import form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
-from dbbstation.inference.alternatives import RIVALS
+from dbbstation.inference.bounds import BOUNDS, SIMULATORS
 from dbbstation.inference.named_values import named_values
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.work import FittedState
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.settled import Settled
-
-MOST_ROUNDS = 20
-"""Times that a term is put in, taken out or refuted, or everything refitted, at the most."""
 
 RIVAL_SHARE = 0.5
 """Log posterior of a rival by the linear comparison, over that of the best, from which on it is put in: linear answers to a term that
@@ -81,7 +78,7 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
     node, been, refuted, refitted, stopped = base, {base.names}, dict[str, str](), 0, ""
     settled, still, put_in = compare(node.channel), False, node
     try:
-        for _ in range(MOST_ROUNDS):
+        for _ in range(SIMULATORS.rounds):
             wanted: Node | None = challenger(nodes, node, settled)
             more: Mapping[str, str] = {}
             if wanted is None or wanted.names in been:
@@ -97,7 +94,7 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
             elif more:
                 refuted |= more
                 settled = compare(node.but_for(refuted))
-            elif not refits or still or refitted >= MOST_REFITS:
+            elif not refits or still or refitted >= BOUNDS.refits:
                 break
             else:
                 again, before = nodes.again(node, *noise_of(settled)), _said(node, settled)
@@ -116,10 +113,6 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
         return SearchOutcome(node, settled, *found, still, refuted, stopped, tuple(nodes.withstood(node)))
     state, residual = near(nodes.work, node.fitted, *noise_of(settled))
     return SearchOutcome(node, settled, state, residual, is_settled=True)
-
-
-MOST_REFITS = 4
-"""Refits of the same terms in noise found anew, at the most."""
 
 
 REFUTED = "it was put in and refitted, and is not worth it there"
@@ -207,7 +200,7 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
     worth = {c.name: float(f) + c.log_prior_odds for c, f in zip(scan.causes, scan.log_factor, strict=True)}
     order = sorted((name for name in worth if name != first.name), key=lambda name: -worth[name])
     enough = [name for name in order if worth[name] > max(RIVAL_SHARE * worth.get(first.name, 0.0), 0.0)]
-    return [first, *(outside[name] for name in enough[: RIVALS - 1])]
+    return [first, *(outside[name] for name in enough[: BOUNDS.rivals - 1])]
 
 
 def moves(node: Node, settled: Settled) -> dict[str, float]:

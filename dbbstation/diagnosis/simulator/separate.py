@@ -11,6 +11,7 @@ from dbbstation.diagnosis.simulator.held import parts
 from dbbstation.diagnosis.simulator.nodes import spread_of
 from dbbstation.diagnosis.simulator.trials import apart, beside, trial_inputs
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.verdict import OUT, Verdict
 
 if TYPE_CHECKING:
@@ -21,12 +22,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.inference.read_off import CauseFinding
-
-MOST = 3
-"""Pairs that proposals are made for, at the most."""
-
-MOST_REPEATS = 1000
-"""Repeats from which on they are no proposal."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +65,7 @@ def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding
     settled = found.settled
     base = settled.bank.whitened(settled.channel.base.samples) / settled.noise.innovation
     every, proposals = parts(nodes.work), []
-    for pair in _wanted(found, findings)[:MOST]:
+    for pair in _wanted(found, findings)[: BOUNDS.separations]:
         columns = [_column(found, each) for each in pair]
         first, second = (settled.bank.whitened(column) / settled.noise.innovation for column in columns)
         differs = beside(np.column_stack([base, second]), first)
@@ -122,7 +117,7 @@ def _term(found: SearchOutcome, name: str) -> Term:
 
 
 def _repeated(repeats: int) -> str:
-    if repeats > MOST_REPEATS:
+    if repeats > BOUNDS.repeats:
         return "though no number of repeats will do"
     return f"{repeats} times" if repeats > 1 else "once more"
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
@@ -43,9 +44,6 @@ ROOM = 30.0
 
 AGREE = 0.1
 """Share by which answers per dose of two sizes may differ: of second order, their difference then leaves a hundredth or so."""
-
-ROUNDS = 8
-"""Times that a dose may be changed until its answer has the right size."""
 
 UNSEEN = 1e-9
 """Answer over the spread of the output below which there is none: digits run out there."""
@@ -181,7 +179,7 @@ class SimulationRuns:
         seen = np.zeros(len(directions), dtype=bool)
         doses = np.array([self.doses.get(one.key, one.dose) for one in directions])
         open_ = list(range(len(directions)))
-        for _ in range(ROUNDS):
+        for _ in range(BOUNDS.derivative_rounds):
             if not open_:
                 break
             once = self.residuals([directions[k].at(state, doses[k]) for k in open_], strict=False)

@@ -12,6 +12,7 @@ from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress, with_random
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling_of
 from dbbstation.inference.folds import held_out_error, parts_of
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
@@ -45,17 +46,6 @@ if TYPE_CHECKING:
 
 FAR_STATED = 3.0
 """Standard uncertainties by which a parameter is off what was stated of it from which on this is said: one in 400 by chance."""
-
-FOLD_ROWS = 3000
-"""Rows that a selection for a held-out part is made from, at the most, evenly spaced: fewer rows can only make its error larger."""
-
-
-MOST_WORK = 2e6
-"""Work of all searches over all rows [`SearchWork`]: half a minute of one processor. Tables of a thousand rows with five effects take a
-fiftieth of it."""
-
-MOST_WORK_WITHOUT = 2e5
-"""The same without one held-out part, so that ten of these cost as much."""
 
 
 @dataclass(frozen=True)
@@ -213,7 +203,7 @@ def _found(
 ) -> Mismatch:
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))
-    settled = settle(channel, most_work=MOST_WORK, progress=progress)
+    settled = settle(channel, most_work=BOUNDS.work, progress=progress)
     chosen: list[WithoutPart] = []
     held_out = _held_out(settled, table, chosen, progress) if hold_out else None
     refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
@@ -263,8 +253,8 @@ def choose_without(
     channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
 ) -> Settled:
     """Repeat the selection without rows, shape (n,), in a smaller search, which can only raise the error."""
-    kept = channel.without(rows).thinned(FOLD_ROWS)
-    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=MOST_WORK_WITHOUT)
+    kept = channel.without(rows).thinned(BOUNDS.fold_rows)
+    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=BOUNDS.work_without)
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.variables import TRAVELS, Kind
 from dbbstation.inference.verdict import Verdict
 
@@ -22,9 +23,6 @@ ALIKE = 0.95
 TAKEN_UP = 0.9
 """Share of a parameter's effect that what was found can do as well, from which on its value rests on the choice of these."""
 
-MOST = 4
-"""Suggestions, at the most."""
-
 
 @dataclass(frozen=True)
 class Next:
@@ -37,7 +35,7 @@ class Next:
 @with_one_thread
 def next_measurements(found: Mismatch) -> tuple[Next, ...]:
     """Return proposals, the most decisive first."""
-    return tuple(list(_suggested(found))[:MOST])
+    return tuple(list(_suggested(found))[: BOUNDS.measurements])
 
 
 def _suggested(found: Mismatch) -> Iterator[Next]:

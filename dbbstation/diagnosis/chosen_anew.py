@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,8 +10,7 @@ import numpy as np
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.left_out import groups_of, predicted_without
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import KnownGains, chosen_anew
-from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
+from dbbstation.inference.chosen_anew import KnownGains, gains_of_tests, rows_of_groups
 from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
@@ -30,11 +30,7 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
     groups = groups_of(channel.observations)
     if not settled.best.members or groups is None:
         return None
-    held_back = []
-    for group in np.unique(groups):
-        held_back.append(np.zeros(len(outcome.channel.residual), dtype=bool))
-        for rows, own in zip(channel.runs, groups, strict=True):
-            held_back[-1][rows] = own == group
+    held_back = rows_of_groups(groups, channel.runs)
     target = settled.target
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     # What was laid out before it was laid out better is asked for by nobody.
@@ -51,14 +47,6 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
         found = search(comparison, settled.causes, begin, most_members=BOUNDS.members, likely=CLOSE, thorough=False)
         return found.best.members
 
-    follow = follow_of(outcome)
-    classes = [one.wanted for one in classes_of(outcome, VariableProbabilities(outcome))]
-    anew = chosen_anew(
-        settled.comparison, of_others(), choose, lambda name: (name,), lambda cause: cause.named, (classes, follow)
-    )
-    names = [m.cause.name for m in settled.best.members if not m.cause.setup]
-    without = {wanted: {name for name in names if follow(name) & wanted} for wanted in classes}
-    errors = predicted_without(explained, [(), *without.values(), names])
-    return KnownGains.of_tests(
-        held_back, anew, dict(zip([*without, frozenset[str]()], errors[1:], strict=True)), errors[0]
-    )
+    comparisons = settled.comparison, of_others()
+    errors = partial(predicted_without, explained)
+    return gains_of_tests(outcome, held_back, comparisons, choose, errors, lambda cause: cause.named)

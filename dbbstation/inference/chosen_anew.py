@@ -10,17 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from dbbstation.inference.followed import ClassGain
+import numpy as np
+
+from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.inference.folds import Kind
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+    from dbbstation.inference.settled import Settled
 
 Classes: TypeAlias = "tuple[Sequence[frozenset[str]], Callable[[str], frozenset[str]]]"
 """Classes of variables, and what each cause follows."""
@@ -69,21 +71,6 @@ class KnownGains:
     errors: Sequence[float]
     anew: ChosenAnew | None = None
 
-    @classmethod
-    def of_tests(
-        cls, rows: Sequence[NDArray[np.bool_]], anew: ChosenAnew, errors: Mapping[frozenset[str], float], error: float
-    ) -> KnownGains:
-        """Return the gains of groups of tests.
-
-        Args:
-            errors: rms errors of predicting groups without each class, by its variables; of the base alone under none.
-            error: with everything.
-        """
-        counts = tuple(int(one.sum()) for one in rows)
-        parts = {key: tuple(part[key] for part in anew.of_classes) if key else anew.whole for key in errors}
-        gains = {key: ClassGain(DensityGains(parts[key], counts), before, error) for key, before in errors.items()}
-        return cls(rows, gains, [error], anew)
-
     def of(self, wanted: Collection[str] | None) -> ClassGain:
         """Return the gain of everything over some variables; None: everything."""
         return self.gains[frozenset(wanted or ())]
@@ -95,6 +82,39 @@ class KnownGains:
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
         """Return the rms error of each part with everything, which is put in together."""
         return list(self.errors)
+
+
+def rows_of_groups(groups: Sequence[int], blocks: Sequence[slice]) -> list[NDArray[np.bool_]]:
+    """Return the rows of each group of blocks, shape (n,)."""
+    lengths = [block.stop - block.start for block in blocks]
+    return [np.repeat(np.array(groups) == group, lengths) for group in sorted(set(groups))]
+
+
+def gains_of_tests(
+    settled: Settled,
+    rows: Sequence[NDArray[np.bool_]],
+    comparisons: tuple[ModelComparison, Iterable[ModelComparison]],
+    choose: Callable[[ModelComparison], Sequence[Member]],
+    errors: Callable[[Sequence[Collection[str]]], Sequence[float]],
+    asked: Callable[[Cause], bool] = lambda _: True,
+) -> KnownGains:
+    """Return each cause's gain in groups of tests, and each class's.
+
+    Args:
+        comparisons: of all rows, and without each group.
+        errors: rms errors of predicting groups without causes of these names, for each of several sets.
+    """
+    follow = follow_of(settled)
+    classes = [one.wanted for one in classes_of(settled, VariableProbabilities(settled))]
+    anew = chosen_anew(*comparisons, choose, settled.bank.kind_of, asked, (classes, follow))
+    names = [member.cause.name for member in settled.best.members]
+    without = [{name for name in names if follow(name) & wanted} for wanted in classes]
+    error, *others = errors([(), *without, names])
+    counts = tuple(int(one.sum()) for one in rows)
+    parts = [*(tuple(part[key] for part in anew.of_classes) for key in classes), anew.whole]
+    every = zip([*classes, frozenset[str]()], parts, others, strict=True)
+    gains = {key: ClassGain(DensityGains(part, counts), before, error) for key, part, before in every}
+    return KnownGains(rows, gains, [error], anew)
 
 
 def chosen_anew(

@@ -8,16 +8,15 @@ import numpy as np
 
 from dbbstation.inference.blocks import Columns, compress
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import LEAST_PARTS, KnownGains, chosen_anew
+from dbbstation.inference.chosen_anew import LEAST_PARTS, KnownGains, gains_of_tests, rows_of_groups
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
-from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.held_out import held_out
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.read_off import Trial
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -30,12 +29,7 @@ if TYPE_CHECKING:
 def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
     """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups."""
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
-    parts = []
-    for group in range(max(groups) + 1):
-        rows = np.zeros(len(settled.channel.residual), dtype=bool)
-        for own, number in zip(sides.blocks, groups, strict=True):
-            rows[own] = number == group
-        parts.append(rows)
+    parts = rows_of_groups(groups, sides.blocks)
     if len(parts) < LEAST_PARTS or not settled.best.members:
         return Trial(), None
     gains = _chosen_anew(sides, settled, parts) if hold_out else None
@@ -53,12 +47,10 @@ def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         return search(comparison, settled.causes, [settled.best.members], BOUNDS.expanded_of_table).best.members
 
-    follow = follow_of(settled)
-    classes = [one.wanted for one in classes_of(settled, VariableProbabilities(settled))]
-    anew = chosen_anew(settled.comparison, of_others(), choose, bank.kind_of, classes=(classes, follow))
-    rest = [[m for m in settled.best.members if not follow(m.cause.name) & wanted] for wanted in classes]
-    error, *without = (predicted(sides, settled, some).rms for some in (settled.best.members, *rest, ()))
-    return KnownGains.of_tests(parts, anew, dict(zip([*classes, frozenset[str]()], without, strict=True)), error)
+    def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
+        return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
+
+    return gains_of_tests(settled, parts, (settled.comparison, of_others()), choose, errors)
 
 
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:

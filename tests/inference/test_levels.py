@@ -9,6 +9,7 @@ import pytest
 from scipy.special import logsumexp
 
 from dbbstation.facts.value import Value
+from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
@@ -42,7 +43,7 @@ from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.variables import Kind, Variable
-from dbbstation.inference.verdict import DensityGains, Verdict
+from dbbstation.inference.verdict import Acts, DensityGains, Verdict
 from dbbstation.results.levels_text import level_sentences
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import EFFECTS, channel
@@ -284,6 +285,25 @@ def test_a_verdict_is_read_off_the_level_of_the_class(both, answer, form, verdic
     assert found["hysteresis of q"].verdict is verdict
     if answer is FollowsAnswer.FOLLOWS and form is None:
         assert found["hysteresis of q"].ambiguous_with == ("curve by direction over q",)
+
+
+def said_of_hysteresis(settled, form, answer, probability):
+    follows = Followed((("q",),), (), answer, 1.0, {}, 1.0, ("curve over q", "hysteresis of q"), form=form)
+    levels = replace(levels_of(settled, left_over(settled), None, None), follows=(follows,))
+    return VerdictsByLevel(settled, levels, {}, worse=False).of_member("hysteresis of q", probability, 9.0, Acts.ALWAYS)
+
+
+@pytest.mark.parametrize(("probability", "verdict"), [(0.96, Verdict.DOES_NOT_PREDICT), (0.9, Verdict.AMBIGUOUS)])
+def test_held_out_parts_refute_no_member_that_is_not_sure(both, probability, verdict):
+    assert said_of_hysteresis(both[1], None, FollowsAnswer.DOES_NOT_PREDICT, probability)[0] is verdict
+
+
+def test_what_is_named_beside_it_is_no_rival_of_a_member_of_a_sum(both):
+    rivals = {"hysteresis of q": ("hysteresis of q", "curve by direction over q")}
+    form = LawForm(None, (), (), together=("curve over q",), rivals=rivals)
+    verdict, others, _ = said_of_hysteresis(both[1], form, FollowsAnswer.FOLLOWS, 1.0)
+    assert verdict is Verdict.AMBIGUOUS
+    assert others == ("curve by direction over q",)
 
 
 def test_what_leaves_more_than_as_simulated_is_not_identified(both):

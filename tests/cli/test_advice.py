@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import shlex
 from pathlib import Path
@@ -35,6 +36,7 @@ OTHERS |= {"--reuid", "--regid", "--clear-groups"}  # of setpriv
 """Options of other programs."""
 
 
+@functools.cache  # both tests ask for the texts of all files
 def texts(path: Path) -> list[tuple[int, str]]:
     """Texts of a file with their lines; f-strings with `X` for what is filled in; no docstrings but those of commands."""
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import threading
@@ -20,7 +21,11 @@ import pytest
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.yaml import text
 from dbbstation.machine.geometry import Machine
+
+# A command reads one model, tests the same few again and again: as many are kept as 50 MB hold.
+text._of_the_last = functools.lru_cache(maxsize=8)(text._parsed)
 
 
 def pytest_sessionstart() -> None:

@@ -188,7 +188,7 @@ class _Settling:
             self._given_up |= idle
             return False
         if not self._fitted:
-            self._unmodelled.look(joint, settled.members, self._noise_mm)
+            self._unmodelled.look(joint, settled.best.members, self._noise_mm)
         self._fit, self._fitted = joint, named
         _refine(self._channel, joint, named)
         return False

@@ -44,6 +44,7 @@ class Unmodelled:
     follows: dict[str, Follows] = field(default_factory=dict)
     shapes: dict[tuple[str, str], tuple[Shape, ...]] = field(default_factory=dict)
     causes: list[Cause] = field(default_factory=list)
+    _looked_for: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         channel = self.channel
@@ -54,8 +55,12 @@ class Unmodelled:
         ]
         self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 
-    def look(self, fit: Calibration, members: Sequence[Member], noise_mm: float) -> None:
-        """Search for waves, bumps, steps and pulses beside base and causes, and add them."""
+    def look(self, fit: Calibration, best: Sequence[Member], noise_mm: float) -> None:
+        """Search for waves, bumps, steps and pulses beside base and named causes, and add them.
+
+        What an earlier look found and the best set lacks is forgotten: beside the named causes it is found again, or is theirs.
+        """
+        members = [member for member in best if member.cause.named]
         channel = self.channel
         taken = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
         known = with_random(channel.base, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
@@ -63,11 +68,22 @@ class Unmodelled:
         base = (np.hstack([own.base[rows], own.samples[rows][:, taken]]) for rows in channel.runs)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
         look = TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
-        self._add(looked_for(look, ranges(self.runs)))
+        found = looked_for(look, ranges(self.runs))
+        self._forget(self._looked_for - {member.cause.name for member in best})
+        before = set(self.follows)
+        self._add(found)
+        self._looked_for |= set(self.follows) - before
 
     def of(self, member: Member) -> tuple[Shape, ...]:
         """Return an effect's shapes in its form; none for named causes."""
         return self.shapes.get((member.cause.name, member.variant.label), ())
+
+    def _forget(self, names: set[str]) -> None:
+        gone = [variant.columns for cause in self.causes if cause.name in names for variant in cause.variants]
+        self.channel.columns.give_back(np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *gone])))
+        self.causes = [cause for cause in self.causes if cause.name not in names]
+        self.follows = {name: follows for name, follows in self.follows.items() if name not in names}
+        self._looked_for -= names
 
     def _add(self, more: Sequence[Shape]) -> None:
         families: dict[str, list[Shape]] = {}

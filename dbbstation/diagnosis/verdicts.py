@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
-from dbbstation.diagnosis.held import held_variance, unseen
+from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.inference.alternatives import standing_out
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.impossible import impossibly_negative
@@ -190,11 +190,11 @@ class _CircleJudge(CauseJudge):
 
     def _fitted(self, name: str) -> dict[str, Value]:
         after = self._joint.after
-        found, seen = after.x.copy(), np.maximum(after.solution.variance, 0.0)
+        variance = uncertainties(after, unseen(after)) ** 2 + after.layout.formula_variance(after.x)
+        found = after.x.copy()
         own, shift, beside = self._beside_nameless(name)
         found[own] += shift
-        seen[own] = beside
-        variance = seen + held_variance(after, unseen(after)) + after.layout.formula_variance(after.x)
+        variance[own] = np.maximum(variance[own], beside)
         values: dict[str, Value] = {}
         for term in after.layout.terms:
             if term.source.name != name:

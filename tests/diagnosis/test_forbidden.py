@@ -40,4 +40,5 @@ def test_a_compliance_keeps_name_and_values_beside_an_effect_without_a_name(tmp_
     for name, true in (("horizontal_um_kn", 0.9), ("vertical_um_kn", 2.6)):
         value = compliance.parameters[name]
         assert abs(value.value - true) <= 3.0 * value.uncertainty
-        assert value.uncertainty < 0.5 * true
+        # The joint fit, without the wander, makes the vertical one -12.
+        assert abs(value.value - true) < 0.3 * true

@@ -15,6 +15,7 @@ from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.limits import limits_of_fit
 from dbbstation.diagnosis.shapes import ranges, samples_of, shapes, variables
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import search
 from dbbstation.sources.contract import Effect, Parameter
 from dbbstation.sources.registry import sources_named
@@ -184,12 +185,25 @@ def test_who_interrupts_the_comparison_gets_what_it_had_found(backlash, monkeypa
         assert abs(one.value - 4.0) <= 3.0 * one.uncertainty
 
 
+@pytest.fixture(scope="module")
+def found_before():
+    """What both stages below interrupt: the same explanation, found once."""
+    found = []
+
+    def once(*asked, **more):
+        found[:] = found or [explain.explain(*asked, **more)]
+        return found[0]
+
+    return once
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("stage", ["without_tests", "next_tests"])
-def test_who_interrupts_the_tests_of_an_answer_gets_the_answer(backlash, monkeypatch, stage):
+def test_who_interrupts_the_tests_of_an_answer_gets_the_answer(backlash, found_before, monkeypatch, stage):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
+    monkeypatch.setattr(finished, "explain", found_before)
     monkeypatch.setattr(finished, stage, interrupted)
     found = diagnose([backlash], sources=FEW, tests=EIGHT, until_interrupted=True)
     assert found.limits[0].what == "stopped"
@@ -212,7 +226,7 @@ def test_who_interrupts_before_anything_is_found_gets_nothing(backlash, monkeypa
 
 @pytest.mark.slow
 def test_a_search_at_its_limit_says_what_its_sets_leave(backlash, monkeypatch):
-    monkeypatch.setattr(explain, "MOST_MEMBERS", 0)
+    monkeypatch.setattr(explain, "BOUNDS", replace(BOUNDS, members=0))
     found = diagnose_sessions([backlash], FEW, EIGHT, lambda _: None).diagnosis
     (limit,) = found.limits
     assert limit.what == "search"

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from dbbstation.facts.value import Value
 from dbbstation.inference.levels import JOINED, FollowsAnswer
 from dbbstation.inference.pushes import too_many, within_a_step
-from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.verdict import OUT, SURE, Acts, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.facts.value import Value
     from dbbstation.inference.levels import Followed, Levels
     from dbbstation.inference.settled import Settled
 
@@ -33,17 +27,20 @@ class VerdictsByLevel:
 
     A law that level 3 names is identified. An effect over time alone happened. A class without held-out gain does not
     predict. All others are ambiguous.
+
+    Args:
+        pushes: sizes of all stretches of time, by member.
     """
 
     def __init__(
         self,
         settled: Settled,
         levels: Levels,
-        values: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]],
+        pushes: Mapping[str, Sequence[Value]],
         *,
         worse: bool,
     ) -> None:
-        self._settled, self._levels, self._values, self._worse = settled, levels, values, worse
+        self._settled, self._levels, self._pushes, self._worse = settled, levels, pushes, worse
 
     def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
         """Return the verdict on a member, given its size in standard deviations.
@@ -100,16 +97,6 @@ class VerdictsByLevel:
         if refuted and self._levels.correction is False:
             return Verdict.AMBIGUOUS, (), MAKES_UP
         return Verdict.HAPPENED, (), ""
-
-    @cached_property
-    def _pushes(self) -> dict[str, list[Value]]:
-        """Return sizes of all stretches of time, by member."""
-        unit, patterns, found = self._settled.channel.unit, self._settled.bank.patterns, {}
-        for name in (n for n in self._values if n in patterns and patterns[n].family in IN_TIME):
-            values, covariance = self._values[name]
-            sigmas = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-            found[name] = [Value(float(v), float(s), unit) for v, s in zip(values, sigmas, strict=True)]
-        return found
 
 
 def _named(one: Followed, name: str) -> bool:

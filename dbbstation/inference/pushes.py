@@ -40,7 +40,7 @@ def within_a_step(sizes: Sequence[Value], step: float) -> str:
     Args:
         step: zero if none.
     """
-    if any(abs(one.value) - step >= OUT * one.uncertainty for one in sizes):
+    if not sizes or any(abs(one.value) - step >= OUT * one.uncertainty for one in sizes):
         return ""
     return f"No stretch of it is larger than the step of {step:.3g} {sizes[0].unit} that is measured in: it may be what was rounded off."
 

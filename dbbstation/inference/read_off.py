@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.impossible import impossible
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.facts.value import Value
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.levels import Levels
@@ -166,7 +166,7 @@ class CauseJudge:
             if estimates is not None:
                 self._values[name] = (estimates.values[own], estimates.covariance[own, own])
         worse = trial is not None and trial.is_worse
-        self._levels = VerdictsByLevel(settled, levels, self._values, worse=worse)
+        self._levels = VerdictsByLevel(settled, levels, self._pushes(), worse=worse)
         absent = [cause for cause in settled.causes if cause.name not in self._members]
         scan = settled.comparison.scan(self._best.members, absent)
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
@@ -237,6 +237,16 @@ class CauseJudge:
             persists=happened and lasts,
             recurs=happened and pattern is not None and pattern.family is Family.WAVE,
         )
+
+    def _pushes(self) -> dict[str, Sequence[Value]]:
+        """Return sizes of all stretches of time, by member."""
+        unit, patterns = self._settled.channel.unit, self._settled.bank.patterns
+        found: dict[str, Sequence[Value]] = {}
+        for name in (n for n in self._values if n in patterns and patterns[n].family in IN_TIME):
+            values, covariance = self._values[name]
+            sigmas = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+            found[name] = [Value(float(v), float(s), unit) for v, s in zip(values, sigmas, strict=True)]
+        return found
 
     def _gains(self, name: str) -> Gains | None:
         if self._trial is None or self._trial.held_out is None:

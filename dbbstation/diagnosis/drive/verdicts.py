@@ -146,6 +146,14 @@ class Verdicts(CauseJudge):
         )
         return Verdict.AMBIGUOUS, (), why
 
+    def _pushes(self) -> dict[str, Sequence[Value]]:
+        """Return those of pushes; stretches of several members are levels between edges, counted with the first of them."""
+        patterns = self._settled.bank.patterns
+        found = {name: own for name, own in super()._pushes().items() if patterns[name].family is Family.PULSES}
+        if not self._pulses:
+            return found
+        return dict.fromkeys(found, ()) | {next(iter(found)): [part.parameters["force_n"] for part in self._pulses]}
+
     def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
         """Return the same; also where a cause of force cannot have such values."""
         if (why := super()._impossible(shown, values, covariance)) or shown.cause.name not in self._drive.of_law:

@@ -86,7 +86,7 @@ def _print_scatter(check: ScatterCheck, *, missing_physics: bool) -> None:
 calibrate = command(
     task,
     show,
-    CommandOutput("out", "Write the calibrated model here.", said="model written to {path}"),
+    CommandOutput("out", "MODEL.yaml", said="model written to {path}"),
     figure(said="figure written to {path}"),
     remarks=lambda result: map(outlier_sentence, result.outliers),
 )

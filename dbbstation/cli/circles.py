@@ -34,7 +34,7 @@ def show(
         _print_quick_looks(result.quick_look)
 
 
-circles = command(task, show, CommandOutput("table", "Write the table here, as CSV.", table=True, field="csv"))
+circles = command(task, show, CommandOutput("table", table=True, field="csv"))
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import re
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ from dbbstation.cli.figure_option import format_of, known_format
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
+from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import options_of
 
 if TYPE_CHECKING:
@@ -46,7 +48,7 @@ class CommandOutput:
     """
 
     name: str
-    help: str
+    metavar: str | None = None
     write: Callable[..., None] = save
     folder: bool = False
     table: bool = False
@@ -55,12 +57,25 @@ class CommandOutput:
     refused: Callable[[Any, Path], StationError | None] = lambda _result, _path: None
     only_with: str = ""
     field: str = ""
+    required: bool = False
+
+    @property
+    def option(self) -> click.Option:
+        """Return it as click has it."""
+        kind = _PATHS["folder" if self.folder else "file"]
+        return click.Option(
+            [f"--{self.name}"],
+            type=kind,
+            required=self.required,
+            callback=self.check,
+            help=o.OUTPUTS[self.name],
+            metavar=self.metavar,
+        )
 
 
-def figure(what: str = "Write a figure here", said: str = "") -> CommandOutput:
+def figure(said: str = "") -> CommandOutput:
     """Return `--figure FILE`: what the result draws."""
-    text = f"{what}, as SVG, PNG or PDF by the ending of its name."
-    return CommandOutput("figure", text, _draw, said=said, check=known_format)
+    return CommandOutput("figure", write=_draw, said=said, check=known_format)
 
 
 def _draw(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result
@@ -91,7 +106,7 @@ def command(
     def run(**given: Any) -> None:  # noqa: ANN401 - each option has a type of its own
         from dbbstation.cli.output import print_result
 
-        as_json, own = given.pop("as_json"), {name: given.pop(name) for name in shown}
+        as_json, own = given.pop("json"), {name: given.pop(name) for name in shown}
         paths = {one: given.pop(one.name) for one in outputs}
         paths = {one: path for one, path in paths.items() if path is not None}
         force = bool(given.get("force") if with_force else given.pop("force", False))
@@ -110,15 +125,28 @@ def command(
             raise error
 
     options = [option_of(one) for one in {**task.parameters, **shown}.values() if one.name != "force"]
-    for one in outputs:
-        kind = _PATHS.get("folder" if one.folder else "file")
-        options.append(
-            click.Option([f"--{one.name}"], type=kind, required=one.folder, callback=one.check, help=one.help)
-        )
+    options += [one.option for one in outputs]
     if with_force or any(not one.folder for one in outputs):
-        options.append(click.Option(["--force"], is_flag=True, help="Replace existing files."))
-    options.append(click.Option(["--json", "as_json"], is_flag=True, help="Print the result as JSON."))
+        options.append(click.Option(["--force"], is_flag=True, help=o.FORCE.help))
+    options.append(click.Option(["--json"], is_flag=True, help=o.JSON.help))
+    options.sort(key=lambda one: isinstance(one, click.Option))
     return click.Command(task.name, params=options, callback=run, help=task.help)
+
+
+def plain_command(function: Callable[..., Any], name: str = "", **more: Any) -> click.Command:  # noqa: ANN401 - as click has it
+    """Make a command of a function whose parameters have each an `Option`."""
+    options = options_of(function)
+
+    @functools.wraps(function)
+    def run(**given: Any) -> Any:  # noqa: ANN401 - the exit code
+        try:
+            return function(**{name: options[name].checked(value) for name, value in given.items()})
+        except ArgumentError as error:
+            raise _usage_error(error, options) from None
+
+    kind = more.pop("cls", click.Command)
+    name = name or function.__name__
+    return kind(name, params=[*map(option_of, options.values())], callback=run, help=function.__doc__, **more)
 
 
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
@@ -133,11 +161,15 @@ def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]
             now = getattr(import_module(function.__module__), function.__name__)  # a test may have put another there
             return now(**{"progress": progress, "say": lambda text: say(f"note: {text}"), **asked})
     except ArgumentError as error:
-        flags = {name: one.flag for name, one in task.parameters.items()}
-        what = f"{error.what}; {error.remedy}" if error.remedy else error.what
-        told = re.sub(r"`(\w+)`", lambda found: flags.get(found[1], found[0]), what)
-        at = "" if told.startswith("--") else f"{flags.get(error.where, '')}: "
-        raise click.UsageError(f"{at}{told}") from None
+        raise _usage_error(error, task.parameters) from None
+
+
+def _usage_error(error: ArgumentError, options: Mapping[str, TaskParameter]) -> click.UsageError:
+    flags = {name: one.flag for name, one in options.items()}
+    what = f"{error.what}; {error.remedy}" if error.remedy else error.what
+    told = re.sub(r"`(\w+)`", lambda found: flags.get(found[1], found[0]), what)
+    at = "" if told.startswith("--") else f"{flags.get(error.where, '')}: "
+    return click.UsageError(f"{at}{told}")
 
 
 @contextmanager
@@ -208,9 +240,9 @@ def option_of(one: TaskParameter) -> click.Parameter:
         )
     make: Any = click.Option
     if option.setting:
-        make = partial(ShopOption, setting=option.setting)
-    if one.default not in (None, (), inspect.Parameter.empty):
-        make = partial(make, default=one.default, show_default=True)
+        make = partial(ShopOption, setting=option.setting, goes_with=option.goes_with, factor=option.factor)
+    if option.usual or one.default not in (None, (), "", inspect.Parameter.empty):
+        make = partial(make, default=None if required else one.default, show_default=option.usual or True)
     found: click.Option = make(
         [one.flag, one.name],
         type=kind,
@@ -224,12 +256,12 @@ def option_of(one: TaskParameter) -> click.Parameter:
 
 def _kind_of(one: TaskParameter) -> Any:  # noqa: ANN401 - a type of click
     option, kind = one.option, get_args(one.type)[0] if one.many else one.type
-    if kind is Path or option.kind:
+    if kind is Path or option.kind in _PATHS:
         return _PATHS[option.kind or "path"]
-    if get_origin(kind) is Literal:
+    if get_origin(kind) is Literal and not one.many:
         return click.Choice(get_args(kind))
     if kind is int:
-        return click.IntRange(option.least if option.least is None else int(option.least))
+        return click.IntRange(*(None if end is None else int(end) for end in (option.least, option.most)))
     if kind is float:
         least = option.above if option.least is None else option.least
         return Finite(least, option.most, min_open=option.above is not None)

@@ -187,7 +187,7 @@ def _probable(source: SourceFinding) -> str:
 diagnose = command(
     task,
     show,
-    CommandOutput("out", "Write the joint model here.", _write, said="joint model written to {path}"),
+    CommandOutput("out", "MODEL.yaml", _write, said="joint model written to {path}"),
     figure(said="figure written to {path}"),
     more=_further,
 )

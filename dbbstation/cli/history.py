@@ -88,8 +88,8 @@ def _pair(value: float | None, u: float | None, k: float) -> tuple[str, str]:
 history = command(
     task,
     show,
-    CommandOutput("page", "Write a page with all trends here.", _write_page, said="page written to {path}"),
-    CommandOutput("table", "Write every value here, as CSV.", table=True, said="table written to {path}"),
+    CommandOutput("page", write=_write_page, said="page written to {path}"),
+    CommandOutput("table", table=True, said="table written to {path}"),
     remarks=_remarks,
     more=lambda: {"tolerances": shop_settings().tolerances, "coverage_factor": COVERAGE_FACTOR, "say": silent},
 )

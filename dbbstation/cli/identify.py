@@ -133,6 +133,6 @@ def _number(number: Value) -> str:
 identify = command(
     task,
     show,
-    CommandOutput("table", "Write what was compared here, as CSV.", table=True, field="compared"),
-    figure("Draw force and friction here"),
+    CommandOutput("table", table=True, field="compared"),
+    figure(),
 )

@@ -62,14 +62,12 @@ def _allowed() -> dict[str, object]:
     return {"allowed": setting.value if setting else ()}
 
 
-OUT = "With --simulator: write the missing terms here, as Python code."
-ROWS = "Write the table here, with the corrected simulation; with --simulator, measured, simulated, refitted and corrected values."
 mismatch = command(
     task,
     show,
-    CommandOutput("out", OUT, refused=_refused, only_with="simulator"),
-    CommandOutput("table", ROWS, _write_table, table=True, refused=_refused_table, field="corrected"),
-    figure("Draw what differs here"),
+    CommandOutput("out", "CODE.py", refused=_refused, only_with="simulator"),
+    CommandOutput("table", write=_write_table, table=True, refused=_refused_table, field="corrected"),
+    figure(),
     more=_allowed,
 )
 

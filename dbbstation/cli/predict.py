@@ -2,73 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-import click
+from dbbstation.cli.declared import CommandOutput, command
+from dbbstation.tasks.predict import predict as task
 
-from dbbstation.cli.shared_options import number_options, source_file_option
+if TYPE_CHECKING:
+    from dbbstation.results.prediction import PredictionResult
 
 
-@click.command()
-@click.argument("poses", type=click.Path(path_type=Path), metavar="POSES.csv")
-@click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
-@source_file_option
-@number_options
-@click.option(
-    "--table", "out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="CSV of actual poses."
-)
-@click.option("--force", is_flag=True, help="Overwrite the output file.")
-@click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON.")
-def predict(
-    poses: Path,
-    *,
-    model: Path,
-    source_files: tuple[Path, ...],
-    decimal: str | None,
-    separator: str | None,
-    out: Path,
-    force: bool,
-    as_json: bool,
-) -> None:
-    r"""Predict the actual poses for commanded ones, with standard uncertainties.
+def show(result: PredictionResult) -> None:
+    """Print how far the poses are off, and how well that is known."""
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, say
 
-    Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
-    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that depends on undetermined parameters is left empty, with the reason in u_not_known_because; joint_tolerance_mm in the machine file
-    of the calibration bounds it.
-
-    \b
-    Examples:
-      dbbstation predict --model model.yaml commanded.csv --table actual.csv
-      dbbstation predict --model model.yaml poses.csv --decimal , --table actual.csv
-    """
-    from dbbstation.cli.model_warnings import say_model_warnings
-    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_result, say
-    from dbbstation.cli.progress import stage_bar
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.files.formats.number_language import PLAIN, number_language
-    from dbbstation.files.own_sources import every_source
-    from dbbstation.files.provenance import refuse_existing_table
-    from dbbstation.tasks.models import model_of
-    from dbbstation.tasks.predict import STAGES
-    from dbbstation.tasks.predict import predict as predicted
-
-    refuse_existing_table(out, force=force)
-    identified = model_of(model, every_source(source_files))
-    say_model_warnings(identified)
-    with stage_bar("prediction", STAGES) as progress:
-        result = predicted(
-            identified,
-            poses,
-            out=out,
-            force=force,
-            numbers=number_language(decimal, separator) or PLAIN,
-            provenance=provenance,
-            progress=progress,
-        )
-    if as_json:
-        print_result(result)
-        return
-    say(f"{result.poses} poses written to {out}")
+    say(f"{result.poses} poses written to {result.file}")
     shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", result.common_shift_um, strict=True))
     say(
         f"position errors {result.error_rms_um:.1f} µm rms, {result.greatest_error_um:.1f} µm at most; their mean is {shift} µm, "
@@ -85,5 +32,8 @@ def predict(
         f"{'greatest uncertainty u ' + ', '.join(known) + ' µm; ' if known else ''}"
         f"u of {', '.join(unknown)} is not known: {result.uncertainty_not_known_because}"
     )
-    if identified.null_space is not None:
+    if result.directions_lost:
         say("  a joint_tolerance_mm in the machine file of the calibration, or tests that show it, would tell")
+
+
+predict = command(task, show, CommandOutput("table", table=True, field="file", required=True))

@@ -31,6 +31,7 @@ _NO_CONTENT = frozenset(
         "log",
         "force",
         "as_json",
+        "json",
         "jobs",
         "out_table",
         "scheduler",

@@ -18,4 +18,4 @@ def show(result: SimulatedSession) -> None:
     say(f"{result.runs} runs written to {result.session}")
 
 
-simulate = command(task, show, CommandOutput("out", "Session folder to make.", folder=True, field="session"))
+simulate = command(task, show, CommandOutput("out", "SESSION", folder=True, required=True, field="session"))

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
+from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, write_poses
+from dbbstation.files.provenance import Provenance
 from dbbstation.model.uncertainty import pose_errors
 from dbbstation.results.frame import Framed
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 
 if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
-
-NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,6 +48,19 @@ class PredictionResult(Framed):
     commanded: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
     actual: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
     uncertainty_mm: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
+    others: Annotated[Mapping[str, Sequence[str]], AsItIs, Kept] = field(default_factory=dict, repr=False)
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        write_poses(
+            path,
+            self.actual,
+            self.uncertainty_mm,
+            self.others,
+            provenance,
+            why_unknown=self.uncertainty_not_known_because or "",
+            warning="; ".join(self.model_warnings),
+            force=force,
+        )
 
     def headline(self) -> str:
         """Return the number of poses and their errors."""
@@ -56,31 +70,27 @@ class PredictionResult(Framed):
         """Return actual poses with standard uncertainties, a row each."""
         rows = []
         for pose, known in zip(self.actual.tolist(), self.uncertainty_mm.tolist(), strict=True):
-            row: dict[str, object] = dict(zip(NAMES, pose, strict=True))
+            row: dict[str, object] = dict(zip(POSE_COLUMNS, pose, strict=True))
             row |= {f"u_{axis}_mm": u if np.isfinite(u) else None for axis, u in zip("xyz", known, strict=True)}
             rows.append(row)
         return rows
 
 
 def prediction_result(
-    identified: IdentifiedModel,
-    commanded: NDArray[np.float64],
-    actual: NDArray[np.float64],
-    uncertainty_mm: NDArray[np.float64],
-    file: str | None = None,
+    identified: IdentifiedModel, table: PoseTable, actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
 ) -> PredictionResult:
     """Return the result of a prediction."""
-    figures = pose_errors(commanded, actual, uncertainty_mm)
+    figures = pose_errors(table.poses, actual, uncertainty_mm)
     unknown = None in figures.greatest_uncertainty_by_axis_um.values()
     return PredictionResult(
-        file=file,
         poses=len(actual),
         **vars(figures),
         uncertainty_not_known_because=identified.why_unknown if unknown else None,
         directions_lost=tuple(identified.directions_lost),
         unknown_causes=unknown_causes(identified.model),
         model_warnings=model_warnings(identified),
-        commanded=commanded,
+        commanded=table.poses,
         actual=actual,
         uncertainty_mm=uncertainty_mm,
+        others=table.others,
     )

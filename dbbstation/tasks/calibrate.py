@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
@@ -31,20 +31,10 @@ STAGES = {"fit": 0, "figures": 36, "observability": 53}
 def calibrate(
     sessions: o.RecordedSessions,
     *,
-    sources: Annotated[
-        Names | None,
-        Option("Error sources to fit [default: strut-reference-length,base-joints].", metavar="A,B,..."),
-    ] = None,
+    sources: Annotated[Names | None, replace(o.SOURCES, usual="strut-reference-length,base-joints")] = None,
     source_files: o.SourceFiles = (),
-    law_over_time: Annotated[
-        bool, Option("Fit thermal growth as a function of time, even if temperatures were logged.")
-    ] = False,
-    method: Annotated[
-        Literal["jig", "conv-a", "conv-b"],
-        Option(
-            "How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b)."
-        ),
-    ] = "jig",
+    law_over_time: o.LawOverTime = False,
+    method: o.Method = "jig",
     prescribe: Annotated[
         Names | None,
         Option("Parameters to hold at nominal, as many as the tests cannot identify.", metavar="SOURCE.PARAMETER,..."),

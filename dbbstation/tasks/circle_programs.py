@@ -25,13 +25,11 @@ if TYPE_CHECKING:
 @in_a_book
 def program(
     *,
-    plan: Annotated[File, Option("Test plan.", kind="file")],
-    machine: Annotated[File, Option("Machine file.", kind="file")],
-    out: Annotated[File, Option("Folder to write to.", kind="folder")],
-    dialect: Annotated[
-        str, Option("Language of the control: a name, or FILE.py.", metavar="D", setting="program.dialect")
-    ] = "linuxcnc",
-    model: Annotated[o.Model | None, o.model("Compensate with this calibrated model.")] = None,
+    plan: o.Plan,
+    machine: o.Machine,
+    out: Annotated[File, Option(o.OUTPUTS["out"], kind="folder", metavar="FOLDER")],
+    dialect: o.Dialect = "linuxcnc",
+    model: o.Model | None = None,
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),
     exclude: o.Exclude = (),
@@ -42,20 +40,12 @@ def program(
         float, Option("Height of rapid moves above the first point [mm].", setting="program.clearance_mm", least=0.0)
     ] = 20.0,
     bar_stays_on: Annotated[bool, Option("Start and end with the bar on its balls: no rapids, no stops.")] = False,
-    chord_um: Annotated[
-        float,
-        Option(
-            "With --model: greatest distance between a straight move and the circle [µm].", least=0.001, most=1000.0
-        ),
-    ] = 1e3 * CIRCLE_CHORD_MM,
+    chord_um: Annotated[float, o.CHORD_UM] = 1e3 * CIRCLE_CHORD_MM,
     prefer: o.Prefer = "accuracy",
     strict: o.Strict = False,
-    time_s: Annotated[
-        float | None,
-        Option("Start of the programs after the session's start [s], for models that depend on time.", metavar="S"),
-    ] = None,
+    time_s: o.TimeS = None,
     largest_correction_mm: o.LargestCorrectionMm = LARGEST_CORRECTION_MM,
-    force: Annotated[bool, Option("Replace existing files.")] = False,
+    force: o.Force = False,
     known: Mapping[str, ErrorSource] | None = None,
     provenance: Callable[[], Provenance] | None = None,
     progress: Progress = silent,
@@ -68,7 +58,7 @@ def program(
     are written or none. A program goes above its first point, comes down to it, waits for the bar to be put on, runs
     the path of a run and waits for the bar to be taken off.
 
-    Points of compensated programs are as far apart as the control needs for the feed, within --chord-um. If that is not
+    With --model programs are compensated. Their points are as far apart as the control needs for the feed, within --chord-um. If that is not
     far enough, the output states about how much slower the control is. --strict refuses the program instead.
 
     \b

@@ -26,10 +26,8 @@ def circles(
     sessions: o.SessionPaths,
     *,
     filter: o.Filter = "none",  # noqa: A002 - the standard's word
-    findings: Annotated[bool, Option("Judge every run too: number, limit, verdict.")] = False,
-    model: Annotated[
-        o.Model | None, o.model("Model that predicts the circles; with --findings.", only_with="findings")
-    ] = None,
+    findings: o.Findings = False,
+    model: Annotated[o.Model | None, o.MODEL_WITH_FINDINGS] = None,
     quick_look: Annotated[
         bool, Option("Look for the classical signatures of serial axes: symptoms, no causes here.")
     ] = False,

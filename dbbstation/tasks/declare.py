@@ -18,7 +18,7 @@ from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from dbbstation.errors import ArgumentError
 
@@ -48,15 +48,21 @@ class Option:
     Attributes:
         help: one or two sentences, the unit in brackets; for a flag that is True by default, the meaning of its
             absence.
-        kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
+        kind: `argument` has no flag; `path`, `file` or `folder`; `whole`: texts whose commas are their own; empty: by the
+            type.
+        usual: what its absence means, shown as default.
         least: `most`, `above`: range of a number.
+        setting: key in the shop's settings, times `factor`, unless `goes_with` is given.
         objects: scripts may give other objects than paths.
     """
 
     help: str = field(kw_only=False)
     kind: str = ""
     metavar: str | None = None
+    usual: str = ""
     setting: str = ""
+    goes_with: str = ""
+    factor: float = 1.0
     least: float | None = None
     most: float | None = None
     above: float | None = None
@@ -118,22 +124,29 @@ class TaskParameter:
 
     def _read(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
         kind = self.type
-        if kind == _NAMES:
-            texts = [value] if isinstance(value, str) else list(value)
-            return tuple(dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip()))
-        if kind == _FILES:
-            given = [value] if isinstance(value, str | PathLike) else value
-            if self.option.objects and not isinstance(given, list | tuple):
-                return given
-            return tuple(one if self.option.objects and not isinstance(one, str) else Path(one) for one in given)
         if kind is Path:
             return Path(value)
+        if self.many:
+            return self._read_several(value)
         if get_origin(kind) is Literal:
             return _one_of(str(value), get_args(kind))
         numeric = {float: Real, int: Integral}.get(kind, kind)
         if kind in _KINDS and (not isinstance(value, numeric) or (isinstance(value, bool) and kind is not bool)):
             raise TypeError
         return self._in_range(float(value) if kind is float else value)
+
+    def _read_several(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
+        if self.type == _FILES:
+            given = [value] if isinstance(value, str | PathLike) else value
+            if self.option.objects and not isinstance(given, list | tuple):
+                return given
+            return tuple(one if self.option.objects and not isinstance(one, str) else Path(one) for one in given)
+        texts = [value] if isinstance(value, str) else list(value)
+        if self.option.kind == "whole":
+            return tuple(texts)
+        names = dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip())
+        kind = get_args(self.type)[0]
+        return tuple(_one_of(name, get_args(kind)) if get_origin(kind) is Literal else name for name in names)
 
     def _in_range(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
         one = self.option
@@ -212,6 +225,7 @@ def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Functi
 
     def give(function: _Function) -> _Function:
         parameters, signature = options_of(function), inspect.signature(function)
+        options = {name: one.option for name, one in parameters.items()}
         text = inspect.cleandoc(function.__doc__ or "")
         head, rest = re.split(r"\n\nArgs:\n|(?=\n\n(?:Returns|Raises):\n)", text, maxsplit=1)
         known = Declared(name, label or name, stages, head, parameters, signature)
@@ -221,7 +235,7 @@ def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Functi
             bound = known.checked(args, named)
             return function(*bound.args, **bound.kwargs)
 
-        told = {name: one.option.help for name, one in parameters.items()}
+        told = {n: f"{one.help} [default: {one.usual}]" if one.usual else one.help for n, one in options.items()}
         told |= {name: text for name, text in _OF_ALL.items() if f"    {name}: " not in rest}
         lines = "".join(f"    {name}: {text}\n" for name, text in told.items() if name in signature.parameters)
         written = f"{head.partition(EXAMPLES)[0].strip()}\n\nArgs:\n{lines}{rest}"
@@ -245,14 +259,19 @@ def options_of(function: Callable[..., Any]) -> dict[str, TaskParameter]:
             annotation = eval(one.annotation, own.__globals__)  # noqa: S307 - of our own source
         except NameError:
             continue  # a type for checkers only is no option
-        option = next((mark for mark in getattr(annotation, "__metadata__", ()) if isinstance(mark, Option)), None)
+        kinds = [annotation, *(get_args(annotation) if get_origin(annotation) in {Union, UnionType} else ())]
+        option = next(
+            (mark for kind in kinds for mark in getattr(kind, "__metadata__", ()) if isinstance(mark, Option)), None
+        )
         if option is not None:
-            found[name] = TaskParameter(name, _plain(annotation.__origin__), one.default, option)
+            found[name] = TaskParameter(name, _plain(annotation), one.default, option)
     return found
 
 
 def _plain(kind: Any) -> Any:  # noqa: ANN401 - a type
+    if get_origin(kind) is Annotated:
+        return _plain(kind.__origin__)
     if get_origin(kind) not in {Union, UnionType}:
         return kind
     others = [one for one in get_args(kind) if one is not NoneType]
-    return others[0] if len(others) == 1 else Any
+    return _plain(others[0]) if len(others) == 1 else Any

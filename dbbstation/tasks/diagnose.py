@@ -36,7 +36,7 @@ STAGES = {
 def diagnose(
     sessions: o.RecordedSessions,
     *,
-    sources: Annotated[Names | None, Option("Error sources to compare [default: all].", metavar="A,B,...")] = None,
+    sources: Annotated[Names | None, replace(o.SOURCES, usual="all")] = None,
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),
     exclude: o.Exclude = (),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
+from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Files, Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
@@ -33,20 +35,13 @@ def identify(
     force_per_ampere: Annotated[
         float | None, Option("Force of the drive at 1 A, for motor_current_a.", metavar="N/A")
     ] = None,
-    sources: Annotated[Names | None, Option("Causes to compare [default: all].", metavar="A,B,...")] = None,
-    source_files: Annotated[
-        Files,
-        Option(
-            "Python file with physics of your own, as for `mismatch`. It is executed. May be given more than once.",
-            kind="path",
-            metavar="FILE.py",
-        ),
-    ] = (),
+    sources: Annotated[Names | None, replace(o.SOURCES, usual="all")] = None,
+    source_files: o.SourceFiles = (),
     cutoff_hz: Annotated[
         float | None,
         Option("Bandwidth in which force and model are compared [default: chosen from the recording].", metavar="HZ"),
     ] = None,
-    held_out: Annotated[bool, Option("Skip the check on parts that causes were not chosen from: much faster.")] = True,
+    held_out: o.HeldOut = True,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,

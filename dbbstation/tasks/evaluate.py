@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import task
@@ -24,7 +24,7 @@ STAGES = {"predicting runs": 0}
 @task("evaluate", label="evaluation", stages=STAGES)
 def evaluate(
     sessions: o.RecordedSessions,
-    model: Annotated[o.Model, o.model("Model file of `calibrate`.")],
+    model: o.Model,
     *,
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),

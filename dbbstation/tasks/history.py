@@ -24,12 +24,12 @@ def history(
     *,
     false_alarms: Annotated[
         float,
-        Option("False alarms per session, all quantities of a machine together.", least=1e-6, most=0.1),
+        Option(o.FALSE_ALARMS, least=1e-6, most=0.1),
     ] = 1e-3,
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     source_files: o.SourceFiles = (),
-    anew: Annotated[bool, Option("Ignore the index and read every session again.")] = False,
+    anew: o.Anew = False,
     tolerances: Sequence[Tolerance] = (),
     coverage_factor: float = 2.0,
     progress: Progress = silent,
@@ -41,7 +41,7 @@ def history(
     Of every test and direction G, centre X and Y, mean radial error R and centre distance C; parameters of models that lie in
     the folder and come from one of its sessions. Limits come from the shop's settings. A two-sided CUSUM with a limit for
     single sessions watches each quantity, from its second session on; the rate of false alarms is that of the whole table.
-    No model is fitted. Results are kept in an index in the user's cache folder.
+    --false-alarms is per session, all quantities of a machine together. No model is fitted. Results are kept in an index in the user's cache folder.
 
     \b
     Examples:

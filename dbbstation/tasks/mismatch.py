@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -78,14 +79,7 @@ def mismatch(
             only_with="simulator",
         ),
     ] = None,
-    anew: Annotated[
-        bool,
-        Option(
-            "With --simulator: run all simulations anew; those run before, of the same files and values, are kept in the user's "
-            "cache folder and not run again otherwise.",
-            only_with="simulator",
-        ),
-    ] = False,
+    anew: Annotated[bool, replace(o.ANEW, only_with="simulator")] = False,
     allow: Annotated[
         bool,
         Option(
@@ -112,14 +106,7 @@ def mismatch(
             metavar="COLUMN",
         ),
     ] = None,
-    source_files: Annotated[
-        Files,
-        Option(
-            "Python file with physics of your own. It is executed. May be given more than once.",
-            kind="path",
-            metavar="FILE.py",
-        ),
-    ] = (),
+    source_files: o.SourceFiles = (),
     known: Annotated[
         Uncertainties | None,
         Option(
@@ -141,7 +128,7 @@ def mismatch(
         ),
     ] = None,
     offset: Annotated[bool, Option("Do not fit a constant difference.")] = True,
-    held_out: Annotated[bool, Option("Leave out the held-out test, which takes most of the time.")] = True,
+    held_out: o.HeldOut = True,
     decimal: o.Decimal = None,
     separator: o.Separator = None,
     allowed: Collection[str] | None = None,
@@ -156,7 +143,8 @@ def mismatch(
     Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
 
     With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself: it says at which
-    of its ports which term is missing.
+    of its ports which term is missing, and --out has the missing terms as Python code. Simulations of the same files and
+    values are kept in the user's cache folder and not run again, but with --anew. --table has the corrected simulation.
 
     \b
     Examples:

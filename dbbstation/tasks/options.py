@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
-from dbbstation.tasks.declare import Files, Names, Option
+from dbbstation.tasks.declare import File, Files, Names, Option
 
 if TYPE_CHECKING:
     from dbbstation.tasks.load import Recorded, Sessions
@@ -13,8 +14,45 @@ if TYPE_CHECKING:
 else:
     Sessions, Recorded, _Model = Files, Files, Any
 
-Model = _Model
-
+MODEL = Option("Calibrated model, a file of `calibrate` or `diagnose`.", kind="file", metavar="MODEL.yaml")
+"""Scripts may give the model or a result that has one."""
+MODEL_WITH_FINDINGS = replace(MODEL, only_with="findings")
+Model = Annotated[_Model, MODEL]
+FORCE, JSON = Option("Replace existing files."), Option("Print the result as JSON.")
+Force = Annotated[bool, FORCE]
+Json = Annotated[bool, JSON]
+OUTPUTS = {
+    "out": "Write the result here.",
+    "table": "Write the table here, as CSV.",
+    "figure": "Write a figure here, as SVG, PNG or PDF by the ending of its name.",
+    "page": "Write the page here, as HTML.",
+    "pdf": "Print it here, by an installed Chromium.",
+}
+"""Of what a command writes: what it is stands in its metavar."""
+Out = Annotated[File, Option(OUTPUTS["out"], kind="file")]
+Machine = Annotated[File, Option("Machine file.", kind="file", metavar="MACHINE.yaml")]
+Plan = Annotated[File, Option("Test plan.", kind="file", metavar="PLAN.yaml")]
+Seed = Annotated[int, Option("Seed of everything random.", least=0)]
+ANEW = Option("Work out anew what is kept.")
+Anew = Annotated[bool, ANEW]
+Before = Annotated[File | None, Option("Earlier one, to go on from or to put beside.", kind="path")]
+SOURCES = Option("Error sources by name.", metavar="A,B,...")
+LawOverTime = Annotated[bool, Option("Fit thermal growth as a function of time, even if temperatures were logged.")]
+Method = Annotated[
+    Literal["jig", "conv-a", "conv-b"],
+    Option(
+        "How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b)."
+    ),
+]
+FALSE_ALARMS = "Probability of a false alarm, in all compared quantities together."
+Dialect = Annotated[str, Option("Language to write: a name, or FILE.py.", metavar="D", setting="program.dialect")]
+CHORD_UM = Option("Greatest distance between a move and the commanded path [µm].", least=0.001, most=1000.0)
+TimeS = Annotated[
+    float | None, Option("Start after the session's start [s], for models that depend on time.", metavar="S")
+]
+Findings = Annotated[bool, Option("Judge every run too: number, limit, verdict.")]
+Job = Annotated[str, Option("Job or order number: what it is measured for.")]
+DryRun = Annotated[bool, Option("Show what would be done, and write nothing.")]
 SessionPaths = Annotated[Sessions, Option("session folders or session files.", kind="argument", metavar="SESSION...")]
 RecordedSessions = Annotated[
     Sessions | Recorded,
@@ -25,12 +63,12 @@ Exclude = Annotated[Names, Option("Leave tests out; may be given more than once.
 SourceFiles = Annotated[
     Files,
     Option(
-        "Python file with an error source of your own. It is executed. May be given more than once.",
+        "Python file with error sources or physics of your own. It is executed. May be given more than once.",
         kind="path",
         metavar="FILE.py",
     ),
 ]
-HeldOut = Annotated[bool, Option("Leave out the held-out tests, so that causes need not predict other tests.")]
+HeldOut = Annotated[bool, Option("Leave out the held-out test, which takes most of the time.")]
 Filter = Annotated[
     Literal["none", "15", "30", "50", "150"],
     Option(
@@ -53,19 +91,12 @@ LargestCorrectionMm = Annotated[
         most=LARGEST_ALLOWED_MM,
     ),
 ]
-Decimal = Annotated[
-    Literal[".", ","] | None, Option("Decimal sign in the table  [default: a dot].", setting="numbers.decimal")
-]
+DECIMAL, SEPARATOR = (
+    "Decimal sign in the files  [default: the shop's; else as found, or a dot].",
+    "Separator of columns  [default: the shop's; else as found, or a comma].",
+)
+Decimal = Annotated[Literal[".", ","] | None, Option(DECIMAL, setting="numbers.decimal")]
 Separator = Annotated[
     Literal["comma", "semicolon", "tab", ",", ";", "\t"] | None,
-    Option(
-        "Separator of the table's columns  [default: comma; semicolon with a decimal comma].",
-        setting="numbers.separator",
-        metavar="[comma|semicolon|tab]",
-    ),
+    Option(SEPARATOR, setting="numbers.separator", metavar="[comma|semicolon|tab]"),
 ]
-
-
-def model(help_text: str, *, only_with: str = "") -> Option:
-    """Return a model as an option: a file; scripts may give the model or a result that has one."""
-    return Option(help_text, kind="file", only_with=only_with)

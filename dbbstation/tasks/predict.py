@@ -5,23 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-import numpy as np
-
-from dbbstation.control.commands import nominal_commands
 from dbbstation.errors import ArgumentError
-from dbbstation.files.formats.number_language import PLAIN
-from dbbstation.files.formats.pose_table import PoseTable, read_poses, write_poses
-from dbbstation.files.inputs import in_a_book
-from dbbstation.files.provenance import from_python, refuse_existing_table
-from dbbstation.files.recordings.table_csv import given_table
-from dbbstation.machine.travel import check_travel
-from dbbstation.model.uncertainty import predicted_poses
-from dbbstation.results.model_warnings import model_warnings
-from dbbstation.results.prediction import NAMES, PredictionResult, prediction_result
-from dbbstation.sources.registry import known_sources
-from dbbstation.tasks.models import model_of
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -30,86 +18,103 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from dbbstation.files.formats.number_language import NumberLanguage
-    from dbbstation.files.provenance import Provenance
+    from dbbstation.files.formats.pose_table import PoseTable
     from dbbstation.files.recordings.table_csv import Columns
+    from dbbstation.results.prediction import PredictionResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
-STAGES = {"reading": 0, "travel": 32, "predicting": 48, "writing": 67}
+    Poses = ArrayLike | Columns | str | PathLike[str]
+else:
+    Poses = Any
+
+STAGES = {"reading": 0, "travel": 40, "predicting": 60}
 """Stages of a prediction, and the share of its time that has passed by then [%]."""
 
 AXES = 6
 
 
-@in_a_book
+@task("predict", label="prediction", stages=STAGES)
 def predict(
-    model: Model,
-    poses: ArrayLike | Columns | str | PathLike[str],
+    model: o.Model,
+    poses: Annotated[
+        Poses,
+        Option(
+            "CSV file; scripts may give rows of X, Y, Z [mm], A, B, C [deg], or a DataFrame.",
+            kind="argument",
+            metavar="POSES.csv",
+        ),
+    ],
     *,
-    out: str | PathLike[str] | None = None,
-    force: bool = False,
-    numbers: NumberLanguage = PLAIN,
+    source_files: o.SourceFiles = (),
+    decimal: o.Decimal = None,
+    separator: o.Separator = None,
     known: Mapping[str, ErrorSource] | None = None,
-    provenance: Callable[[], Provenance] = from_python,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
 ) -> PredictionResult:
-    """Predict the actual poses for commanded ones, with standard uncertainties.
+    r"""Predict the actual poses for commanded ones, with standard uncertainties.
+
+    Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
+    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that depends on undetermined parameters is left empty, with the reason in u_not_known_because; joint_tolerance_mm in the machine file
+    of the calibration bounds it.
+
+    \b
+    Examples:
+      dbbstation predict --model model.yaml commanded.csv --table actual.csv
+      dbbstation predict --model model.yaml poses.csv --decimal , --table actual.csv
 
     Args:
-        model: a model, its file, or the result of `calibrate` or `diagnose`.
-        poses: commanded X, Y, Z [mm] and A, B, C [deg], shape (n, 6) or (6,), a DataFrame or CSV file with x_mm, y_mm, z_mm, a_deg, b_deg,
-            c_deg.
-        out: CSV file; None: none.
-        force: overwrite it.
-        numbers: notation of a CSV file.
-        known: error sources by name, for a file; None: those of package and installed packages.
-        provenance: called after all reading.
-        progress: called with each stage.
-        stop: asked at each stage.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
+
+    Returns:
+        Actual poses in memory; `save` writes them as CSV.
 
     Raises:
+        ArgumentError: a value that it does not take, or poses of another shape.
         InputError: faults of files.
         TravelError: a pose outside the machine's travel.
         KinematicsError: a pose that the actual machine cannot take.
         ModelError: a source needs more than poses.
-        OutputError: `out` exists without `force`.
-        ArgumentError: another shape.
         StoppedError: `stop` returned True.
     """
-    telling = Telling(progress, stop)
-    if out is not None:
-        refuse_existing_table(Path(out), force=force)
-    identified = model_of(model, known)
+    from dbbstation.control.commands import nominal_commands
+    from dbbstation.files.formats.number_language import PLAIN, number_language
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.machine.travel import check_travel
+    from dbbstation.model.uncertainty import predicted_poses
+    from dbbstation.results.model_warnings import model_warnings
+    from dbbstation.results.prediction import prediction_result
+    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.models import model_of
+
+    telling = Telling(progress, stop, say)
+    every = every_source(paths_of(source_files)) if known is None else known
+    identified = model_of(model, every)
+    machine = identified.model.machine
+    telling.note(*model_warnings(identified))
     telling.stage("reading poses")
-    table, where = _table(poses, numbers)
+    table, where = _table(poses, number_language(decimal, separator) or PLAIN)
     telling.stage("travel")
-    check_travel(identified.model.machine, table.poses, where=where)
-    commands = nominal_commands(identified.model.machine, table.poses, known_sources() if known is None else known)
+    check_travel(machine, table.poses, where=where)
+    commands = nominal_commands(machine, table.poses, every)
     actual, uncertainty_mm = predicted_poses(identified, commands, telling.counted("predicting pose"))
-    if out is not None:
-        telling.stage("writing")
-        write_poses(
-            Path(out),
-            actual,
-            uncertainty_mm,
-            table.others,
-            provenance(),
-            why_unknown=identified.why_unknown,
-            warning="; ".join(model_warnings(identified)),
-            force=force,
-        )
-    return prediction_result(identified, table.poses, actual, uncertainty_mm, None if out is None else str(out))
+    return prediction_result(identified, table, actual, uncertainty_mm)
 
 
-def _table(poses: ArrayLike | Columns | str | PathLike[str], numbers: NumberLanguage) -> tuple[PoseTable, str]:
+def _table(poses: Poses, numbers: NumberLanguage) -> tuple[PoseTable, str]:
+    import numpy as np
+
+    from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, read_poses
+    from dbbstation.files.recordings.table_csv import given_table
+
     if isinstance(poses, str | PathLike):
         return read_poses(Path(poses), numbers), str(poses)
     if hasattr(poses, "columns") or isinstance(poses, Mapping):
-        table = given_table(cast("Columns", poses), NAMES, "poses")
-        others = {name: list(table.cells[name]) for name in table.names if name not in NAMES}
-        return PoseTable(np.column_stack([table.values[name] for name in NAMES]), others), "poses"
+        table = given_table(cast("Columns", poses), POSE_COLUMNS, "poses")
+        others = {name: list(table.cells[name]) for name in table.names if name not in POSE_COLUMNS}
+        return PoseTable(np.column_stack([table.values[name] for name in POSE_COLUMNS]), others), "poses"
     given = np.atleast_2d(np.asarray(cast("ArrayLike", poses), dtype=np.float64))
     if given.ndim != 2 or given.shape[1] != AXES or not np.isfinite(given).all():  # noqa: PLR2004 - rows and columns
         raise ArgumentError(

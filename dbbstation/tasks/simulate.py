@@ -29,7 +29,7 @@ SIMULATING = "simulating runs"
 
 @task("simulate", label="runs")
 def simulate(
-    model: Annotated[o.Model, o.model("Model file of `calibrate`.")],
+    model: o.Model,
     plan: Annotated[File, Option("test plan.", kind="argument", metavar="PLAN")],
     *,
     source_files: o.SourceFiles = (),

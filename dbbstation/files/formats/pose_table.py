@@ -15,6 +15,7 @@ from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.source_text import LARGEST_TABLE, shortened, text_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -91,7 +92,7 @@ def write_poses(
     path: Path,
     poses: NDArray[np.float64],
     uncertainty_mm: NDArray[np.float64],
-    others: dict[str, list[str]],
+    others: Mapping[str, Sequence[str]],
     provenance: Provenance,
     *,
     why_unknown: str = "",

@@ -1,0 +1,244 @@
+"""The rows of exported sessions, written run by run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, OutputError, Problem, TraceError
+from dbbstation.files.atomic import streamed, write_text
+from dbbstation.files.csv_rows import csv_text
+from dbbstation.files.provenance import beside_table
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.run_lines import split_head
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace import columns
+from dbbstation.trace.cut import edges_of, progress_deg
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.plan.circle import Circle
+    from dbbstation.trace.recording import Recording
+
+OF_RUN = ("session", "test", "direction", "repeat", "mounting", "state", "started")
+"""Columns that are the same in all rows of a run."""
+
+ANGLE, DEVIATION = "angle_deg", "deviation_um"
+"""Columns that are computed: the angle of samples on the turn, from 0 up to 360; length less the bar's of the plan."""
+
+MEANINGS = {
+    "session": "name of the session's folder",
+    "test": "test of the plan",
+    "direction": "sense of travel, seen from +Z: ccw or cw",
+    "repeat": "counts the runs of this test and direction",
+    "mounting": "counts how often a ball was put up; empty: one per test",
+    "state": "accepted, rejected, complete (not judged) or recording (broken off)",
+    "started": "when the first sample was taken",
+    ANGLE: "angle from +X towards +Y of samples on the full turn [deg]: as recorded, else by the plan's feed between the edges",
+    DEVIATION: "length_mm less the plan's length of the bar [µm]; no centre is taken off",
+    columns.STATUS: "what the instrument said of the sample; others than ok or empty are not used",
+    **{name: f"{column.meaning} [{column.unit}]" for name, column in columns.COLUMNS.items()},
+}
+"""What every column of the table is."""
+
+_WHOLE = frozenset({"repeat", "mounting"})
+
+
+@dataclass(frozen=True, eq=False)
+class Exporting:
+    """What is exported."""
+
+    runs: tuple[tuple[SessionFolder, RunEntry], ...]
+    names: tuple[str, ...]
+
+    def is_text(self, name: str) -> bool:
+        """Return whether a column has texts."""
+        return name not in _WHOLE and name not in {ANGLE, DEVIATION} and name not in columns.COLUMNS
+
+
+def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
+    """Return these runs with every column that any has.
+
+    Raises:
+        InputError: no run, or a file is no run.
+    """
+    faults: list[Problem] = []
+    found: dict[str, None] = {}
+    for _, run in runs:
+        found |= dict.fromkeys(split_head(run.path, faults))
+    if not runs:
+        faults.append(
+            Problem("export", 0, 0, "no run is left to be exported", "exclude fewer tests, or give another --states")
+        )
+    if faults:
+        raise InputError(faults)
+    known = [
+        name for name in columns.COLUMNS if name in found and name not in {columns.TIME, columns.THETA, columns.LENGTH}
+    ]
+    others = [name for name in found if name not in columns.COLUMNS and name != columns.CRC]
+    # A column of the file that is named like one of ours would stand there twice.
+    clear = [name for name in others if name not in {*OF_RUN, ANGLE, DEVIATION}]
+    names = (*OF_RUN, columns.TIME, columns.THETA, ANGLE, columns.LENGTH, DEVIATION, *known, *clear)
+    return Exporting(tuple(runs), names)
+
+
+def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
+    """Return each sample's commanded angle on the full turn, 0 to 360, NaN for others, shape (n,) [deg].
+
+    Raises:
+        TraceError: neither angles nor edges of a circle.
+    """
+    if recording.theta_deg is not None:
+        return np.mod(recording.theta_deg, FULL_TURN_DEG)
+    phi = progress_deg(recording, circle, edges_of(recording, circle))
+    on_turn = (phi >= 0.0) & (phi < FULL_TURN_DEG)
+    return np.where(on_turn, np.mod(circle.theta_deg(phi), FULL_TURN_DEG), np.nan)
+
+
+def blocks(
+    what: Exporting, progress: Callable[[int, int], None], say: Callable[[str], None]
+) -> Iterator[dict[str, NDArray[np.float64] | list[str]]]:
+    """Yield the columns of each run: numbers with NaN for gaps, texts as lists.
+
+    Raises:
+        InputError: a run cannot be read.
+    """
+    for done, (session, run) in enumerate(what.runs):
+        progress(done, len(what.runs))
+        try:
+            read, circle = session.load(run), session.circle(run)
+        except InputError as error:
+            if run.state is not RunState.RECORDING:
+                raise
+            say(f"{session.name}: run {run.label} was broken off and is left out: {error.problems[0]}")
+            continue
+        recording, count = read.recording, len(read.recording)
+        try:
+            angle = angles_deg(recording, circle)
+        except TraceError as error:
+            say(f"{session.name}: run {run.label} has no {ANGLE}: {error.what}")
+            angle = np.full(count, np.nan)
+        none = np.full(count, np.nan)
+        said = {
+            "session": session.name,
+            "test": run.test,
+            "direction": run.direction.value,
+            "state": run.state.value,
+            "started": "" if run.started is None else run.started.isoformat(),
+        }
+        numbers = {
+            "repeat": np.full(count, float(run.repeat)),
+            "mounting": none if run.mounting is None else np.full(count, float(run.mounting)),
+            columns.TIME: recording.t_s,
+            columns.THETA: none if recording.theta_deg is None else recording.theta_deg,
+            ANGLE: angle,
+            columns.LENGTH: recording.length_mm,
+            DEVIATION: 1e3 * (recording.length_mm - circle.bar_mm),
+            **recording.logged,
+        }
+        texts = {columns.STATUS: read.status, **read.unknown_columns}
+        block: dict[str, NDArray[np.float64] | list[str]] = {}
+        for name in what.names:
+            if name in said:
+                block[name] = [said[name]] * count
+            elif what.is_text(name):
+                block[name] = list(texts.get(name) or [""] * count)
+            else:
+                block[name] = numbers.get(name, none)
+        yield block
+    progress(len(what.runs), len(what.runs))
+
+
+def write_csv(
+    path: Path,
+    what: Exporting,
+    provenance: Callable[[], Provenance],
+    progress: Callable[[int, int], None],
+    say: Callable[[str], None],
+    *,
+    force: bool,
+) -> int:
+    """Write the table as CSV with its provenance file; return the number of rows.
+
+    Numbers read back the same bits; gaps are empty cells.
+
+    Raises:
+        InputError: a run cannot be read.
+        OutputError: a file exists without `force`, or the disk refuses; nothing is replaced.
+    """
+    rows = 0
+    with streamed(path, force=force) as file:
+        file.write(csv_text([what.names]).encode())
+        for block in blocks(what, progress, say):
+            cells = [_cells(block[name], whole=name in _WHOLE) for name in what.names]
+            file.write(csv_text(zip(*cells, strict=True), exact=True).encode())
+            rows += len(cells[0])
+        told = {**provenance().data(), "columns": _meanings(what)}
+        write_text(beside_table(path), json.dumps(told, indent=1, ensure_ascii=False) + "\n", force=force)
+    return rows
+
+
+def write_parquet(
+    path: Path,
+    what: Exporting,
+    provenance: Callable[[], Provenance],
+    progress: Callable[[int, int], None],
+    say: Callable[[str], None],
+    *,
+    force: bool,
+) -> int:
+    """Write the table as Parquet, a row group per run, with provenance and meanings; return the number of rows.
+
+    Raises:
+        InputError: a run cannot be read.
+        OutputError: pyarrow is missing; or as `write_csv`.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
+        raise OutputError(
+            "Parquet is written by pyarrow, which is not installed", where=str(path), remedy=remedy
+        ) from error
+
+    def kind(name: str) -> pa.DataType:
+        if what.is_text(name):
+            return pa.string()
+        return pa.int64() if name in _WHOLE else pa.float64()
+
+    meanings = _meanings(what)
+    schema = pa.schema([pa.field(name, kind(name), metadata={"meaning": meanings[name]}) for name in what.names])
+    rows = 0
+    with streamed(path, force=force) as file, parquet.ParquetWriter(file, schema) as writer:
+        for block in blocks(what, progress, say):
+            arrays = [pa.array(block[name], from_pandas=True, safe=False).cast(kind(name)) for name in what.names]
+            table = pa.Table.from_arrays(arrays, schema=schema)
+            writer.write_table(table, row_group_size=max(len(table), 1))
+            rows += len(table)
+        writer.add_key_value_metadata({"dbbstation": json.dumps(provenance().data(), ensure_ascii=False)})
+    return rows
+
+
+def _meanings(what: Exporting) -> Mapping[str, str]:
+    return {
+        name: MEANINGS.get(name, "a column of the run files that this program does not know") for name in what.names
+    }
+
+
+def _cells(values: NDArray[np.float64] | list[str], *, whole: bool) -> list[object]:
+    if isinstance(values, list):
+        return list(values)
+    if whole:
+        return ["" if value != value else int(value) for value in values.tolist()]  # noqa: PLR0124 - NaN is not itself
+    return ["" if value != value else value for value in values.tolist()]  # noqa: PLR0124

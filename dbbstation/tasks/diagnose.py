@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import CalibrationError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Names, Option, task
+from dbbstation.tasks.declare import Names, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

@@ -58,7 +58,7 @@ def main() -> None:
     peer = timed(partial(curves, data), 3)
     found: list[Mismatch] = []
     once = timed(lambda: found.append(find_mismatch(data, hold_out=False)), calls)
-    families = {finding.family for finding in found[-1].there}
+    families = {finding.form for finding in found[-1].there}
     if not {"hysteresis", "wave"} <= {str(family) for family in families}:
         raise SystemExit(f"found {families}: this is not the work that was to be measured")
     whole = timed_once(lambda: find_mismatch(data))

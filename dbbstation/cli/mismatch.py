@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.errors import OutputError
-    from dbbstation.results.mismatch import EffectResult, MismatchResult
+    from dbbstation.inference.read_off import CauseFinding
+    from dbbstation.results.mismatch import MismatchResult
     from dbbstation.results.simulator import SimulatorResult
 
 
@@ -147,7 +148,7 @@ def _print_whether(result: MismatchResult) -> None:
     echo(f"noise of one row: {noise.sigma:.3g} {unit}{alike}{fitted}")
 
 
-def _print_findings(there: Sequence[EffectResult], unit: str) -> None:
+def _print_findings(there: Sequence[CauseFinding], unit: str) -> None:
     from dbbstation.cli.output import print_table
 
     tested = any(f.gains for f in there)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Mapping  # noqa: TC003 - types of fields are read when results are written
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.by_level import VerdictsByLevel
@@ -51,12 +53,12 @@ class Span:
     unit: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CauseFinding:
     """Finding on one cause.
 
     Attributes:
-        family: None for a law.
+        form: family; None for a law.
         rms: beyond the base, over its rows; in the residual's unit.
         sigmas: norm over standard deviation.
         confounded: R² of the effect on base parameters.
@@ -74,27 +76,27 @@ class CauseFinding:
 
     name: str
     verdict: Verdict
-    family: Family | None
-    label: str
-    variables: tuple[str, ...]
-    probability: float
-    log_factor: float
-    rms: float
-    sigmas: float
-    whole_rms: float
-    confounded: float
-    values: dict[str, Value]
-    spans: tuple[Span, ...]
-    rows: tuple[tuple[int, int], ...]
-    blocks: tuple[float, ...]
-    rows_there: int = 0
+    acts: Acts = Acts.ALWAYS
+    persists: bool = False
+    recurs: bool = False
+    gains: Gains | None = None
+    form: Family | None = None
+    variables: tuple[str, ...] = ()
+    probability: float = 0.0
+    log_bayes_factor: float = 0.0
+    rms: float = 0.0
+    sigmas: float = 0.0
+    confounded: float = 0.0
+    values: Mapping[str, Value] = field(default_factory=dict)
+    spans: tuple[Span, ...] = ()
+    rows_there: float = 0
+    rows: tuple[tuple[int, int], ...] = ()
+    blocks: Mapping[str, float] = field(default_factory=dict)
     equivalent: tuple[str, ...] = ()
     ambiguous_with: tuple[str, ...] = ()
     text: str = ""
-    acts: Acts = Acts.ALWAYS
-    gains: Gains | None = None
-    persists: bool = False
-    recurs: bool = False
+    label: Annotated[str, Kept] = ""
+    whole_rms: Annotated[float, Kept] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,14 +177,12 @@ class CauseJudge:
         """Return a finding per cause and refused law, present ones first, by size."""
         found = [self.finding(cause) for cause in self._settled.causes]
         found += [self._refused(name, why) for name, why in self._settled.refused.items()]
-        return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
+        return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_bayes_factor)))
 
     def _refused(self, name: str, why: str) -> CauseFinding:
         """Return the finding of an impossible law."""
-        blocks = (0.0,) * len(self._settled.channel.blocks)
-        return CauseFinding(
-            name, Verdict.RULED_OUT, None, "", (), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {}, (), (), blocks, text=why
-        )
+        blocks = dict.fromkeys(self._settled.channel.names, 0.0)
+        return CauseFinding(name=name, verdict=Verdict.RULED_OUT, blocks=blocks, text=why)
 
     def finding(self, cause: Cause) -> CauseFinding:
         """Return the finding on a cause."""
@@ -215,11 +215,11 @@ class CauseJudge:
         return CauseFinding(
             name=cause.name,
             verdict=verdict,
-            family=pattern.family if pattern else law.family if law else None,
+            form=pattern.family if pattern else law.family if law else None,
             label=shown.variant.label,
             variables=tuple(v.name for v in variables),
             probability=probability,
-            log_factor=gain,
+            log_bayes_factor=gain,
             rms=beyond,
             sigmas=sigmas,
             whole_rms=whole,
@@ -228,7 +228,9 @@ class CauseJudge:
             spans=tuple(_span(v.values[largest], v.name, v.unit) for v in variables) if there else (),
             rows_there=int(largest.sum()),
             rows=rows,
-            blocks=tuple(rms(effect[rows] - effect.mean()) for rows in channel.blocks) if there else (),
+            blocks={n: rms(effect[r] - effect.mean()) for n, r in zip(channel.names, channel.blocks, strict=True)}
+            if there
+            else {},
             equivalent=equal if len(equal) > 1 else (),
             ambiguous_with=others,
             text=text,

@@ -10,6 +10,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dbbstation.diagnosis.table.mismatch import RefittedParameter
+from dbbstation.diagnosis.table.next_measurement import Next
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.files.provenance import Provenance, write_table
@@ -18,8 +19,7 @@ from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
-from dbbstation.inference.read_off import Span
-from dbbstation.inference.verdict import Gains
+from dbbstation.inference.read_off import CauseFinding
 from dbbstation.results.frame import Framed, picked
 from dbbstation.results.levels_text import level_sentences
 
@@ -99,49 +99,6 @@ class HeldOutRms:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EffectResult:
-    """What was found of one effect.
-
-    Attributes:
-        persists: a single event that other parts confirm.
-        form: family; None for own physics.
-        confounded: R² on the parameters.
-        rows: first and last of a single event.
-        blocks: size in each run, by name.
-    """
-
-    name: str
-    verdict: str
-    acts: str
-    persists: bool
-    recurs: bool
-    gains: Gains | None
-    form: str | None
-    variables: tuple[str, ...]
-    probability: float
-    log_bayes_factor: float
-    rms: float
-    sigmas: float
-    confounded: float
-    values: Mapping[str, Value]
-    spans: tuple[Span, ...]
-    rows_there: float
-    rows: tuple[tuple[int, ...], ...]
-    blocks: Mapping[str, float]
-    equivalent: tuple[str, ...]
-    ambiguous_with: tuple[str, ...]
-    text: str
-
-
-@dataclass(frozen=True)
-class NextMeasurement:
-    """What to measure next."""
-
-    text: str
-    variables: tuple[str, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
 class MismatchResult(Framed):
     """Findings in a table of measured and simulated values.
 
@@ -164,10 +121,10 @@ class MismatchResult(Framed):
     held_out: str
     held_out_rms: HeldOutRms | None
     cancelling: Cancelling | None
-    findings: tuple[EffectResult, ...]
+    findings: tuple[CauseFinding, ...]
     parameters: tuple[RefittedParameter, ...]
     left: LeftOver
-    next: tuple[NextMeasurement, ...]
+    next: tuple[Next, ...]
     not_asked: Mapping[str, str]
     stopped: str
     corrected: Annotated[str | None, Absent] = None

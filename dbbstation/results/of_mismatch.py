@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
 from dbbstation.results.mismatch import (
-    EffectResult,
     HeldOutRms,
     MismatchResult,
-    NextMeasurement,
     NoiseResult,
     OffsetResult,
     ResidualRms,
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from dbbstation.diagnosis.table.mismatch import Mismatch
-    from dbbstation.inference.read_off import CauseFinding
 
 
 def mismatch_result(
@@ -51,10 +49,10 @@ def mismatch_result(
         held_out="not-tested" if found.held_out is None else "tested",
         held_out_rms=_held_out(found),
         cancelling=found.cancelling,
-        findings=tuple(_effect(found, finding) for finding in found.findings),
+        findings=tuple(replace(one, text=sentence_of(found, one)) for one in found.findings),
         parameters=found.fitted,
         left=found.left,
-        next=tuple(NextMeasurement(step.text, tuple(step.variables)) for step in next_measurements(found)),
+        next=next_measurements(found),
         not_asked=found.lacking,
         stopped=found.stopped,
         table={} if table is None else table,
@@ -93,29 +91,3 @@ def _held_out(found: Mismatch) -> HeldOutRms | None:
     if held_out is None:
         return None
     return HeldOutRms(held_out.as_simulated, held_out.before, held_out.after, found.is_worse, held_out.folds)
-
-
-def _effect(found: Mismatch, finding: CauseFinding) -> EffectResult:
-    return EffectResult(
-        name=finding.name,
-        verdict=str(finding.verdict),
-        acts=finding.acts.name.lower(),
-        persists=finding.persists,
-        recurs=finding.recurs,
-        gains=finding.gains,
-        form=None if finding.family is None else str(finding.family),
-        variables=tuple(finding.variables),
-        probability=finding.probability,
-        log_bayes_factor=finding.log_factor,
-        rms=finding.rms,
-        sigmas=finding.sigmas,
-        confounded=finding.confounded,
-        values=finding.values,
-        spans=tuple(one for one in finding.spans),
-        rows_there=finding.rows_there,
-        rows=tuple(tuple(rows) for rows in finding.rows),
-        blocks=dict(zip(found.table.names, finding.blocks, strict=True)) if finding.blocks else {},
-        equivalent=tuple(finding.equivalent),
-        ambiguous_with=tuple(finding.ambiguous_with),
-        text=sentence_of(found, finding),
-    )

@@ -81,7 +81,7 @@ def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
         form=str(term.form) if term else one.name.split(" of ")[0].split(" at ")[0],
         put_in=term is not None,
         probability=one.probability,
-        log_bayes_factor=one.log_factor,
+        log_bayes_factor=one.log_bayes_factor,
         rms=one.rms,
         sigmas=one.sigmas,
         confounded=one.confounded,

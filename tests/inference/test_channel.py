@@ -129,7 +129,7 @@ def test_several_pulses_are_found() -> None:
         return 0.3 * np.sum([(row >= k) & (row < k + 40) for k in starts], axis=0)
 
     found = there(read_by_levels(settle(channel(table(9, pulses))))).values()
-    assert {finding.family for finding in found} == {"pulses"}
+    assert {finding.form for finding in found} == {"pulses"}
     rows = sorted(stretch for finding in found for stretch in finding.rows)
     assert len(rows) == len(starts)
     assert np.abs(np.array([first for first, _ in rows]) - starts).max() <= 3
@@ -157,7 +157,7 @@ def test_sizes_lie_within_their_uncertainty(seeds: int) -> None:
 
 def test_a_wave_is_found_with_its_period() -> None:
     found = there(read_by_levels(settle(channel(table(3, lambda d: 0.1 * np.sin(2.0 * np.pi * d.q / 7.3))))))
-    (wave,) = [finding for finding in found.values() if finding.family == "wave"]
+    (wave,) = [finding for finding in found.values() if finding.form == "wave"]
     assert wave.variables == ("q",)
     assert float(wave.name.split("period ")[1].split()[0]) == pytest.approx(7.3, rel=0.01)
     assert float(np.hypot(*(v.value for v in wave.values.values()))) == pytest.approx(0.1, abs=0.02)

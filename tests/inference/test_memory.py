@@ -110,7 +110,7 @@ def test_a_first_order_memory_is_named_with_its_time_constant(seed, at_once):
         value = finding.values[name]
         assert abs(value.value - true) < 3.0 * value.uncertainty
         assert value.uncertainty < 0.2 * true
-    assert {one.name for one in found.there if one.family != "wave"} == {"memory of load_n"}
+    assert {one.name for one in found.there if one.form != "wave"} == {"memory of load_n"}
 
 
 @pytest.mark.slow

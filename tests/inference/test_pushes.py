@@ -50,7 +50,7 @@ def test_rounding_of_a_slow_value_is_no_event():
         least_noise=0.25 / np.sqrt(12.0),
     )
     found = read_by_levels(settle(rounded, thorough=False))
-    assert not [one.name for one in found if one.verdict is Verdict.HAPPENED and one.family == "pulses"]
+    assert not [one.name for one in found if one.verdict is Verdict.HAPPENED and one.form == "pulses"]
 
 
 @pytest.mark.parametrize("equal", [True, False])
@@ -61,7 +61,7 @@ def test_a_dozen_pulses_happened_only_where_they_are_of_one_size(equal):
     pulses = np.repeat(heights, 50) * (np.arange(600) % 50 >= 30)
     settled = settle(replace(whole, residual=whole.residual + pulses), thorough=False)
     found = [one for one in read_by_levels(settled) if one.name in settled.best.names]
-    in_time = [one for one in found if one.family == "pulses"]
+    in_time = [one for one in found if one.form == "pulses"]
     assert sum(len(one.values) for one in in_time) >= 10
     wanted = Verdict.HAPPENED if equal else Verdict.AMBIGUOUS
     assert {one.verdict for one in in_time} == {wanted}

@@ -96,8 +96,8 @@ class Verdicts(CauseJudge):
         for one in self._raw:
             if self._source_of[one.name] or one.name not in sure or one.sigmas < OUT:
                 continue
-            if one.family is Family.BLOCKS:
-                which = 1.0 + float(np.argmax(one.blocks))
+            if one.form is Family.BLOCKS:
+                which = 1.0 + float(np.argmax([*one.blocks.values()]))
                 text = f"offset of {one.label}" if one.label else "offset of each recording"
                 found.append(
                     UnexplainedForce(
@@ -108,7 +108,7 @@ class Verdicts(CauseJudge):
             if not one.spans:
                 continue
             span = one.spans[0]
-            turns = one.family in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
+            turns = one.form in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
             variable = f"{span.variable} by direction" if turns else span.variable
             found.append(UnexplainedForce(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
         return tuple(sorted(found, key=lambda e: -e.rms_n))
@@ -168,17 +168,17 @@ class Verdicts(CauseJudge):
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
         there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
-        best = max(there or own, key=lambda f: f.log_factor, default=None)
+        best = max(there or own, key=lambda f: f.log_bayes_factor, default=None)
         verdict, alike, text = self._said(source, own, there)
         ends = self._at_end(there)
         beyond = (f"{name} is at the end of what is tried, {span}: it may lie beyond." for name, span in ends.items())
-        pulses = [f for f in there if f.family is Family.PULSES]
+        pulses = [f for f in there if f.form is Family.PULSES]
         parts = tuple(part for f in there if f not in pulses for part in self._parts(f))
         told = bool(pulses) and distinct_pushes(self._pulses) <= MOST_PUSHES
         complement = self._complement if told else None
         text = " ".join([text, *beyond, *([] if complement is None else [_in_words(complement)])])
         parameters = self._values_found(best) if best is not None else {}
-        if len(there) > 1 and best is not None and best.family is None:
+        if len(there) > 1 and best is not None and best.form is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values_found(f).items()}
         gains = None if self._held is None else self._held.gains.get(source.name, Gains(()))
         return DriveFinding(
@@ -186,7 +186,7 @@ class Verdicts(CauseJudge):
             verdict=verdict,
             probability=self._probability(own) * (self._edges.pushed if pulses else 1.0),
             ambiguous_with=alike,
-            gain=best.log_factor if best is not None else 0.0,
+            gain=best.log_bayes_factor if best is not None else 0.0,
             concealed=best.confounded if best is not None else 0.0,
             signature_rms_n=best.whole_rms if best is not None else 0.0,
             unconcealed_rms_n=best.rms if best is not None else 0.0,
@@ -328,7 +328,7 @@ class Verdicts(CauseJudge):
     def _values_found(self, finding: CauseFinding) -> dict[str, Value]:
         if finding.name in self._drive.of_law and finding.name in self._members:
             return self._explained.after.parameters(finding.name)
-        return finding.values if finding.family is None else {}
+        return finding.values if finding.form is None else {}
 
     def _parts(self, finding: CauseFinding) -> list[CausePart]:
         if finding.name in self._drive.of_law:

@@ -192,7 +192,7 @@ def _said(
     levels = levels_of(settled, left, gains, held_out, matters)
     read = read_off(settled, Trial(held_out, refits), levels)
     findings = tuple(_judged(one, found, nonlinear, open_to) for one in read)
-    findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor)))
+    findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_bayes_factor)))
     return SimulatorComparison(
         model=nodes.work.model,
         base=base,

@@ -43,9 +43,9 @@ MEANINGS: dict[Family, str] = {
 def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
     """Return place, possible meaning and resemblance of an effect."""
     parts = [_where(found, finding)]
-    if finding.family is not None:
-        parts.append(MEANINGS[finding.family])
-        if finding.family is Family.PRODUCT and finding.label:
+    if finding.form is not None:
+        parts.append(MEANINGS[finding.form])
+        if finding.form is Family.PRODUCT and finding.label:
             parts.append(f"Its factors are zero at {finding.label.removeprefix('about ')}.")
         if finding.acts is Acts.ONCE:
             parts.append(PERSISTS if finding.persists else RECURS if finding.recurs else HAPPENED)
@@ -75,9 +75,9 @@ def _where(found: Mismatch, finding: CauseFinding) -> str:
     spans = [f"{span.variable} {span.low:.4g} to {span.high:.4g} {span.unit}".strip() for span in finding.spans]
     text = f"Largest at {', '.join(spans)}, in {finding.rows_there} of {len(table)} rows." if spans else ""
     if len(finding.blocks) > 1:
-        worst = int(np.argmax(finding.blocks))
-        if finding.blocks[worst] > 2.0 * float(np.median(finding.blocks)):
-            text += f" Most in {table.names[worst]}."
+        worst, most = max(finding.blocks.items(), key=lambda one: one[1])
+        if most > 2.0 * float(np.median([*finding.blocks.values()])):
+            text += f" Most in {worst}."
     return text
 
 

@@ -140,7 +140,8 @@ def test_play_and_temperature_together(tmp_path):
 def test_two_files_are_two_blocks_and_an_effect_of_one_is_placed_there(tmp_path):
     found = found_in(tmp_path, Truth(), Truth(pulse_um=15.0))
     (finding,) = found.there
-    assert finding.blocks[1] > 5.0 * finding.blocks[0]
+    first, second = finding.blocks.values()
+    assert second > 5.0 * first
     text = next(f.text for f in mismatch_result(found).findings if f.name == finding.name)
     assert "of run4.csv" in text
 

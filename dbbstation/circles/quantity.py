@@ -26,3 +26,6 @@ ABSOLUTE = frozenset(
     {BudgetQuantity.F_MAX, BudgetQuantity.F_MIN, BudgetQuantity.RADIUS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.D}
 )
 """Figures that rest on the bar's length, not on its changes alone."""
+
+FIRST = 2
+"""The first undulation that is form: one per revolution is the centre."""

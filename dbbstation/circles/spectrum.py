@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.circles.quantity import FIRST
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, coefficients
 
 if TYPE_CHECKING:
@@ -45,7 +46,3 @@ def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
     amplitude = np.sqrt(2.0 / count) * np.hypot(found[1 : highest + 1], found[highest + 1 :])
     noise_um = 2.0 * one.noise.slow_um / float(np.sqrt(count))
     return FormSpectrum(np.arange(FIRST, highest + 1), amplitude[FIRST - 1 :], noise_um)
-
-
-FIRST = 2
-"""The first undulation that is form: one per revolution is the centre."""

@@ -2,54 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import names_of_tests
+from dbbstation.diagnosis.drawn import GainOfTest, Trace
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.average import by_angle
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.findings import Diagnosis
-    from dbbstation.plan.circle import Direction
 
 TRACE_SECTORS = 360
 """Points of a trace: means of a degree."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """One run by rising angle, shape (s,) each.
-
-    Attributes:
-        theta_deg: from +X towards +Y.
-    """
-
-    direction: Direction
-    theta_deg: NDArray[np.float64]
-    measured_um: NDArray[np.float64]
-    before_um: NDArray[np.float64]
-    after_um: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class GainOfTest:
-    """One test, all its runs together."""
-
-    name: str
-    residual_um: tuple[float, float]
-    circularity_um: tuple[float, float]
-    traces: tuple[Trace, ...]
-
-    @property
-    def gain_um(self) -> float:
-        """Return the reduction [µm]."""
-        return self.residual_um[0] - self.residual_um[1]
 
 
 def gains_by_test(diagnosis: Diagnosis) -> tuple[GainOfTest, ...]:

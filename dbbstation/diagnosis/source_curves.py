@@ -13,6 +13,7 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.discrepancy import BY_DIRECTION
+from dbbstation.diagnosis.drawn import Branch, SourceCurves
 from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
@@ -50,43 +51,6 @@ UNITS = {
 
 SENSES = {1.0: "lengthening", -1.0: "shortening"}
 """Names of the branches of what hangs on the direction of travel."""
-
-
-@dataclass(frozen=True, eq=False)
-class Branch:
-    """One curve over pieces, shape (b,) each.
-
-    Attributes:
-        sense: `lengthening` or `shortening`, or empty.
-        model_um: mean error by the source.
-        before_um: strut error that explains the base residual; NaN if hardly measured.
-        after_um: the model's plus the joint residual's; NaN if hardly measured.
-    """
-
-    sense: str
-    variable: NDArray[np.float64]
-    model_um: NDArray[np.float64]
-    before_um: NDArray[np.float64]
-    after_um: NDArray[np.float64]
-    sigma_um: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SourceCurves:
-    """One source.
-
-    Attributes:
-        source: empty for the unmodelled residual.
-        fine: may change between pieces, as a wave.
-        reading: if no strut moves.
-    """
-
-    source: str
-    variable: str
-    unit: str
-    fine: bool
-    struts: tuple[tuple[Branch, ...], ...]
-    reading: tuple[Branch, ...]
 
 
 @dataclass(frozen=True, eq=False)

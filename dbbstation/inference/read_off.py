@@ -87,7 +87,7 @@ class CauseFinding:
     rms: float = 0.0
     sigmas: float = 0.0
     confounded: float = 0.0
-    values: Mapping[str, Value] = field(default_factory=dict)
+    values: dict[str, Value] = field(default_factory=dict)
     spans: tuple[Span, ...] = ()
     rows_there: float = 0
     rows: tuple[tuple[int, int], ...] = ()

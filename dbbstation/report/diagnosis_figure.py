@@ -10,8 +10,6 @@ import numpy as np
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import residual_map
-from dbbstation.diagnosis.per_test import gains_by_test
-from dbbstation.diagnosis.source_curves import found_sources, source_curves
 from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, ShownFigure, draw_maps, in_style
@@ -26,9 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
+    from dbbstation.diagnosis.drawn import Branch, GainOfTest, SourceCurves
     from dbbstation.diagnosis.findings import Diagnosis
-    from dbbstation.diagnosis.per_test import GainOfTest
-    from dbbstation.diagnosis.source_curves import Branch, SourceCurves
     from dbbstation.inference.levels import Followed
 
 WIDTH_IN = 11.0
@@ -40,11 +37,13 @@ MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def diagnosis_figure(diagnosis: Diagnosis, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
+def diagnosis_figure(
+    diagnosis: Diagnosis, gains: Sequence[GainOfTest], curves: Sequence[SourceCurves], wanted: Wanted = FigureFormat.SVG
+) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw maps, errors over their variables, traces and gains, as SVG."""
     with in_style():
         if isinstance(wanted, OnePanel):
-            gains, found = gains_by_test(diagnosis), diagnosis.after is not diagnosis.before
+            found = diagnosis.after is not diagnosis.before
             draw = partial(_pairs, names=[one.name for one in gains], found=found)
             return wanted.draw(
                 {
@@ -53,18 +52,18 @@ def diagnosis_figure(diagnosis: Diagnosis, wanted: Wanted = FigureFormat.SVG) ->
                     "levels": partial(_levels, classes=_tested(diagnosis)),
                 }
             )
-        return in_format(draw_diagnosis(diagnosis), wanted)
+        return in_format(draw_diagnosis(diagnosis, gains, curves), wanted)
 
 
-def draw_diagnosis(diagnosis: Diagnosis) -> ShownFigure:
+def draw_diagnosis(diagnosis: Diagnosis, gains: Sequence[GainOfTest], curves: Sequence[SourceCurves]) -> ShownFigure:
     """Draw all non-empty parts, one below the other."""
     found = diagnosis.after is not diagnosis.before
-    curves, gains, unnamed = source_curves(diagnosis), gains_by_test(diagnosis), diagnosis.unexplained.curve
+    unnamed = diagnosis.unexplained.curve
     classes = _tested(diagnosis)
     own = [1.0 + 2.0 * ROW_IN * len(classes)] if classes else []
     heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), *([2.1] if unnamed else []), 4.6, 2.4, *own]
     figure = ShownFigure(figsize=(WIDTH_IN, sum(heights) + 0.4), layout="constrained")
-    figure.suptitle(_headline(diagnosis), fontsize=11, fontweight="bold")
+    figure.suptitle(_headline(diagnosis, [one.source for one in curves if one.source]), fontsize=11, fontweight="bold")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, hspace=0.03)
     _maps(parts[0], diagnosis, found=found)
     for part, one in zip(parts[1:], curves, strict=False):
@@ -95,11 +94,10 @@ def _levels(axes: Axes, classes: Sequence[Followed]) -> None:
     axes.legend(loc="lower right")
 
 
-def _headline(diagnosis: Diagnosis) -> str:
+def _headline(diagnosis: Diagnosis, modelled: Sequence[str]) -> str:
     if not diagnosis.mismatch:
         return "The recordings agree with the kinematic model"
     told = [s for s in diagnosis.sources if s.verdict.rank <= Verdict.AMBIGUOUS.rank]
-    modelled = found_sources(diagnosis)
     # What is only mistaken for one of them stands in the table, and may be many.
     named = [f"{s.name} ({s.verdict})" for s in told if s.name in modelled or not modelled]
     return "Found: " + ", ".join(named) if named else diagnosis.unexplained.text

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from dbbstation.circles.budget import budget_of
-from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
 from dbbstation.report.drawing import AFTER, BEFORE, in_style
@@ -294,6 +292,6 @@ def _drawn(one: MeasuredCircle) -> DrawnCircle:
     if one.analysis is None:
         raise ValueError("a run without a circle is on no sheet")
     x, y = one.analysis.centre_mm
-    g = budget_of(one.analysis, BudgetQuantity.G, one.known)
+    g = one.budget()
     name = (one.session, one.entry.test, str(one.entry.direction), one.entry.repeat)
     return DrawnCircle(*name, g_um=g.value_um, u_g_um=g.u_um, centre_um=PlaneVector(1e3 * x, 1e3 * y))

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from matplotlib.patches import Circle as Ring
 
-from dbbstation.circles.budget import budget_of
-from dbbstation.circles.quantity import BudgetQuantity
-from dbbstation.circles.spectrum import FIRST, spectrum_of
+from dbbstation.circles.quantity import FIRST
 from dbbstation.plan.circle import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
 from dbbstation.report.label_places import Box
@@ -108,7 +106,7 @@ def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence
 
 def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> None:
     """Draw undulation amplitudes, and noise."""
-    spectra = [(one.analysis, spectrum_of(one.analysis), thin) for one, thin in drawn if one.analysis is not None]
+    spectra = [(one.analysis, one.spectrum, thin) for one, thin in drawn if one.analysis is not None]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
     noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")
     subtitle = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
@@ -162,11 +160,7 @@ def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
 
 def _figures(drawn: Sequence[Drawn]) -> str:
     last = [one for one, thin in drawn if not thin and one.analysis is not None]
-    return ", ".join(
-        f"{budget_of(one.analysis, BudgetQuantity.G, one.known).value_um:.1f} {str(one.entry.direction).upper()}"
-        for one in last
-        if one.analysis
-    )
+    return ", ".join(f"{one.budget().value_um:.1f} {str(one.entry.direction).upper()}" for one in last)
 
 
 def _style(analysis: CircleAnalysis, *, thin: bool) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.circles.budget import budget_of
 from dbbstation.circles.quantity import BudgetQuantity
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
             analysis.residual_um,
             str(one.entry.direction),
             f"{'before ' if former else ''}{str(one.entry.direction).upper()} {one.entry.repeat}",
-            f"{'before: ' if former else ''}{one.entry.label}: G {budget_of(analysis, BudgetQuantity.G_LS, one.known).value_um:.1f} µm",
+            f"{'before: ' if former else ''}{one.entry.label}: G {one.budget(BudgetQuantity.G_LS).value_um:.1f} µm",
             former=former,
             thin=thin,
         )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.circles.analysis import EDITION
-from dbbstation.circles.budget import budgets, pair_budgets
+from dbbstation.circles.budget import budget_of, budgets, pair_budgets
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
+from dbbstation.circles.spectrum import spectrum_of
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
@@ -27,8 +29,9 @@ from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
-    from dbbstation.circles.budget import SetUpKnowledge
+    from dbbstation.circles.budget import Budget, SetUpKnowledge
     from dbbstation.circles.path import Filter
+    from dbbstation.circles.spectrum import FormSpectrum
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.quality.finding import Finding
@@ -50,6 +53,21 @@ class MeasuredCircle:
     problem: str
     known: SetUpKnowledge
     judgement: Judgement | None
+
+    def budget(self, quantity: BudgetQuantity = BudgetQuantity.G) -> Budget:
+        """Return a figure of the circle with its uncertainty."""
+        return budget_of(self._analysed, quantity, self.known)
+
+    @cached_property
+    def spectrum(self) -> FormSpectrum:
+        """Return the circle's undulations."""
+        return spectrum_of(self._analysed)
+
+    @property
+    def _analysed(self) -> CircleAnalysis:
+        if self.analysis is None:
+            raise ValueError("a run without a circle has no figures")
+        return self.analysis
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,7 +133,9 @@ def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
 
 
 def _drawn(diagnosis: Diagnosis, wanted: object) -> Any:  # noqa: ANN401 - as asked for
+    from dbbstation.diagnosis.per_test import gains_by_test
+    from dbbstation.diagnosis.source_curves import source_curves
     from dbbstation.report.diagnosis_figure import diagnosis_figure
     from dbbstation.report.figure_format import figure_format
 
-    return diagnosis_figure(diagnosis, figure_format(wanted))
+    return diagnosis_figure(diagnosis, gains_by_test(diagnosis), source_curves(diagnosis), figure_format(wanted))

@@ -1,4 +1,4 @@
-"""What the figure of a diagnosis shows: curves of causes, gains of tests."""
+"""Curves of causes and gains of tests, for the figure of a diagnosis."""
 
 from __future__ import annotations
 

@@ -13,6 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.files.inputs import note_input
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -93,6 +95,7 @@ def _kept(task: Callable[..., Any], folder: Path) -> Callable[..., Any]:
                     _HERE[place] = told, answer
                     return _told(told, more, answer)
         told, answer = pickle.loads(place.read_bytes())  # noqa: S301 - written above
+        _note_files((*words, *wanted.values()))
         return _told(told, more, answer)
 
     ask.kept_in = folder
@@ -103,6 +106,14 @@ def _told(told: list[str], more: dict[str, Any], answer: object) -> object:
     for text in told:
         more["say"](text)
     return answer
+
+
+def _note_files(values: tuple[object, ...]) -> None:
+    """Files count as read, as they do where the task reads them itself: outputs name them."""
+    for value in values:
+        for one in value if isinstance(value, tuple | list) else [value]:
+            if isinstance(one, str | Path) and one and Path(one).is_file():
+                note_input(Path(one), hashlib.sha256(Path(one).read_bytes()).hexdigest())
 
 
 def _request(value: object) -> object:

@@ -261,7 +261,8 @@ def _kind_of(one: TaskParameter) -> Any:  # noqa: ANN401 - a type of click
     if get_origin(kind) is Literal and not one.many:
         return click.Choice(get_args(kind))
     if kind is int:
-        return click.IntRange(*(None if end is None else int(end) for end in (option.least, option.most)))
+        lowest, highest = (None if end is None else int(end) for end in (option.least, option.most))
+        return click.IntRange(lowest, highest)
     if kind is float:
         least = option.above if option.least is None else option.least
         return Finite(least, option.most, min_open=option.above is not None)

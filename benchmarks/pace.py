@@ -47,7 +47,9 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 DEMO = ("demo", "--out", "{out}/demo")
 TESTS = ("-m", "pytest", "-q", "-p", "no:cacheprovider")
 
-_REPORT: dict[str, tuple[str, ...]] = {"report": ("report", "{session}", "--model", "{model}", "--out", "{out}/report.html")}
+_REPORT: dict[str, tuple[str, ...]] = {
+    "report": ("report", "{session}", "--model", "{model}", "--out", "{out}/report.html")
+}
 SAID_OTHERWISE: dict[str, dict[str, tuple[str, ...]]] = {"e461050": _REPORT, "f2b049e3": _REPORT}
 """By the beginning of a commit: command lines that have other words there."""
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.circles.analysis import analyse, analyse_pair
+from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.path import Filter
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.analysis import figures
@@ -197,3 +197,22 @@ def test_both_passes_of_the_overlap_show_drift():
 def test_a_recording_with_angles_has_no_overlap():
     recording = whole_run(flat)
     assert passes_of(replace(recording, theta_deg=np.zeros(len(recording))), CCW) is None
+
+
+def test_another_filter_changes_f_and_leaves_the_radius():
+    """An ellipse of ± 10 µm on a circle 7 µm too large, with a ripple above the cut-off: without it F is 17 and -3 µm."""
+
+    def form_um(theta):
+        return 7.0 + 10.0 * np.cos(2 * theta) + 3.0 * np.cos(60 * theta)
+
+    other = refiltered(analyse(measured(form_um)), Filter.UPR_30)
+    assert (other.f_centred.largest_um, other.f_centred.least_um) == pytest.approx((17.0, -3.0), abs=0.05)
+    assert (other.f_commanded.largest_um, other.f_commanded.least_um) == pytest.approx((17.0, -3.0), abs=0.05)
+    assert other.radius_error_um == pytest.approx(7.0, abs=0.01)
+
+
+def test_without_a_filter_a_path_passes_as_it_is():
+    theta_deg = np.linspace(0.0, 360.0, 500, endpoint=False)
+    values = 5.0 * np.cos(np.radians(40 * theta_deg))
+    np.testing.assert_array_equal(Filter.of_word("none").through(theta_deg, values), values)
+    assert np.abs(Filter.UPR_30.through(theta_deg, values)).max() < 1e-9

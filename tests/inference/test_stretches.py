@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import ndtr
+from scipy.stats import t as student_t
 
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
-from dbbstation.inference.coloured import Coloured
+from dbbstation.inference.coloured import Coloured, akaike_cost
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pieces import Fitting, Left, LeftBesideOthers
@@ -110,6 +111,20 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
         found.append(bank.log_likelihood())
     wanted = [dense(spread, level) for spread, level in cases]
     assert np.diff(found) == pytest.approx(np.diff(wanted), rel=1e-6)
+
+
+def test_the_likelihood_of_long_tails_is_that_of_students_t(rng):
+    """The gain over weighted normal rows and their part together, against SciPy's density of the same rows."""
+    bank = Bank(replace(made(0.3 * rng.standard_t(3.0, 400)), time=None))
+    bank.long_tails, bank.measures_beside_members = True, True
+    bank.measure(())
+    assert np.isfinite(bank.tails)
+    assert np.ptp(bank.trust) > 0.0
+    weighted = bank.beside().left(bank.target[:, None], bank._sizes(()))[:, 0] / bank.noise.innovation
+    found = bank.log_level() - 0.5 * float(weighted @ weighted) + bank.tails_beyond(())
+    rows = weighted / bank.trust * bank.noise.innovation
+    wanted = student_t.logpdf(rows, bank.tails, scale=bank.noise.innovation).sum() + 0.5 * len(rows) * np.log(2.0 * np.pi)
+    assert found == pytest.approx(wanted - akaike_cost(bank.noise.parameters + 1, len(rows)), abs=1e-6)
 
 
 @pytest.mark.parametrize("edges", [(37.5, np.inf), (38.5, np.inf), (-np.inf, 0.5), (12.2, 12.4), (30.0, 30.0)])

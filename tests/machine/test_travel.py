@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import TravelError
-from dbbstation.machine.travel import check_travel
+from dbbstation.machine.travel import check_travel, middle
 
 HOME = np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]])
 
@@ -18,6 +18,13 @@ def pose(**change):
 
 def test_the_middle_is_inside(reference):
     check_travel(reference, HOME, where="home")
+
+
+def test_the_middle_lies_on_the_axis_half_way_and_untilted(reference):
+    frames = middle(reference)
+    low, high = reference.travel.z_mm
+    np.testing.assert_allclose(frames.position_mm, [[0.0, 0.0, (low + high) / 2.0]])
+    np.testing.assert_allclose(frames.rotation, np.eye(3)[None], atol=1e-15)
 
 
 @pytest.mark.parametrize(

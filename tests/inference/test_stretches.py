@@ -123,7 +123,9 @@ def test_the_likelihood_of_long_tails_is_that_of_students_t(rng):
     weighted = bank.beside().left(bank.target[:, None], bank._sizes(()))[:, 0] / bank.noise.innovation
     found = bank.log_level() - 0.5 * float(weighted @ weighted) + bank.tails_beyond(())
     rows = weighted / bank.trust * bank.noise.innovation
-    wanted = student_t.logpdf(rows, bank.tails, scale=bank.noise.innovation).sum() + 0.5 * len(rows) * np.log(2.0 * np.pi)
+    wanted = student_t.logpdf(rows, bank.tails, scale=bank.noise.innovation).sum() + 0.5 * len(rows) * np.log(
+        2.0 * np.pi
+    )
     assert found == pytest.approx(wanted - akaike_cost(bank.noise.parameters + 1, len(rows)), abs=1e-6)
 
 

@@ -139,19 +139,6 @@ def test_every_module_of_it_is_imported(installed, tmp_path):
     assert Path(place.strip()).is_relative_to(installed.parent)
 
 
-def test_it_computes_and_writes_a_report(installed, tmp_path):
-    shipped_session = shipped(installed, tmp_path, "fixtures") / "sessions" / "small"
-    keep_compiled(shipped_session.parents[2])
-    done = run(installed, tmp_path, "dbbstation", "calibrate", shipped_session, "--out", "model.yaml")
-    assert done.returncode == 0, done.stderr
-    done = run(
-        installed, tmp_path, "dbbstation", "report", shipped_session, "--model", "model.yaml", "--page", "a.html"
-    )
-    assert done.returncode == 0, done.stderr
-    assert "<html" in (tmp_path / "a.html").read_text("utf-8")
-
-
-@pytest.mark.nightly  # `demo --quick` runs in tests/test_demo.py; `releasing.py try` runs it from the wheel, too
 def test_it_does_the_whole_job(installed, tmp_path):
     keep_compiled(shipped(installed, tmp_path, "protocols").parent)
     done = run(installed, tmp_path, "dbbstation", "demo", "--quick", "--out", "demo", timeout_s=900)

@@ -83,7 +83,6 @@ DRIVE = (
     Constant("diagnosis.drive.channel", "NEAR_STANDSTILL"),
     Constant("diagnosis.drive.signals", "MOST"),
     Constant("diagnosis.drive.pulses", "APART"),
-    Constant("diagnosis.drive.explain", "MOST_LOOKS"),
 )
 """Of `drive`."""
 

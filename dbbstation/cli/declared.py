@@ -106,7 +106,7 @@ def command(
     def run(**given: Any) -> None:  # noqa: ANN401 - each option has a type of its own
         from dbbstation.cli.output import print_result
 
-        as_json, own = given.pop("json"), {name: given.pop(name) for name in shown}
+        as_json, own = given.pop("as_json"), {name: given.pop(name) for name in shown}
         paths = {one: given.pop(one.name) for one in outputs}
         paths = {one: path for one, path in paths.items() if path is not None}
         force = bool(given.get("force") if with_force else given.pop("force", False))
@@ -128,7 +128,7 @@ def command(
     options += [one.option for one in outputs]
     if with_force or any(not one.folder for one in outputs):
         options.append(click.Option(["--force"], is_flag=True, help=o.FORCE.help))
-    options.append(click.Option(["--json"], is_flag=True, help=o.JSON.help))
+    options.append(click.Option(["--json", "as_json"], is_flag=True, help=o.JSON.help))
     options.sort(key=lambda one: isinstance(one, click.Option))
     return click.Command(task.name, params=options, callback=run, help=task.help)
 

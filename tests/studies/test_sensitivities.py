@@ -51,7 +51,7 @@ def test_what_changes_is_said_in_verdicts_and_uncertainties(answers, monkeypatch
 
 
 def test_only_what_is_asked_for_is_varied(answers, monkeypatch):
-    monkeypatch.setattr(asked, "DRIVE", (SHARE, Constant("diagnosis.drive.explain", "MOST_LOOKS")))
+    monkeypatch.setattr(asked, "DRIVE", (SHARE, Constant("diagnosis.drive.pulses", "APART")))
     found = study([(DRIVE, None)], [], 1, only=["METHOD_SHARE"])
     assert {one.constant for one in found} == {"diagnosis.drive.channel METHOD_SHARE"}
     assert len(answers) == 3
@@ -64,9 +64,10 @@ def test_a_constant_that_is_none_of_the_study_is_refused():
     assert "METHOD_SHARE" in outcome.output
 
 
-def test_whole_numbers_stay_whole_and_above_zero():
-    assert Constant("diagnosis.drive.explain", "MOST_LOOKS").tried == (1, 4)
+def test_whole_numbers_stay_whole_and_above_zero(monkeypatch):
     assert Constant("diagnosis.drive.channel", "STRONGEST").tried == (3, 12)
+    monkeypatch.setattr("dbbstation.diagnosis.drive.channel.STRONGEST", 1)
+    assert Constant("diagnosis.drive.channel", "STRONGEST").tried == (1, 2)
 
 
 def test_a_table_is_asked_by_the_constants_of_mismatch(monkeypatch, tmp_path):

@@ -57,8 +57,8 @@ def predict(
     r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
     Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
-    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that depends on undetermined parameters is left empty, with the reason in u_not_known_because; joint_tolerance_mm in the machine file
-    of the calibration bounds it.
+    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that depends on undetermined parameters is left empty, with the reason in u_not_known_because. A joint_tolerance_mm in the machine
+    file of the calibration bounds it.
 
     \b
     Examples:

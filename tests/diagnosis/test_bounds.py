@@ -12,6 +12,9 @@ from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
 from dbbstation.diagnosis.verdicts import _CircleJudge
+from dbbstation.inference.by_level import VerdictsByLevel
+from dbbstation.inference.levels import DifferenceFound, Differs, Followed, FollowsAnswer, Levels
+from dbbstation.inference.verdict import Acts
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
@@ -104,7 +107,11 @@ def _still(folder, *mechanisms):
 @pytest.mark.parametrize(("group", "verdict"), [((), Verdict.NOT_TESTABLE), (("backlash",), Verdict.AMBIGUOUS)])
 def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
     judge = object.__new__(_CircleJudge)
-    judge._levels, judge._classes, judge._rows = None, {"play": ("play",)}, "tests"
+    undecided = Followed((("strut-force",),), (), FollowsAnswer.UNDECIDED, 0.7, {}, 1.0, ("play",))
+    settled = SimpleNamespace(channel=SimpleNamespace(rows_are="tests"))
+    levels = Levels(DifferenceFound(Differs.YES, "", 1.0, 1.0, matters_stated=False, independent_samples=900.0, detectable=()), (undecided,), None)
+    judge._levels = VerdictsByLevel(settled, levels, {}, worse=False)
+    judge._classes, judge._rows, judge._acts = {"play": ("play",)}, "tests", lambda _: Acts.ALWAYS
     judge._joint = SimpleNamespace(unmodelled=SimpleNamespace(follows={}))
     judge._alternatives = SimpleNamespace(probability=lambda _: 0.7, ambiguity=lambda _: group)
     cause = SimpleNamespace(name="play")

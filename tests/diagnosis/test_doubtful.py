@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.diagnosis.diagnose import doubtful, judged
+from dbbstation.diagnosis.diagnose import doubtful, without_doubtful
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.diagnosis.levels import outcome_of
+from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.inference.alternatives import EVEN
@@ -42,9 +42,11 @@ def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_pa
     sources = sources_named(NAMES)
     explained = explain(recorded.machine, [thinned(one) for one in recorded.observations], sources, lambda _: None)
     # Which of the three stands in the most probable set is chance.
-    (doubted,) = doubtful(explained, judge(explained, outcome_of(explained)))
+    (doubted,) = doubtful(explained)
     assert doubted in NAMES[1:]
-    explained, findings = judged(explained)
+    explained = without_doubtful(explained)
+    outcome = outcome_of(explained)
+    findings = judge(explained, outcome, None, circle_levels(explained, outcome, None))
     modelled = {term.source.name for term in explained.settled.after.layout.terms} & set(NAMES)
     assert modelled == {"gravity"}
     found = {finding.name: finding for finding in findings}

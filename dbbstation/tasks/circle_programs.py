@@ -55,7 +55,7 @@ def program(
     r"""Write the NC programs of a plan's circles, one for each test and direction, nominal or compensated.
 
     Every program is checked against the travel of axes, angles and struts before anything is written; all programs
-    are written or none. A program goes above its first point and comes down to it. It waits for the bar to be put
+    are written or none. A program goes above its first point and comes down to it. The program waits for the bar to be put
     on, runs the path of a run and waits for the bar to be taken off.
 
     With --model programs are compensated. Their points are as far apart as the control needs for the feed, within --chord-um. If that is not

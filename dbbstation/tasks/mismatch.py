@@ -142,7 +142,7 @@ def mismatch(
     positions, loads, temperatures, the time. Units are at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
     Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
 
-    With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself. It says which
+    With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself. The answer says which
     term is missing at which port; --out has the missing terms as Python code. Simulations of the same files and
     values are kept in the user's cache folder and not run again, but with --anew. --table has the corrected simulation.
 

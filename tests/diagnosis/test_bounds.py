@@ -109,7 +109,11 @@ def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
     judge = object.__new__(_CircleJudge)
     undecided = Followed((("strut-force",),), (), FollowsAnswer.UNDECIDED, 0.7, {}, 1.0, ("play",))
     settled = SimpleNamespace(channel=SimpleNamespace(rows_are="tests"))
-    levels = Levels(DifferenceFound(Differs.YES, "", 1.0, 1.0, matters_stated=False, independent_samples=900.0, detectable=()), (undecided,), None)
+    levels = Levels(
+        DifferenceFound(Differs.YES, "", 1.0, 1.0, matters_stated=False, independent_samples=900.0, detectable=()),
+        (undecided,),
+        None,
+    )
     judge._levels = VerdictsByLevel(settled, levels, {}, worse=False)
     judge._classes, judge._rows, judge._acts = {"play": ("play",)}, "tests", lambda _: Acts.ALWAYS
     judge._joint = SimpleNamespace(unmodelled=SimpleNamespace(follows={}))

@@ -134,7 +134,10 @@ async def press(app: StationApp, *keys: str) -> None:
 
 async def accept(pilot: Pilot[None], app: StationApp) -> None:
     """Accept a run; sped up so much, something is wrong with one now and then: then for a reason."""
+    before = app.board.accepted
     await press(app, "a")
+    # A busy computer asks late.
+    await until(pilot, lambda: isinstance(app.screen, ReasonQuestion) or app.board.accepted != before)
     if isinstance(app.screen, ReasonQuestion):
         await press(app, "1")
         await until(pilot, lambda: not isinstance(app.screen, ReasonQuestion))

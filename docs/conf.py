@@ -79,7 +79,7 @@ def _last(name: str) -> str:
 
 def setup(app: Sphinx) -> None:
     """Write the pages that come from the code before any page is read."""
-    logging.getLogger("sphinx").setLevel(logging.INFO)  # a hundred thousand lines for debugging, shown to nobody
+    logging.getLogger("sphinx").setLevel(logging.INFO)  # its hundred thousand lines for debugging are not shown
     app.add_domain(PythonByLastName, override=True)
     app.connect("builder-inited", lambda _: generate.write_pages(HERE / "_generated"))
     app.connect("autodoc-skip-member", _of_others)

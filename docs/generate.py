@@ -32,7 +32,7 @@ DESCRIBED = {
     *("own", "results", "errors", "tasks", "machine", "plan", "trace"),
     *("circles", "model", "sources", "nc", "instrument", "simulators", "calibration"),
 }
-"""What scripts and own classes meet. Two thirds of the package are nobody else's; their docstrings are read in the source."""
+"""What scripts and own classes meet. The docstrings of other packages are read in the source."""
 
 _UNWRAPPED = "\b"
 

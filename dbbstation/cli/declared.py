@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import inspect
 import re
 from contextlib import contextmanager
@@ -133,22 +132,6 @@ def command(
     return click.Command(task.name, params=options, callback=run, help=task.help)
 
 
-def plain_command(function: Callable[..., Any], name: str = "", **more: Any) -> click.Command:  # noqa: ANN401 - as click has it
-    """Make a command of a function whose parameters have each an `Option`."""
-    options = options_of(function)
-
-    @functools.wraps(function)
-    def run(**given: Any) -> Any:  # noqa: ANN401 - the exit code
-        try:
-            return function(**{name: options[name].checked(value) for name, value in given.items()})
-        except ArgumentError as error:
-            raise _usage_error(error, options) from None
-
-    kind = more.pop("cls", click.Command)
-    name = name or function.__name__
-    return kind(name, params=[*map(option_of, options.values())], callback=run, help=function.__doc__, **more)
-
-
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
     """Run a task beside its progress bar; an `ArgumentError` becomes a usage error with the option's name."""
     from dbbstation.cli.output import say
@@ -161,15 +144,11 @@ def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]
             now = getattr(import_module(function.__module__), function.__name__)  # a test may have put another there
             return now(**{"progress": progress, "say": lambda text: say(f"note: {text}"), **asked})
     except ArgumentError as error:
-        raise _usage_error(error, task.parameters) from None
-
-
-def _usage_error(error: ArgumentError, options: Mapping[str, TaskParameter]) -> click.UsageError:
-    flags = {name: one.flag for name, one in options.items()}
-    what = f"{error.what}; {error.remedy}" if error.remedy else error.what
-    told = re.sub(r"`(\w+)`", lambda found: flags.get(found[1], found[0]), what)
-    at = "" if told.startswith("--") else f"{flags.get(error.where, '')}: "
-    return click.UsageError(f"{at}{told}")
+        flags = {name: one.flag for name, one in task.parameters.items()}
+        what = f"{error.what}; {error.remedy}" if error.remedy else error.what
+        told = re.sub(r"`(\w+)`", lambda found: flags.get(found[1], found[0]), what)
+        at = "" if told.startswith("--") else f"{flags.get(error.where, '')}: "
+        raise click.UsageError(f"{at}{told}") from None
 
 
 @contextmanager
@@ -240,7 +219,7 @@ def option_of(one: TaskParameter) -> click.Parameter:
         )
     make: Any = click.Option
     if option.setting:
-        make = partial(ShopOption, setting=option.setting, goes_with=option.goes_with, factor=option.factor)
+        make = partial(ShopOption, setting=option.setting)
     if option.usual or one.default not in (None, (), "", inspect.Parameter.empty):
         make = partial(make, default=None if required else one.default, show_default=option.usual or True)
     found: click.Option = make(

@@ -58,7 +58,8 @@ class Unmodelled:
     def look(self, fit: Calibration, best: Sequence[Member], noise_mm: float) -> None:
         """Search for waves, bumps, steps and pulses beside base and named causes, and add them.
 
-        What an earlier look found and the best set lacks is forgotten: beside the named causes it is found again, or is theirs.
+        Effects of an earlier look that the best set lacks are forgotten. This look finds them again unless a named cause
+        explains them.
         """
         members = [member for member in best if member.cause.named]
         channel = self.channel

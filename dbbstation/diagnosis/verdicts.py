@@ -206,7 +206,7 @@ class _CircleJudge(CauseJudge):
         return values
 
     def _beside_nameless(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return amplitudes' columns, what effects without a name change, and variances beside these."""
+        """Return the columns of a cause's amplitudes, their changes by unnamed effects, and their variances beside these."""
         amplitudes = self._joint.after.layout.columns_of(name)[0]
         if self._best.members == self._joint.members:
             return amplitudes[:0], np.zeros(0), np.zeros(0)

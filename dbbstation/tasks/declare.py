@@ -48,11 +48,9 @@ class Option:
     Attributes:
         help: one or two sentences, the unit in brackets; for a flag that is True by default, the meaning of its
             absence.
-        kind: `argument` has no flag; `path`, `file` or `folder`; `whole`: texts whose commas are their own; empty: by the
-            type.
+        kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
         usual: what its absence means, shown as default.
         least: `most`, `above`: range of a number.
-        setting: key in the shop's settings, times `factor`, unless `goes_with` is given.
         objects: scripts may give other objects than paths.
     """
 
@@ -61,8 +59,6 @@ class Option:
     metavar: str | None = None
     usual: str = ""
     setting: str = ""
-    goes_with: str = ""
-    factor: float = 1.0
     least: float | None = None
     most: float | None = None
     above: float | None = None
@@ -142,8 +138,6 @@ class TaskParameter:
                 return given
             return tuple(one if self.option.objects and not isinstance(one, str) else Path(one) for one in given)
         texts = [value] if isinstance(value, str) else list(value)
-        if self.option.kind == "whole":
-            return tuple(texts)
         names = dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip())
         kind = get_args(self.type)[0]
         return tuple(_one_of(name, get_args(kind)) if get_origin(kind) is Literal else name for name in names)

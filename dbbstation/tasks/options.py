@@ -20,22 +20,17 @@ MODEL_WITH_FINDINGS = replace(MODEL, only_with="findings")
 Model = Annotated[_Model, MODEL]
 FORCE, JSON = Option("Replace existing files."), Option("Print the result as JSON.")
 Force = Annotated[bool, FORCE]
-Json = Annotated[bool, JSON]
 OUTPUTS = {
     "out": "Write the result here.",
     "table": "Write the table here, as CSV.",
     "figure": "Write a figure here, as SVG, PNG or PDF by the ending of its name.",
     "page": "Write the page here, as HTML.",
-    "pdf": "Print it here, by an installed Chromium.",
 }
 """Of what a command writes: what it is stands in its metavar."""
-Out = Annotated[File, Option(OUTPUTS["out"], kind="file")]
 Machine = Annotated[File, Option("Machine file.", kind="file", metavar="MACHINE.yaml")]
 Plan = Annotated[File, Option("Test plan.", kind="file", metavar="PLAN.yaml")]
-Seed = Annotated[int, Option("Seed of everything random.", least=0)]
 ANEW = Option("Work out anew what is kept.")
 Anew = Annotated[bool, ANEW]
-Before = Annotated[File | None, Option("Earlier one, to go on from or to put beside.", kind="path")]
 SOURCES = Option("Error sources by name.", metavar="A,B,...")
 LawOverTime = Annotated[bool, Option("Fit thermal growth as a function of time, even if temperatures were logged.")]
 Method = Annotated[
@@ -51,8 +46,6 @@ TimeS = Annotated[
     float | None, Option("Start after the session's start [s], for models that depend on time.", metavar="S")
 ]
 Findings = Annotated[bool, Option("Judge every run too: number, limit, verdict.")]
-Job = Annotated[str, Option("Job or order number: what it is measured for.")]
-DryRun = Annotated[bool, Option("Show what would be done, and write nothing.")]
 SessionPaths = Annotated[Sessions, Option("session folders or session files.", kind="argument", metavar="SESSION...")]
 RecordedSessions = Annotated[
     Sessions | Recorded,

@@ -45,7 +45,7 @@ class RowKind(IntEnum):
     MESSAGE = 7
     """What the control shows or writes to a file: its keyword, a comma, the text, as in `MSG, hello`."""
     SYSTEM = 8
-    """From here on numbers count otherwise: `G54` to `G59.3`, `G10 L2 …`, `G43 H1`, `G49`."""
+    """From here on numbers count otherwise: `G54` to `G59.3`, `G10 L2 …`, `G43 H1`, `G49`; or `G28`, to a place the control alone knows."""
 
 
 MESSAGE = "MSG, "
@@ -375,7 +375,7 @@ class ToolpathBuilder:
         return self._text.get(self._count - 1, "")
 
     def built(self) -> Toolpath:
-        """Return the toolpath of all rows so far; an axis begins where it is first named."""
+        """Return the toolpath of all rows so far; an axis begins where it is first named, and an unknown one stays where it was."""
         count = np.array([len(rows.poses) for rows in self._rows], dtype=np.int64)
 
         def each(values: list[Any], kind: type) -> NDArray[Any]:
@@ -384,7 +384,8 @@ class ToolpathBuilder:
         poses = np.vstack([np.empty((0, 6)), *(rows.poses for rows in self._rows)])
         for axis in np.flatnonzero(np.isnan(poses).any(axis=0)):
             known = np.flatnonzero(~np.isnan(poses[:, axis]))
-            poses[: known[0] if len(known) else None, axis] = poses[known[0], axis] if len(known) else 0.0
+            last = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
+            poses[:, axis] = poses[known[np.maximum(last, 0)], axis] if len(known) else 0.0
         return Toolpath(
             name=self.name,
             kind=each([rows.kind for rows in self._rows], np.int8),

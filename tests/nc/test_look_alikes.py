@@ -168,7 +168,7 @@ FOREIGN = {
     "a main program that repeats": ("M99\n", 4, "for ever"),
     "H without its length": ("G43 H7\n", 4, "the length of tool 7 is not known"),
     "H that is no tool": ("G43 H0\n", 4, "H0 is no tool"),
-    "a second reference point": ("G30 Z0\n", 4, "where G30 leads is not known"),
+    "a cut from a reference point": ("G30 Z0\n", 5, "does not state the place of Z"),
     "G92 before anything is known": ("G92.1\nG91 G38 Z1\n", 5, "G38 is not read"),
     "a rotation": ("G10 L2 P1 R30\n", 4, "rotation"),
     "the tool table": ("G10 L1 P1 Z20\n", 4, "G10 L1 is not read"),

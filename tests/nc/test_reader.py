@@ -144,6 +144,15 @@ def test_the_first_move_must_say_where_the_machine_is():
     assert path.tip_mm[0] == 1.0
 
 
+def test_a_reference_point_that_is_not_declared_stays_with_the_control():
+    path = read_program(FIRST + "G91 G28 Z0\nG90 G0 X5\nZ-990\nG28\nM2\n", "part.ngc")
+    assert list(path.text.values()) == ["G91 G28 Z0\nG90", "G91 G28 X0 Y0 Z0 A0 B0 C0\nG90"]
+    assert path.unknown.tolist() == [0, 0, 0b100, 0, 0]
+    declared = np.array([np.nan] * 3 + [0.0] * 3)
+    path = read_program("G0 X1 Y2 Z-1000\nG30\nM2\n", "part.ngc", start=declared)
+    assert path.text[1] == "G91 G30 X0 Y0 Z0\nG90"
+
+
 def test_a_program_without_moves_is_refused():
     with pytest.raises(InputError, match="moves nothing"):
         read_program("G21\nM2\n", "part.ngc")

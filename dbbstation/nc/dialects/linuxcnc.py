@@ -43,7 +43,7 @@ class LinuxCNC(WordDialect):
     look_ahead = LookAhead(share=0.5)
     takes_setup = True
     functions = r"[STQ][0-9.]+|G97|M(?:[3-9]|48|49|61)"
-    systems = r".*"
+    systems = r"[\s\S]*"
     instead = MappingProxyType({"(": "[", ")": "]"})
     words = MappingProxyType(
         {

@@ -80,6 +80,7 @@ class Modes:
         self._cycle = ModalCycle()
         self._turning, self._stopped = "", 0
         self._upright = self._moved = False
+        self._away: set[int] = set()
         self._system_said = False
         self.path.holds = {}
         self.path.count_from(self._state.offset)

@@ -103,7 +103,8 @@ class _Interpreter(Moves):
             # A spindle that stops behind the last cut ends programs that have no other end, as for GRBL.
             if not (self.flow.closed or (not self.flow.percent and 0 < self.path.fed <= self._stopped)):
                 raise BadLine(self.flow.cut_short())
-        unknown = [letter for letter, value in zip(AXES, self._state.pose, strict=True) if math.isnan(value)]
+        away = [math.isnan(value) and axis not in self._away for axis, value in enumerate(self._state.pose)]
+        unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
         if unknown and self._moved:
             raise unknown_place(block, unknown, "")
 
@@ -187,20 +188,29 @@ class _Interpreter(Moves):
         word = block.codes[ModalGroup.ONCE]
         code, named = name("G", word.value), [letter for letter in AXES if letter in block.words]
         there = self._state.setup.place(code)
-        if there is None:
-            what = f"where {code} leads is not known"
-            remedy = f"give its place with --offset {code}=X,Y,Z, or LinuxCNC's parameter file with --parameters"
-            raise block.place.fault(word.column, what, remedy)
-        axes = [AXES.index(letter) for letter in named] or range(6)
+        axes = [AXES.index(letter) for letter in named]
         if named:
             between = self._target(block, through=True)
             if not np.array_equal(between, self._state.pose, equal_nan=True):
-                self._rapid(block, between, [AXES.index(letter) for letter in named])
-        target = self._state.pose.copy()
-        target[list(axes)] = [there[axis] for axis in axes]
-        self._rapid(block, target, list(axes), in_machine=True)
+                self._rapid(block, between, axes)
+        if there is None:
+            self._somewhere(code, axes, block)
+        else:
+            axes = axes or list(range(6))
+            target = self._state.pose.copy()
+            target[axes] = [there[axis] for axis in axes]
+            self._rapid(block, target, axes, in_machine=True)
         for letter in named:
             del block.words[letter]
+
+    def _somewhere(self, code: str, axes: list[int], block: ProgramBlock) -> None:
+        """Leave the way to a reference point whose place is not declared to the control."""
+        axes = axes or [axis for axis in range(6) if not self._fixed >> axis & 1]
+        self._system(f"G91 {code} {' '.join(f'{AXES[axis]}0' for axis in axes)}\nG90", block)
+        self._state.pose = self._state.pose.copy()
+        self._state.pose[axes] = math.nan
+        self._away |= set(axes)
+        self.path.unknown |= sum(1 << axis for axis in axes)
 
     def _move(self, block: ProgramBlock) -> None:
         motion = block.code(ModalGroup.MOTION) if block.codes else None

@@ -17,9 +17,10 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.assigned import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER, SIZES, Assigned, FormerSitting
+from dbbstation.quality.assigned import SIZES, Assigned, FormerSitting
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
+from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER
 from dbbstation.quality.together import read_um
 from dbbstation.trace.recording import Recording
 from dbbstation.virtual.machine import VirtualMachine
@@ -136,6 +137,33 @@ def test_a_circle_the_wrong_way_round_is_found_in_the_end(sitting, asked: tuple[
     assert set(found) <= {label, f"{test} {CW if way is CCW else CCW} 1"}
 
 
+@pytest.mark.parametrize(
+    "instead",
+    [
+        {},
+        {("low", CCW): ("low", CW)},
+        {(one, way): (other, way) for one, other in (("low", "side"), ("side", "low")) for way in (CCW, CW)},
+        {("side", way): ("high", way) for way in (CCW, CW)},
+    ],
+)
+def test_runs_judged_one_after_the_other_are_judged_as_all_at_once(sitting, instead) -> None:
+    """What was improbable is not asked again; a sitting without a past asks everything."""
+    circles, whole, before = sitting[0], shown(sitting, instead), None
+    asked = []
+    for count in range(1, 7):
+        alone = Assigned(circles, whole.runs[:count])
+        before = Assigned(circles, whole.runs[:count], before=before)
+        assert suspected(before) == suspected(alone)
+        for name in (Name.TEST, Name.DIRECTION):
+            one, blank = whole.runs[count - 1], undecided(name, "")
+            assert before.finding(one, blank) == alone.finding(one, blank)
+        asked.append(len(before._looked_up) - len(alone._looked_up))
+    # Runs of which one was taken away have no past.
+    fewer = whole.runs[1:]
+    assert suspected(Assigned(circles, fewer, before=before)) == suspected(Assigned(circles, fewer))
+    assert min(asked) < 0
+
+
 def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
     """Against the density of all readings under the whole covariance, one size at a time."""
     assigned = shown(sitting, {}, 4)
@@ -145,17 +173,17 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
     from scipy.special import logsumexp  # noqa: PLC0415
     from scipy.stats import multivariate_normal  # noqa: PLC0415
 
-    machine = np.vstack([assigned._of_machine[k] for k in labels])
-    session = np.vstack([assigned._of_session[k] for k in labels])
+    machine = np.vstack([assigned.effects.of_machine[k] for k in labels])
+    session = np.vstack([assigned.effects.of_session[k] for k in labels])
     off = np.concatenate([read_um(one) - read_um_expected(c) for one, c in zip(assigned.runs, circles, strict=True)])
     for size in SIZES:
         whole = size**2 * machine @ machine.T + session @ session.T
         for k, one in enumerate(assigned.runs):
             rows = slice(7 * k, 7 * k + 7)
-            whole[rows, rows] += assigned._own[labels[k]] + one.u_um**2 * np.eye(7)
+            whole[rows, rows] += assigned.effects.own[labels[k]] + one.u_um**2 * np.eye(7)
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
-    assert assigned.score(labels) == pytest.approx(wanted, abs=1e-3)
+    assert assigned.score(()) == pytest.approx(wanted, abs=1e-3)
 
 
 def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) -> None:
@@ -163,20 +191,19 @@ def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) ->
     for instead in ({}, {PLANNED[0]: ("side", CCW)}):
         assigned = shown(sitting, instead, 4)
         scores = assigned._looked_up
-        assert {BESIDE, LARGER, ELSEWHERE} < {label for labels in scores for label in labels}
-        changed = [sum(a != b for a, b in zip(labels, assigned._planned, strict=True)) for labels in scores]
-        assert set(changed) >= {0, 1, 2, 4}
-        for labels, score in scores.items():
-            assert score + assigned._mistakes(labels) == pytest.approx(
-                log_density(assigned, labels), rel=1e-7, abs=1e-3
+        assert {BESIDE, LARGER, ELSEWHERE} < {label for changes in scores for _, label in changes}
+        assert {len(changes) for changes in scores} >= {0, 1, 2, 4}
+        for changes, score in scores.items():
+            assert score + assigned._mistakes(changes) == pytest.approx(
+                log_density(assigned, assigned._labels(changes)), rel=1e-7, abs=1e-3
             )
 
 
 def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
     """Log density of all readings with all covariances written out."""
     count = len(assigned.runs)
-    machine = np.zeros((count, 7, assigned._of_machine.shape[2]))
-    session = np.zeros((count, 7, assigned._of_session.shape[2]))
+    machine = np.zeros((count, 7, assigned.effects.of_machine.shape[2]))
+    session = np.zeros((count, 7, assigned.effects.of_session.shape[2]))
     own, off = np.zeros((7 * count, 7 * count)), np.zeros((count, 7))
     for k, (one, label) in enumerate(zip(assigned.runs, labels, strict=True)):
         circle = assigned._planned[k] if label < 0 else label
@@ -184,9 +211,9 @@ def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
         rows = slice(7 * k, 7 * k + 7)
         own[rows, rows] = ELSEWHERE_UM**2 * np.eye(7)
         if label != ELSEWHERE:
-            machine[k], session[k] = assigned._of_machine[circle], assigned._of_session[circle]
+            machine[k], session[k] = assigned.effects.of_machine[circle], assigned.effects.of_session[circle]
             more = {BESIDE: [0, 1, 0, 0, 1, 0, 0], LARGER: [1, 0, 0, 0, 0, 0, 0]}.get(label, [0] * 7)
-            own[rows, rows] = assigned._own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
+            own[rows, rows] = assigned.effects.own[circle] + one.u_um**2 * np.eye(7) + ELSEWHERE_UM**2 * np.diag(more)
     machine, session, off = machine.reshape(7 * count, -1), session.reshape(7 * count, -1), off.ravel()
     logs = []
     for size in SIZES:

@@ -1,0 +1,179 @@
+"""What the circles of a plan share, and a run beside each of them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.quality.forms import FIRST_COSINE, FIRST_SINE
+from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
+from dbbstation.quality.together import expected_um, read_um
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from dbbstation.quality.knowledge import Planned, Seen
+
+ELSEWHERE_UM = 1e3
+"""Standard deviation of a run that is no circle of the plan, per coefficient: a bar's travel is millimetres [µm]."""
+
+ELSEWHERE, BESIDE, LARGER = -1, -2, -3
+"""Labels of such a run, of its own circle about another place, and of its own circle with another radius."""
+
+ANYWHERE_UM = 1e4
+"""Standard deviation of a centre that says nothing [µm]."""
+
+
+class PlanEffects:
+    """The circles of a plan with their shared causes; kept for a whole session.
+
+    Args:
+        owns: how often a circle's own part acts: in this session, and in one before if readings are compared with it.
+    """
+
+    def __init__(self, circles: Sequence[Planned], owns: int = 1) -> None:
+        self.circles = circles
+        self._owns = owns
+        self._runs: dict[Seen, RunEffects] = {}
+
+    def run(self, one: Seen) -> RunEffects:
+        """Return a run beside each circle."""
+        if one not in self._runs:
+            self._runs[one] = RunEffects(self, one)
+        return self._runs[one]
+
+    def label(self, test: str, direction: str) -> int:
+        """Return the place of a circle in the plan.
+
+        Raises:
+            StopIteration: the plan has no such circle.
+        """
+        return next(k for k, one in enumerate(self.circles) if key_of(one) == (test, direction))
+
+    @cached_property
+    def shared(self) -> NDArray[np.float64]:
+        """Return effects of shared causes on all circles and on none, shape (l + 1, 7, p) [µm]."""
+        columns = np.concatenate([self.of_machine, self.of_session], axis=2)
+        return np.concatenate([columns, np.zeros_like(columns[:1])])
+
+    def scale(self, size: float) -> NDArray[np.float64]:
+        """Return the standard deviations of shared causes with machine errors of a size, shape (p,)."""
+        return np.repeat([size, 1.0], [self.of_machine.shape[2], self.of_session.shape[2]])
+
+    @cached_property
+    def of_machine(self) -> NDArray[np.float64]:
+        """Return effects of the machine's causes on all circles, shape (l, 7, p) [µm]."""
+        return self._effects({key for key in self._keys if not key[1]})
+
+    @cached_property
+    def of_session(self) -> NDArray[np.float64]:
+        """Return the same of causes common to all circles: the bar, the tool's ball, the plate."""
+        return self._effects({key for key in self._of_all if key[1]})
+
+    @cached_property
+    def _keys(self) -> tuple[tuple[str, str], ...]:
+        return tuple(dict.fromkeys(key for one in self.circles for key in one.expected.effects_um))
+
+    @cached_property
+    def _of_all(self) -> frozenset[tuple[str, str]]:
+        keys = [set(one.expected.effects_um) for one in self.circles]
+        return frozenset(set.intersection(*keys))
+
+    def _effects(self, wanted: set[tuple[str, str]]) -> NDArray[np.float64]:
+        """Return effects of causes on all circles, shape (l, 7, p) [µm]."""
+        columns = [np.zeros((COEFFICIENTS * len(self.circles), 0))]
+        for key in (key for key in self._keys if key in wanted):
+            effects = [one.expected.effects_um.get(key) for one in self.circles]
+            wide = max(each.shape[1] for each in effects if each is not None)
+            blank = np.zeros((COEFFICIENTS, wide))
+            signs = [along_travel(one.circle)[:, None] for one in self.circles]
+            blocks = [blank if e is None else sign * e for sign, e in zip(signs, effects, strict=True)]
+            columns.append(np.vstack(blocks))
+        stacked = np.hstack(columns)
+        # As many numbers as the circles have: rotated so that the rest is zero.
+        u, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
+        kept = sizes > 1e-6 * max(float(sizes.max(initial=0.0)), 1e-9)
+        return (u[:, kept] * sizes[kept]).reshape(len(self.circles), COEFFICIENTS, -1)
+
+    @cached_property
+    def own(self) -> list[NDArray[np.float64]]:
+        """Return the covariance of a circle's own part, ball and mounting, shape (7, 7) each [µm²]."""
+        found = []
+        for one in self.circles:
+            effects = [e for key, e in one.expected.effects_um.items() if key[1] and key not in self._of_all]
+            signs = along_travel(one.circle)[:, None]
+            joined = signs * np.hstack([np.zeros((COEFFICIENTS, 1)), *effects])
+            own = float(self._owns) * joined @ joined.T
+            own += 1e-6 * np.eye(COEFFICIENTS)
+            if not one.expected.place_known:
+                own[[FIRST_COSINE, FIRST_SINE], [FIRST_COSINE, FIRST_SINE]] += ANYWHERE_UM**2
+            found.append(own)
+        return found
+
+
+class RunEffects:
+    """A run beside each circle of the plan, and as no circle of it.
+
+    Attributes:
+        planned: label of the circle that the run was filed under.
+    """
+
+    def __init__(self, plan: PlanEffects, one: Seen) -> None:
+        self._plan, self._one = plan, one
+        self.planned = plan.label(one.run.test, one.run.circle.direction)
+        self._products: dict[int, NDArray[np.float64]] = {}
+
+    def shows(self, labels: ArrayLike) -> NDArray[np.int64]:
+        """Return the circles whose effects a run has under labels, the last for no circle."""
+        labels = np.asarray(labels)
+        own = np.where(labels == ELSEWHERE, len(self._plan.circles), self.planned)
+        return np.where(labels >= 0, labels, own)
+
+    def product(self, label: int) -> NDArray[np.float64]:
+        """Return products of whitened effects and readings, shape (p + 1, p + 1).
+
+        The readings are the last row and column; their own product has the log determinant of the scatter added.
+        """
+        if label not in self._products:
+            root = np.linalg.cholesky(self.scatter[label])
+            read = np.column_stack([self._plan.shared[self.shows(label)], self.off[label]])
+            white = np.linalg.solve(root, read)
+            self._products[label] = white.T @ white
+            self._products[label][-1, -1] += 2.0 * self.half_log_determinants[label]
+        return self._products[label]
+
+    @cached_property
+    def off(self) -> NDArray[np.float64]:
+        """Return the reading minus expectation by label, shape (l + 3, 7) [µm]."""
+        expected = np.array([expected_um(one) for one in self._plan.circles])
+        return read_um(self._one) - expected[[*range(len(expected)), *[self.planned] * 3]]
+
+    @cached_property
+    def scatter(self) -> NDArray[np.float64]:
+        """Return the covariance of the reading's own part by label, shape (l + 3, 7, 7) [µm²]."""
+        own = self._plan.own
+        by_label = np.array([*own, *[own[self.planned]] * 3]) + self._one.u_um**2 * np.eye(COEFFICIENTS)
+        by_label[ELSEWHERE] = ELSEWHERE_UM**2 * np.eye(COEFFICIENTS)
+        for k in (FIRST_COSINE, FIRST_SINE):
+            by_label[BESIDE, k, k] += ELSEWHERE_UM**2
+        by_label[LARGER, 0, 0] += ELSEWHERE_UM**2
+        return by_label
+
+    @cached_property
+    def half_log_determinants(self) -> NDArray[np.float64]:
+        """Return half the log determinants of `scatter`, shape (l + 3,)."""
+        return log_diagonal(np.linalg.cholesky(self.scatter))
+
+
+def log_diagonal(roots: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return half the log determinants of matrices with these Cholesky factors."""
+    return np.asarray(np.sum(np.log(np.diagonal(roots, axis1=-2, axis2=-1)), axis=-1))
+
+
+def key_of(one: Planned) -> tuple[str, str]:
+    """Return test and direction of a circle."""
+    return one.test, str(one.circle.direction)

@@ -59,9 +59,12 @@ WAYS_DEG = tuple(30.0 * k for k in range(12))
 """Where the place may be that pulls. Its height, its distance and where on the platform it pulls are not searched: the nearest
 form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions.md, 20)."""
 
-STICKING_MM = (0.005, 0.01, 0.02, 0.04)
+STICKING_MM = 0.04
 """Travel over which friction that turns round sticks, in one jerk or several: presliding and stick-slip take micrometres to tens of
 them [Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, sec. 2.2] [mm]."""
+
+STICKING_HALVES = 5
+"""Points of that curve: a circle has two or three samples on that way."""
 
 AWAY_MM = 1000.0
 """How far it is from the Z axis: beyond the machine's frame."""
@@ -370,13 +373,8 @@ def shapes(extent: Ranges) -> list[Shape]:
             Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
             for strut in range(1, STRUTS + 1)
         ]
-        found += [
-            Shape(
-                "travel since its reversal", "", strut, EVERY, BehindReversal(length_mm), tried=float(len(STICKING_MM))
-            )
-            for length_mm in STICKING_MM
-            for strut in range(1, STRUTS + 1)
-        ]
+        behind = BehindReversal(STICKING_MM, STICKING_HALVES)
+        found += [Shape("travel since its reversal", "", strut, EVERY, behind) for strut in range(1, STRUTS + 1)]
     for name in ("time", *warmed):
         if name in extent.low and name not in OF_STRUTS:
             found += [Shape(name, "", None, moves, _usual(name, extent, None)) for moves in (READING, BALL)]

@@ -23,10 +23,6 @@ POINTS_PER_WIDTH = 3
 
 WIDTHS = 4.0
 
-BEHIND_POINTS = 4
-"""Of a curve behind a reversal, between the turn and its end: a circle has two or three samples on that way."""
-
-
 class Form(ABC):
     """A family of curves with p amplitudes."""
 
@@ -352,23 +348,25 @@ class Ringing(Form):
 class BehindReversal(Form):
     """The lag behind a reversal: any curve of the distance since then, signed by the new direction.
 
-    It is piecewise linear, zero at the reversal and from `length` on.
+    It is piecewise linear, zero at the reversal and from `length` on. Each point is at half the way of the next: what turns
+    round bends most at its begin.
     """
 
     length: float
+    halves: int
 
     @property
     def count(self) -> int:
-        return BEHIND_POINTS
+        return self.halves
 
     def text(self, unit: str) -> str:
         return f"over {self.length:.3g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        place = np.abs(values) / self.length * (BEHIND_POINTS + 1)
-        hats = np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(1, BEHIND_POINTS + 1)))
-        return -np.sign(values)[..., None] * hats
+        places = self.points(0.0, self.length)
+        hats = [np.interp(np.abs(values), places, row) for row in np.eye(len(places))[1:-1]]
+        return -np.sign(values)[..., None] * np.stack(hats, axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         del low, high
-        return np.linspace(0.0, self.length, BEHIND_POINTS + 2)
+        return self.length * np.append(0.0, 0.5 ** np.arange(self.halves, -1, -1))

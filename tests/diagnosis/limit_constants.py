@@ -21,19 +21,11 @@ from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions
 
-SHORTEST_MM = ((0.0035, 4), (0.007, 4), (0.01, 3))
-"""Shortest travel over which friction sticks, and how many lengths are tried; usually 0.005 of four."""
-
 MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "IDLE": (explain, "IDLE", (0.7, 0.97), 4),
     "HALF": (shape_look, "HALF", (0.25, 1.0), 4),
     "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
-    "STICKING_MM": (
-        shapes,
-        "STICKING_MM",
-        tuple((first, 0.01, 0.02, 0.04)[-count:] for first, count in SHORTEST_MM),
-        23,
-    ),
+    "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),
 }
 """By constant: its module and name, other values, and the session on which it decides most."""
 
@@ -76,7 +68,7 @@ def main() -> None:
             sys.stderr.write(f"{key}: {columns[key]}\n")
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
-        "data": "Three sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, and 0.005, 0.01, 0.02, 0.04 mm.",
+        "data": "Three sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6 and 0.04 mm.",
         "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,

@@ -16,9 +16,9 @@ def test_a_walk_has_the_covariance_of_a_random_walk():
 
 
 def test_what_stays_behind_is_against_the_new_direction_and_ends(rng):
-    form, heights = BehindReversal(10.0), rng.normal(size=4)
-    way = np.linspace(0.01, 15.0, 400)
-    expected = np.interp(way, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0], [0.0, *heights, 0.0], right=0.0)
+    form, heights = BehindReversal(16.0, 5), rng.normal(size=5)
+    way = np.linspace(0.01, 25.0, 400)
+    expected = np.interp(way, [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0], [0.0, *heights, 0.0], right=0.0)
     assert form.columns(way) @ heights == pytest.approx(-expected)
     assert form.columns(-way) @ heights == pytest.approx(expected)
     assert not form.columns(np.zeros(1)).any()

@@ -23,6 +23,7 @@ POINTS_PER_WIDTH = 3
 
 WIDTHS = 4.0
 
+
 class Form(ABC):
     """A family of curves with p amplitudes."""
 

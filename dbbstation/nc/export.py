@@ -320,10 +320,12 @@ def _holds_for(path: Toolpath) -> list[str]:
     """Return the conditions under which a program is valid, besides the model."""
     if path.holds is None:
         return []
-    held = {name: offset_text(values) for name, values in path.holds.items()}
+    diameters = {name: values[0] for name, values in path.holds.items() if name[0] == "D"}
+    held = {name: offset_text(values) for name, values in path.holds.items() if name not in diameters}
     lengths = {name: held.pop(name) for name in list(held) if name[0] == "H"}
     said = [f"right for {'' if name == 'G92' else 'work system '}{name}: {offset}" for name, offset in held.items()]
     said += [f"right for the length of tool {name[1:]}: {length}" for name, length in lengths.items()]
+    said += [f"right for the diameter of tool {name[1:]}: {value:g}" for name, value in diameters.items()]
     return [*said, "after a new touch-off of one of these: compensate again"]
 
 

@@ -42,12 +42,14 @@ class ControlSetup:
     Attributes:
         places: work offsets, `G92` and the reference points `G28` and `G30`, each shape (6,) [mm, deg].
         lengths: offsets of tools by number, each shape (6,) [mm, deg].
+        diameters: of tools by number [mm].
         parameters: all numbered parameters of the control's file; None: unknown.
     """
 
     places: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     lengths: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
-    parameters: Mapping[int, float] | None = None
+    diameters: Mapping[int, float] = field(default_factory=dict)
+    parameters: Mapping[int, float] | None = field(default=None, kw_only=True)
 
     def place(self, name: str) -> tuple[float, ...] | None:
         """Return a work offset, G92 or a reference point; None if unknown."""

@@ -95,7 +95,7 @@ class Toolpath:
         unknown: axes whose position the program does not know, a bit each, shape (n,): such a row must not name them.
         in_machine: moves in machine coordinates (G53), shape (n,).
         holds: offsets and tool lengths for which the poses are valid, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape
-            (6,); a control may check them before it moves. None: not stated.
+            (6,), and diameters of tools by `D1`, shape (1,); a control may check them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those written together, from 1.
@@ -347,6 +347,29 @@ class ToolpathBuilder:
         feed = (mm_min, mm_min if deg_min is None else deg_min)
         self._add(RowKind.FEED, poses, feed, line=line, in_machine=in_machine, arc=arc)
         self.fed = self._count
+
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """Return where the last row ends, shape (6,) [mm, deg]."""
+        return self._pose.copy()
+
+    @property
+    def added(self) -> int:
+        """Return the number of the last rows, which were added together."""
+        return len(self._rows) - 1
+
+    def bend(
+        self,
+        added: int,
+        poses: NDArray[np.float64],
+        arc: tuple[float, float, float, float],
+        plane: NDArray[np.int64],
+    ) -> None:
+        """Replace the poses of rows that were added together; all behind stand at their end in the axes of a plane."""
+        self._rows[added].poses[:] = poses
+        self._rows[added] = self._rows[added]._replace(arc=arc)
+        for rows in self._rows[added + 1 :]:
+            rows.poses[:, plane] = poses[-1, plane]
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.formats.linuxcnc_control import lengths_of, parameters_of
+from dbbstation.files.formats.linuxcnc_control import parameters_of, tools_of
 from dbbstation.files.source_text import read_bytes
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
@@ -141,10 +141,12 @@ def setup_of(
                 f"{name} with {len(values)} numbers is no offset: G54 to G59.3, G92, G28, G30 have three or six"
             )
         places[name] = tuple([*map(float, values), 0.0, 0.0, 0.0][:6])
-    table = {} if tools is None else lengths_of(program_text(tools), str(tools))
+    table = {} if tools is None else tools_of(program_text(tools), str(tools))
+    lengths_there = {tool: tuple(words.get(axis, 0.0) for axis in "XYZABC") for tool, words in table.items()}
+    diameters = {tool: words["D"] for tool, words in table.items() if "D" in words}
     own = {tool: (0.0, 0.0, float(length), 0.0, 0.0, 0.0) for tool, length in lengths.items()}
     known = None if parameters is None else parameters_of(program_text(parameters), str(parameters))
-    return ControlSetup(places, table | own, known)
+    return ControlSetup(places, lengths_there | own, diameters, parameters=known)
 
 
 def _content(path: Path) -> bytes:

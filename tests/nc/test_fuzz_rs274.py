@@ -39,7 +39,7 @@ ONLY_BY_US = {
     "nothing to compensate": "moves nothing",
     "polar coordinates": "polar coordinates|the origin has no angle",
     "skipped line": "can be skipped",
-    "value of the control": "is read before the program sets it",
+    "value of the control": "is read before the program sets it|the diameter of tool",
     "word that does nothing": "nothing in this line uses",
     "number with a second sign": "has no number",
 }
@@ -105,7 +105,7 @@ def test_what_only_we_refuse_is_little_and_has_a_name(verdicts):
 
 def difference(path: Toolpath, they: list[Event]) -> str:
     they = moving([event for event in they if event.kind in MOTION])
-    groups = grouped(path)
+    groups = divided(path, grouped(path), they)
     if [kind for kind, _ in groups] != ["FEED" if event.kind == "ARC" else event.kind for event in they]:
         return f"{[kind for kind, _ in groups]} and {[event.kind for event in they]}"
     before: np.ndarray | None = None
@@ -161,6 +161,20 @@ def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
         else:
             groups.append([row])
     return [(RowKind(path.kind[rows[0]]).name, np.array(rows)) for rows in groups]
+
+
+def divided(path: Toolpath, groups: list[tuple[str, np.ndarray]], they: list[Event]) -> list[tuple[str, np.ndarray]]:
+    """Groups of chords with no more turns than LinuxCNC's arcs: a loop may run one line's arc again."""
+    found, left = [], list(groups)
+    while left:
+        kind, rows = left.pop(0)
+        turned = abs(path.arc[rows[0], 2])
+        if len(found) < len(they) and they[len(found)].kind == "ARC" and turned:
+            most = round(math.tau * abs(they[len(found)].turns) / turned)
+            left[:0] = [(kind, rows[most:])] if len(rows) > most else []
+            rows = rows[:most]
+        found.append((kind, rows))
+    return found
 
 
 def off_arc_mm(start: np.ndarray, poses: np.ndarray, event: Event) -> float:

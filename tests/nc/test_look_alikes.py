@@ -127,8 +127,7 @@ def test_what_is_read_is_read_as_linuxcnc_reads_it(what, tmp_path):
 FOREIGN = {
     "a dynamic tool length": ("G43.1 Z10\n", 4, "G43.1"),
     "tool centre point control": ("G0 A1\nG43.4 H1\n", 5, "G43.4 while A or B"),
-    "cutter compensation": ("G41 D1\nG1 X10\nG40\n", 4, "G41"),
-    "dynamic cutter compensation": ("G42.1 D3\nG1 X10\nG40\n", 4, "G42.1"),
+    "an unknown diameter": ("G41 D1\nG1 X10\nG40\n", 4, "the diameter of tool 1 is not known"),
     "tapping": ("G84 X5 Y5 Z-1010 R-998\nG80\n", 4, "G84"),
     "rigid tapping": ("S200 M3\nG33.1 Z-1010 K1\n", 5, "G33.1"),
     "threading": ("S200 M3\nG33 Z-1010 K1\n", 5, "G33"),

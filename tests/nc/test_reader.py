@@ -123,7 +123,7 @@ def test_a_fault_names_line_and_column(line, column, says):
 
 def test_unreadable_words_are_all_named_at_once():
     with pytest.raises(InputError) as caught:
-        read_program("G0 X1 ?\nG41\nG0 X1\nU5\nM2\n", "part.ngc")
+        read_program("G0 X1 ?\nG33\nG0 X1\nU5\nM2\n", "part.ngc")
     assert [problem.line for problem in caught.value.problems] == [1, 2, 4]
 
 

@@ -32,13 +32,13 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
     return found
 
 
-def lengths_of(text: str, file: str) -> dict[int, tuple[float, ...]]:
-    """Return the offsets of tools by number of a LinuxCNC tool table.
+def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
+    """Return the words of tools by number of a LinuxCNC tool table.
 
     Raises:
         InputError: a line that is none, or none at all.
     """
-    found: dict[int, tuple[float, ...]] = {}
+    found: dict[int, dict[str, float]] = {}
     for number, line in enumerate(text.splitlines(), 1):
         said = line.partition(";")[0].upper()
         words = {letter: float(value) for letter, value in _TOOL_WORD.findall(said)}
@@ -48,7 +48,7 @@ def lengths_of(text: str, file: str) -> dict[int, tuple[float, ...]]:
             raise InputError(
                 [Problem(file, number, 1, "no line of a tool table", "it needs T and words such as Z52.1")]
             )
-        found[int(words["T"])] = tuple(words.get(axis, 0.0) for axis in "XYZABC")
+        found[int(words["T"])] = words
     if not found:
         raise InputError([Problem(file, 0, 0, "no tool in it", "name LinuxCNC's tool table, such as tool.tbl")])
     return found

@@ -40,6 +40,7 @@ class Arc:
         centre_mm: in first and second axis of its plane.
         clockwise: seen from the positive end of the third axis.
         turns: each above 1 adds a full turn.
+        pieces: number of chords; 0: as many as `CHORD_ERROR_MM` needs.
     """
 
     start: NDArray[np.float64]
@@ -48,6 +49,7 @@ class Arc:
     clockwise: bool
     turns: int = 1
     plane: int = 0
+    pieces: int = 0
 
     def radii_mm(self) -> tuple[float, float]:
         """Return distances of start and end from the centre [mm]."""
@@ -75,7 +77,7 @@ class Arc:
     @property
     def chords(self) -> int:
         """Return the number of straight moves that keep `CHORD_ERROR_MM`."""
-        return max(1, math.ceil(self.swept_rad / math.sqrt(8.0 * CHORD_ERROR_MM / max(self.radii_mm()))))
+        return self.pieces or max(1, math.ceil(self.swept_rad / math.sqrt(8.0 * CHORD_ERROR_MM / max(self.radii_mm()))))
 
     @property
     def chord(self) -> tuple[float, float, float, float]:

@@ -40,7 +40,7 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((4, 10, 28, 30, 52, 53, 92, 92.1, 92.2, 92.3), ModalGroup.ONCE),
     **dict.fromkeys((17, 18, 19), ModalGroup.PLANE),
     **dict.fromkeys((20, 21), ModalGroup.UNITS),
-    40: ModalGroup.CUTTER,
+    **dict.fromkeys((40, 41, 41.1, 42, 42.1), ModalGroup.CUTTER),
     **dict.fromkeys((43, 43.4, 49), ModalGroup.TOOL_LENGTH),
     **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
     **dict.fromkeys((61, 61.1, 64), ModalGroup.PATH),
@@ -62,13 +62,11 @@ M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((98, 99), ModalGroup.CALL),
 }
 
-LETTERS = frozenset("ABCFGHIJKLMNPQRSTXYZ@^")
+LETTERS = frozenset("ABCDFGHIJKLMNPQRSTXYZ@^")
 
-_TOOL = "post the program for the centre of the tool, without compensation of its radius in the control"
 _TURNED = "post the program without rotation: the model is not turned with it"
 _SPINDLE = "motion that follows the spindle has no path in time: run it without compensation"
 _REMEDIES: dict[float, str] = {
-    **dict.fromkeys((41, 41.1, 42, 42.1), _TOOL),
     **dict.fromkeys((43.1, 43.2, 43.5), "post the program with G43 and H"),
     **dict.fromkeys((5, 5.1, 5.2, 5.3, 6.2), "post curves as lines or arcs"),
     **dict.fromkeys((32, 33, 33.1, 74, 76, 84, 95, 96), _SPINDLE),
@@ -84,8 +82,6 @@ _REMEDIES: dict[float, str] = {
 
 def remedy_of_letter(letter: str) -> str:
     """Return the remedy for an unsupported letter."""
-    if letter == "D":
-        return _TOOL
     return (
         "the model has no such axis: post the program without it" if letter in "UVW" else "post the program without it"
     )

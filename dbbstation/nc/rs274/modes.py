@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES
 from dbbstation.nc.rs274.codes import ModalGroup, name
+from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.flow import Flow
 from dbbstation.nc.rs274.state import AXES, ControlState
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.tokens import Word
     from dbbstation.nc.setup import ControlSetup
 
 
@@ -50,6 +52,20 @@ LAST_OWN = 5000
 
 _SHOWS_VALUES = re.compile(r"(?:debug|print|log),", re.IGNORECASE)
 _SHOWN = re.compile(r"#(?:(\d+)|<([^<>]*)>)")
+
+
+_NOT_BESIDE = frozenset(
+    {
+        ModalGroup.UNITS,
+        ModalGroup.PLANE,
+        ModalGroup.FEED_MODE,
+        ModalGroup.TOOL_LENGTH,
+        ModalGroup.TOOL,
+        ModalGroup.OFFSET,
+        ModalGroup.ONCE,
+    }
+)
+"""Codes that no line may have beside a contour."""
 
 
 class Feed(NamedTuple):
@@ -81,6 +97,10 @@ class Modes:
         self._turning, self._stopped = "", 0
         self._upright = self._moved = False
         self._away: set[int] = set()
+        self._cutter: Cutter | None = None
+        self._beside: Beside | None = None
+        self._radius_number: Word | None = None
+        self._left_contour = False
         self._system_said = False
         self.path.holds = {}
         self.path.count_from(self._state.offset)
@@ -163,11 +183,16 @@ class Modes:
             self._turning = "" if turning == "M5" else turning
         if tool is not None:
             self._state.tool_selected = int(tool.value)
+        self._change_tool(change, number_set)
+
+    def _change_tool(self, change: Word | None, number_set: Word | None) -> None:
         if number_set is not None:
             self._state.tool = int(number_set.value)
         elif change is not None:
             self._state.tool = self._state.tool_selected
             self._turning = ""
+            if self._left_contour:  # numbers go on from where the machine stands
+                self._state.pose = self.path.pose
             # A tool changer may move the machine: what no line names again before the next cut is not to be named either.
             self.path.unknown |= ALL_AXES & ~self._fixed
 
@@ -216,6 +241,42 @@ class Modes:
             self._motion, self._cycle.numbers = None, {}
         if ModalGroup.PATH in block.codes:
             self._path_control(block)
+
+    def _cutter_radius(self, block: ProgramBlock) -> None:
+        word, block_number = block.codes.get(ModalGroup.CUTTER), block.words.pop("D", None)
+        number = self._radius_number = block_number or self._radius_number
+        if word is None:
+            dwells = block.code(ModalGroup.ONCE) == DWELL
+            if self._cutter is not None and block.codes.keys() & _NOT_BESIDE > ({ModalGroup.ONCE} if dwells else set()):
+                what = "beside a contour (G41, G42) the line changes what moves mean"
+                raise block.place.fault(block.first_column, what, "write it before the contour or behind G40")
+            return
+        if word.value == 40.0:  # noqa: PLR2004
+            self._left_contour = self._beside is not None
+            self._cutter = self._beside = None
+            return
+        if self._cutter is not None or self._plane > 1 or self._per_move:
+            code = name("G", word.value)
+            what = f"{code} {'while another one is in force' if self._cutter else 'in G19 or under G93'}"
+            raise block.place.fault(word.column, what, "write G40 before it, and G17 or G18 and G94")
+        is_left = int(word.value) == 41  # noqa: PLR2004
+        radius_mm = self._diameter_mm(block, word, number) / 2.0
+        self._left_contour = False
+        if radius_mm != 0.0:
+            self._cutter = Cutter(1 if is_left == (radius_mm > 0.0) else -1, abs(radius_mm))
+
+    def _diameter_mm(self, block: ProgramBlock, word: Word, number: Word | None) -> float:
+        if word.value != int(word.value):  # G41.1 and G42.1 name a diameter
+            if number is None:
+                raise block.place.fault(word.column, f"{name('G', word.value)} needs D", "give the diameter")
+            return number.value * self._state.unit_mm
+        tool = self._state.tool if number is None else number.value
+        if tool is None or tool not in self._state.setup.diameters:
+            what = f"the diameter of tool {'in the spindle' if tool is None else f'{tool:g}'} is not known"
+            raise block.place.fault(word.column, what, "give LinuxCNC's tool table with --tools")
+        diameter_mm = self._state.setup.diameters[int(tool)]
+        self._hold(f"D{tool:g}", (diameter_mm,))
+        return diameter_mm
 
     def _path_control(self, block: ProgramBlock) -> None:
         word = block.codes[ModalGroup.PATH]

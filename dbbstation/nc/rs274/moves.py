@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES, arc_of
+from dbbstation.nc.rs274.arcs import Arc
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
+from dbbstation.nc.rs274.cutter import Beside, NoRoomError, element_of, with_plane
 from dbbstation.nc.rs274.cycles import cycle_steps
 from dbbstation.nc.rs274.state import AXES, unknown_place
 from dbbstation.nc.toolpath import (
     IN_FORCE,
     LEAST_MM,
+    PLANES,
     RowKind,
     bits_of,
 )
@@ -22,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.rs274.blocks import ProgramBlock
+    from dbbstation.nc.rs274.cutter import Cutter, Element
     from dbbstation.nc.rs274.tokens import BadLine, Word
 
 from dbbstation.nc.rs274.modes import ARCS, CLOCKWISE, LINEAR, MACHINE, POLAR, RAPID, TAKES_AXES, Feed, Modes
@@ -53,26 +58,93 @@ class Moves(Modes):
             what = f"{named[0]} without a motion code"
             raise block.place.fault(block.first_column, what, "write G0 or G1 before it")
         target = self._target(block, in_machine=in_machine)
-        if self._motion == RAPID:
+        if self._cutter is not None:
+            self._go_beside(self._cutter, block, target)
+        elif self._motion == RAPID:
             self._rapid(block, target, [AXES.index(letter) for letter in named], in_machine=in_machine)
         elif self._motion == LINEAR:
             way = target - self._state.pose
             length = float(np.linalg.norm(way[:3])), float(np.linalg.norm(way[3:]))
             self._cut(block, target[None], length, in_machine=in_machine)
         else:
-            arc = arc_of(
-                block,
-                self._state,
-                target,
-                clockwise=self._motion == CLOCKWISE,
-                plane=self._plane,
-                absolute=self._absolute_centres,
-            )
-            if len(self.path) + arc.chords > MOST_ROWS:
-                raise too_long(block)
+            arc = self._arc(block, target)
             self._cut(block, arc.poses(), (arc.length_mm, 0.0), arc=arc.chord)
+        self._left_contour = False
         for letter in (*named, *POLAR):
             block.words.pop(letter, None)
+
+    def _arc(self, block: ProgramBlock, target: NDArray[np.float64]) -> Arc:
+        if self._left_contour:
+            raise block.place.fault(block.first_column, "an arc leads away from a contour (G40)", "leave it straight")
+        arc = arc_of(
+            block,
+            self._state,
+            target,
+            clockwise=self._motion == CLOCKWISE,
+            plane=self._plane,
+            absolute=self._absolute_centres,
+        )
+        if len(self.path) + arc.chords > MOST_ROWS:
+            raise too_long(block)
+        return arc
+
+    def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: NDArray[np.float64]) -> None:
+        """Move the tool's centre beside a contour (G41, G42)."""
+        arc = self._arc(block, target) if self._motion in ARCS else None
+        if self._motion != RAPID:
+            self._check_feed(block, block.first_column)
+        self._begin_move(block, target)
+        plane = PLANES[self._plane]
+        begin, end = (complex(*pose[plane]) for pose in (self._state.pose, target))
+        try:
+            if self._beside is None:
+                cutter.check_entry(begin, end)
+            if begin == end and arc is None and self._beside is not None:
+                self._piece(block, with_plane(target, plane, self._beside.place))
+            else:
+                element = element_of(begin, end, arc)
+                self._along(cutter, element, arc, block, target)
+        except NoRoomError:
+            what = f"a tool with radius {cutter.radius_mm:g} mm has no room here beside the contour"
+            remedy = "enter contours (G41, G42) by more than the radius, or take a smaller tool"
+            raise block.place.fault(block.first_column, what, remedy) from None
+        self._state.pose = target
+
+    def _along(
+        self, cutter: Cutter, element: Element, arc: Arc | None, block: ProgramBlock, target: NDArray[np.float64]
+    ) -> None:
+        plane, last = PLANES[self._plane], self._beside
+        if last is None:
+            element = cutter.entered(element, element.begin) if arc else element
+        else:
+            place, around = cutter.corner(last.element, element)
+            if place != last.place:
+                self.path.bend(last.added, *last.bent(place), plane)
+            if around:
+                mid = cutter.beside(element, element.begin)
+                there = with_plane(target, plane, mid)
+                rise = 3 - int(plane.sum())
+                there[rise] = self._state.pose[rise]
+                corner = (element.begin.real, element.begin.imag)
+                turn = Arc(self.path.pose, there, corner, clockwise=cutter.side > 0, plane=self._plane)
+                self._piece(block, there, None if self._motion == RAPID else turn)
+        start, there = self.path.pose, with_plane(target, plane, cutter.beside(element, element.end))
+        if arc is not None:
+            cutter.reaches(element)
+            arc = replace(arc, start=start, end=there, centre_mm=(element.centre.real, element.centre.imag))
+        self._beside = Beside(element, self.path.added + 1, start, there, plane, arc)
+        if last is not None:
+            self._beside.check(element.swept_rad)
+        self._piece(block, there, arc)
+
+    def _piece(self, block: ProgramBlock, target: NDArray[np.float64], arc: Arc | None = None) -> None:
+        line = block.place.line
+        if self._motion == RAPID:
+            self.path.rapid(target, line=line)
+        elif arc is None:
+            self.path.feed(target[None], *self._speed, line=line)
+        else:
+            self.path.feed(arc.poses(), *self._speed, line=line, arc=arc.chord)
 
     def _begin_motion(self, motion: float) -> None:
         if motion in CYCLES and self._motion not in CYCLES:
@@ -183,6 +255,8 @@ class Moves(Modes):
         if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
             what = f"{name('G', code)} with {'another plane than G17' if self._plane else 'G93, or A, B, C'}"
             raise block.place.fault(column, what, "post cycles as single moves")
+        if self._cutter is not None:
+            raise block.place.fault(column, "a cycle beside a contour (G41, G42)", "write G40 before it")
         depths = self._cycle.depths(code, block, self._state, column, absolute=self._absolute)
         self._check_feed(block, column)
         corner, self.path.corner_mm = self.path.corner_mm, 0.0  # LinuxCNC follows the exact path there

@@ -111,7 +111,7 @@ class _Interpreter(Moves):
     def _ran_lines(self, first: int) -> bool:
         """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""
         ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
-        if not ready or self._per_move or self._upright or self.path.unknown:
+        if not ready or self._per_move or self._upright or self.path.unknown or self._cutter:
             return False
         text = self.flow.lines_like(LINES)
         if not text:
@@ -156,6 +156,7 @@ class _Interpreter(Moves):
             if block.code(ModalGroup.ONCE) == DWELL:
                 self.path.dwell(self._dwell_s(block), line=block.place.line)
             self._modes(block)
+            self._cutter_radius(block)
             self._tool_length(block)
             self._offsets(block)
         self._move(block)

@@ -274,7 +274,7 @@ def _of_run(
         case events.RunRestored():
             return "recorded before, it waits for its verdict"
         case events.RunAccepted():
-            return "accepted"
+            return "accepted" if event.beside is None else f"accepted; {event.beside.label} counts too"
         case events.RunRejected():
             return f"does not count, kept ({event.reason})"
         case events.RunCompleted(figures=figures) if figures is not None:

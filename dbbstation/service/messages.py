@@ -27,6 +27,8 @@ class Message:
 def message_of(event: object) -> Message | None:  # noqa: C901, PLR0911 - a line per event, nothing nested
     """Return an event's message, or None."""
     match event:
+        case events.RunAccepted(beside=beside) if beside is not None:
+            return Message(Weight.WARNING, f"{event.run.label} accepted; {beside.label} counts too")
         case events.RunAccepted():
             return Message(Weight.NOTE, f"{event.run.label} accepted")
         case events.RunRejected():

@@ -196,10 +196,15 @@ class Noted:
 
 @dataclass(frozen=True)
 class RunAccepted:
-    """The run counts."""
+    """The run counts.
+
+    Attributes:
+        beside: an accepted run of the same test and direction that counts too.
+    """
 
     run: RunId
     reason: str = ""
+    beside: RunId | None = None
 
 
 @dataclass(frozen=True)

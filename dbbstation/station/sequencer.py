@@ -233,11 +233,11 @@ class Sequencer:
 
     def _accept(self, command: Accept) -> None:
         run = self._announced()
-        beside = self.schedule.counts_beside(run) if command.alone else None
+        beside = self.schedule.counts_beside(run)
         self.schedule.accept(run)
         reason = command.reason or (f"accepted although {self._wrong}" if self._wrong else "")
-        self._out.append(events.RunAccepted(run, reason))
-        if beside is not None:
+        self._out.append(events.RunAccepted(run, reason, None if command.alone else beside))
+        if beside is not None and command.alone:
             self.schedule.judge(beside.test, beside.direction, beside.repeat, accepted=False)
             self._out.append(events.RunRejected(beside, f"{run.label} counts in its place"))
         self._take_back(command)
@@ -279,13 +279,12 @@ class Sequencer:
         self._to_next(COMMAND_CAUSES[type(command)])
 
     def _judge(self, command: Judge) -> None:
-        self.schedule.judge(command.test, command.direction, command.repeat, accepted=command.accepted)
         # The mounting of a run that was recorded long ago is not needed to judge it.
         run = events.RunId(command.test, command.direction, command.repeat, 0)
-        verdict = (
-            events.RunAccepted(run, command.reason) if command.accepted else events.RunRejected(run, command.reason)
-        )
-        self._out.append(verdict)
+        beside = self.schedule.counts_beside(run)
+        self.schedule.judge(command.test, command.direction, command.repeat, accepted=command.accepted)
+        verdict = events.RunAccepted(run, command.reason, beside) if command.accepted else None
+        self._out.append(verdict or events.RunRejected(run, command.reason))
 
     def _stop(self) -> None:
         self._flush()

@@ -116,7 +116,7 @@ HELP = {
                 "measured again by Enter. If an earlier circle is wrong, Enter goes back to it."
             ),
         ),
-        {key: sentence for key, sentence in _RUN_KEYS.items() if key in {"enter", "m", "u", "r", "p"}},
+        {key: sentence for key, sentence in _RUN_KEYS.items() if key in {"enter", "m", "u", "z", "r", "p"}},
     ),
     "answer": Help(
         "Answer",

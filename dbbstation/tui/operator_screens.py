@@ -200,7 +200,7 @@ class OperateScreen(RunScreen):
         super().draw()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        if action in {"accept", "alone"} or (action == "tell" and str(parameters[0]) in {"reject", "skip", "accept"}):
+        if action == "accept" or (action == "tell" and str(parameters[0]) in {"reject", "skip", "accept"}):
             return False
         return super().check_action(action, parameters)
 

@@ -41,8 +41,8 @@ def now_for_operator(board: Board) -> str:
     if found.word is Advice.REPEAT:
         return f"{found.word}  {completed.run.label}: {_ended(found.causes[0])} Enter measures it again."
     if found.word is Advice.CANNOT_TELL:
-        return f"{found.word}  {completed.run.label}: {_unseen(found)} U goes on all the same, R measures it again."
-    return f"{found.word}  {completed.run.label}. {_later(found)}Enter goes on."
+        return f"{found.word}  {completed.run.label}: {_unseen(found)} {_both(board)}U goes on all the same, R measures it again."
+    return f"{found.word}  {completed.run.label}. {_both(board)}{_later(found)}Enter goes on."
 
 
 _THROUGH = "Every circle is measured: the answer follows."
@@ -77,14 +77,19 @@ def _verdict(board: Board) -> str:
     name, found = board.completed.run.label, board.completed.answer
     if board.doubted:
         return f"{_looked_back(board)} A accepts this one and leaves them."
-    beside = board.completed.counts_beside
-    both = f"{beside.label} counts too: Z accepts this one in its place. " if beside is not None else ""
     if found.word is Advice.REPEAT:
         more = f" ({len(found.causes) - 1} more)" if len(found.causes) > 1 else ""
         return f"{found.word}  {name}: {_ended(found.causes[0])}{more} Enter or R measures it again; A asks why it counts all the same."
     if found.word is Advice.CANNOT_TELL:
-        return f"{found.word}  {name}: {_unseen(found)} {both}U or A accepts it all the same, R measures it again."
-    return f"{found.word}  {name}. {both}{_later(found)}Enter or A accepts it, R measures it again, X rejects it and goes on."
+        return (
+            f"{found.word}  {name}: {_unseen(found)} {_both(board)}U or A accepts it all the same, R measures it again."
+        )
+    return f"{found.word}  {name}. {_both(board)}{_later(found)}Enter or A accepts it, R measures it again, X rejects it and goes on."
+
+
+def _both(board: Board) -> str:
+    beside = None if board.completed is None else board.completed.counts_beside
+    return f"{beside.label} counts too: Z accepts this one in its place. " if beside is not None else ""
 
 
 def _unseen(found: RunAssessment) -> str:

@@ -28,13 +28,15 @@ from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
+from dbbstation.service.board import RunDecision
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
+from dbbstation.service.messages import Message, Weight, message_of
 from dbbstation.service.operated import SHIFT_S, Answered, JobAnswer, answer_of, read_operated
 from dbbstation.service.shop_temperature import changed_since
 from dbbstation.service.work import WorkProgress
-from dbbstation.station.commands import Accept, Quit, Repeat
+from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Repeat
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
@@ -235,6 +237,42 @@ def test_a_circle_that_cannot_be_told_has_a_key_of_its_own() -> None:
     (sent,) = runner.sent
     assert isinstance(sent, Accept)
     assert sent.reason.startswith("not to be seen: whether something moved during the circle, whether it is the circle")
+
+
+@pytest.mark.parametrize("operated", [False, True])
+def test_a_second_run_of_a_test_and_direction_is_offered_in_place_of_the_first(*, operated: bool) -> None:
+    sound = (found(Name.CLOSURE, 0.1, 1.0, "µm", "", ""),)
+    happening = Happening(findings=sound).circle("t0", Direction.CCW).command(Accept())
+    happening.command(GoTo("t0", Direction.CCW)).circle("t0", Direction.CCW)
+    runner = Waits(happening.events)
+    app = StationApp(happening.shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            if operated:
+                app.push_screen(OperateScreen(app, happening.shown()))
+            app.look()
+            await pilot.pause()
+            said = " ".join(str(app.screen.query_one("#now").visual).split())
+            assert "t0-ccw-1 counts too: Z accepts this one in its place." in said
+            await pilot.press("z")
+
+    asyncio.run(run())
+    assert runner.sent == [Accept(alone=True)]
+    both = happening.sequencer.command(Accept())[0]
+    assert message_of(both) == Message(Weight.WARNING, "t0-ccw-2 accepted; t0-ccw-1 counts too")
+    happening.sequencer.command(Judge("t0", Direction.CCW, 1, accepted=False))
+    told = happening.sequencer.command(Judge("t0", Direction.CCW, 1, accepted=True))[0]
+    assert message_of(told) == Message(Weight.WARNING, "t0-ccw-1 accepted; t0-ccw-2 counts too")
+
+
+def test_the_older_run_does_not_count_after_the_newer_took_its_place() -> None:
+    happening = Happening().circle("t0", Direction.CCW).command(Accept(), GoTo("t0", Direction.CCW))
+    happening.circle("t0", Direction.CCW).command(Accept(alone=True))
+    board = happening.board()
+    assert board.verdicts["t0-ccw-1"] is RunDecision.REJECTED
+    assert board.verdicts["t0-ccw-2"] is RunDecision.ACCEPTED
+    assert board.reasons["t0-ccw-1"] == "t0-ccw-2 counts in its place"
 
 
 def test_a_job_begins_anew_asks_for_what_is_required_and_after_a_shift(job_file: Path) -> None:

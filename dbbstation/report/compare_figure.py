@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.diagnosis.compare.words import by_angle_um
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, ShownFigure, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
@@ -17,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
 
-    from dbbstation.diagnosis.compare.comparison import Comparison, RunDifference
+    from dbbstation.diagnosis.compare.comparison import Comparison
+    from dbbstation.diagnosis.compare.findings import RunDifference
 
 OVERLAYS = 3
 COLOUR_A, COLOUR_B = AFTER, BEFORE
@@ -25,9 +25,9 @@ COLOUR_A, COLOUR_B = AFTER, BEFORE
 
 def compare_figure(found: Comparison, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw maps over test and angle, and the worst runs of three tests, as SVG."""
-    tests = list(dict.fromkeys((run.pair.test, run.pair.number) for run in found.runs))
+    tests = list(dict.fromkeys((run.test, run.number) for run in found.runs))
     with in_style():
-        reach = max(1e3 * float(np.abs(run.smooth_mm).max()) for run in found.runs) or 1.0
+        reach = max(abs(run.peak_um) for run in found.runs) or 1.0
         if isinstance(wanted, OnePanel):
             draw = partial(_map, found=found, tests=tests, reach=reach)
             return wanted.draw({str(direction): partial(draw, direction=direction) for direction in Direction})
@@ -48,14 +48,14 @@ def compare_figure(found: Comparison, wanted: Wanted = FigureFormat.SVG) -> Any:
 
 def _worst(found: Comparison) -> list[RunDifference]:
     by_test: dict[str, RunDifference] = {}
-    for run in sorted(found.runs, key=lambda run: (-float(np.sum(run.found_mm**2)), -run.rms_mm)):
-        by_test.setdefault(run.pair.test, run)
+    for run in sorted(found.runs, key=lambda run: (-float(np.sum(run.found_mm**2)), -run.rms_um)):
+        by_test.setdefault(run.test, run)
     return list(by_test.values())[:OVERLAYS]
 
 
 def _map(axes: Axes, found: Comparison, tests: list[tuple[str, int]], direction: Direction, reach: float) -> QuadMesh:
-    rows = {(r.pair.test, r.pair.number): by_angle_um(r) for r in found.runs if r.pair.direction is direction}
-    nothing = np.full(len(by_angle_um(found.runs[0])), np.nan)
+    rows = {(r.test, r.number): r.by_angle_um for r in found.runs if r.direction == direction}
+    nothing = np.full(len(found.runs[0].by_angle_um), np.nan)
     values = np.array([rows.get(test, nothing) for test in tests])
     edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
     mesh = axes.pcolormesh(edges, np.arange(len(tests) + 1), values, cmap=DIVERGING, vmin=-reach, vmax=reach)
@@ -72,7 +72,7 @@ def _overlay(readings: Axes, differences: Axes, run: RunDifference) -> None:
     theta = run.pair.theta_deg
     readings.plot(theta, 1e3 * run.pair.a_mm, color=COLOUR_A, linewidth=1.0, label="A")
     readings.plot(theta, 1e3 * run.pair.b_mm, color=COLOUR_B, linewidth=1.0, label="B")
-    readings.set_title(f"{run.pair.label}: {1e3 * run.rms_mm:.1f} µm rms apart")
+    readings.set_title(f"{run.pair.label}: {run.rms_um:.1f} µm rms apart")
     readings.legend()
     differences.plot(theta, 1e3 * run.pair.difference_mm, color="#bbbbbb", linewidth=0.6)
     differences.plot(theta, 1e3 * run.smooth_mm, color="black", linewidth=1.2, label="smooth")

@@ -8,6 +8,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dbbstation.diagnosis.compare.findings import DirectionHalves, LargestEffect, RunDifference
+from dbbstation.diagnosis.compare.pairs import NotComparable
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
@@ -15,60 +17,6 @@ from dbbstation.inference.verdict import Gains
 from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed, picked
 from dbbstation.results.levels_text import level_sentences
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparedRun:
-    """A run of B minus that of A.
-
-    Attributes:
-        differs: whether the found effects are certain in this run.
-        circularity_um: range of the difference about its centre.
-        peak_um: with sign.
-        by_angle_um: means over ten degrees from +X.
-    """
-
-    test: str
-    direction: str
-    number: int
-    repeats_a: tuple[int, ...]
-    repeats_b: tuple[int, ...]
-    differs: bool
-    found_rms_um: float
-    found_sigmas: float
-    rms_um: float
-    noise_rms_um: float
-    centre_shift_um: tuple[float, float]
-    centre_shift_uncertainty_um: float
-    mean_radial_change_um: float
-    mean_radial_change_uncertainty_um: float
-    circularity_um: float
-    peak_um: float
-    peak_theta_deg: float
-    by_angle_um: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class DirectionHalves:
-    """Parts of the difference that are equal or opposite in both directions.
-
-    Attributes:
-        opposite_um: rms of the part with changing sign.
-    """
-
-    same_um: float
-    opposite_um: float
-
-
-@dataclass(frozen=True)
-class LargestEffect:
-    """The run and angle of a cause's largest effect."""
-
-    test: str
-    direction: str
-    theta_deg: tuple[float, float]
-    peak_um: float
-    text: str
 
 
 @dataclass(frozen=True)
@@ -108,11 +56,11 @@ class ComparedCause:
     log_evidence: float
     ambiguous_with: tuple[str, ...]
     equivalent: Annotated[tuple[str, ...], Field(serialization_alias="class")]
-    rms_um: float | None
-    share: float | None
-    taken_up: float | None
-    opposite: float | None
-    where: LargestEffect | None
+    rms_um: float | None = None
+    share: float | None = None
+    taken_up: float | None = None
+    opposite: float | None = None
+    where: LargestEffect | None = None
     spans: tuple[VariableSpan, ...]
     parameters: Mapping[str, Value]
     text: str
@@ -135,14 +83,6 @@ class ComparisonResidual:
 
     beyond_noise: bool
     probability: float
-    text: str
-
-
-@dataclass(frozen=True)
-class NotComparable:
-    """A test of both sessions that cannot be compared."""
-
-    test: str
     text: str
 
 
@@ -171,7 +111,7 @@ class ComparisonResult(Framed):
     held_out: str
     held_out_worse: bool | None
     held_out_rms_um: BeforeAfter
-    runs: tuple[ComparedRun, ...]
+    runs: tuple[RunDifference, ...]
     directions: DirectionHalves | None
     cancelling: Cancelling | None
     organised_text: str

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import binom
 
 from dbbstation.diagnosis.compare.comparison import compare
-from dbbstation.diagnosis.compare.pairs import at_common_angles, match
+from dbbstation.diagnosis.compare.pairs import NotComparable, at_common_angles, match
 from dbbstation.diagnosis.compare.set_up import ALIKE, JIG
 from dbbstation.errors import TraceError
 from dbbstation.files.formats.plan import read_plan
@@ -132,9 +132,12 @@ def test_the_bar_is_told(reference):
     assert [one.where for one in found.levels.follows] == [ALIKE]
     (offset,) = best.values.values()
     assert offset.value == pytest.approx(0.005, abs=2 * np.hypot(BAR_MM, BAR_MM))
-    assert all(run.radial_mm == pytest.approx(0.005, abs=0.0002) for run in found.runs)
+    assert all(run.mean_radial_change_um == pytest.approx(5.0, abs=0.2) for run in found.runs)
     # 5 µm where both bars together are known to 0.7 µm: seven sigma in every run.
-    assert all(run.radial_sigma_mm == pytest.approx(np.hypot(BAR_MM, BAR_MM), rel=0.05) for run in found.runs)
+    assert all(
+        run.mean_radial_change_uncertainty_um == pytest.approx(1e3 * np.hypot(BAR_MM, BAR_MM), rel=0.05)
+        for run in found.runs
+    )
 
 
 def test_one_curve_in_all_tests_is_the_set_ups_and_one_of_a_strut_is_not(reference):
@@ -168,11 +171,13 @@ def test_one_ball_that_sits_badly_is_found_in_its_two_runs(reference):
     different = [run for run in found.runs if run.differs]
     assert [run.pair.label for run in different] == ["d ccw 1", "d cw 1"]
     worst = different[0]
-    assert worst.centre_mm == pytest.approx((-0.02, 0.0), abs=5 * worst.centre_sigma_mm)
-    assert worst.centre_sigma_mm == pytest.approx(np.sqrt(2) * np.hypot(MOUNTING_MM, BALL_MM), rel=0.02)
-    assert worst.circularity_mm < 0.001
+    assert worst.centre_shift_um == pytest.approx((-20.0, 0.0), abs=5 * worst.centre_shift_uncertainty_um)
+    assert worst.centre_shift_uncertainty_um == pytest.approx(
+        1e3 * np.sqrt(2) * np.hypot(MOUNTING_MM, BALL_MM), rel=0.02
+    )
+    assert worst.circularity_um < 1.0
     best = the_cause(found, Verdict.HAPPENED)
-    assert (best.name, best.label, found.effects[best.name].test) == ("mounting", "test d", "d")
+    assert (best.name, best.label, found.effects[best.name].where.test) == ("mounting", "test d", "d")
 
 
 def test_a_jig_that_was_put_down_elsewhere_is_one_body(reference):
@@ -210,10 +215,10 @@ def test_what_changes_its_sign_with_the_direction(reference):
     found = compare(reference, shop.session("A"), shop.session("B", reversal))
     assert found.differ
     assert found.effects[found.there[0].name].opposite > 0.99
-    same, opposite = found.halves_mm
+    halves = found.directions
     # A square wave of 1 µm; a little of it could be angles that were cut wrongly.
-    assert 0.85 < 1e3 * opposite < 1.02
-    assert same < 0.0002
+    assert 0.85 < halves.opposite_um < 1.02
+    assert halves.same_um < 0.2
 
 
 def test_a_difference_without_order_is_called_that(reference):
@@ -298,7 +303,7 @@ def test_equal_names_of_different_circles_are_not_compared(change, what):
     ]
     matching = match(a, b)
     assert {pair.test for pair in matching.pairs} == {"b"}
-    assert matching.not_comparable == (("a", what),)
+    assert matching.not_comparable == (NotComparable("a", what),)
 
 
 def test_cmm_differences_of_a_ball_are_one_circle():

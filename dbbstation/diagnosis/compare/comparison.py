@@ -13,6 +13,7 @@ from dbbstation.calibration.fit.methods import CENTRED_MM
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.compare.channel import channel_of
 from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm
+from dbbstation.diagnosis.compare.findings import DirectionHalves, RunDifference
 from dbbstation.diagnosis.compare.left_out import predicted, tried_without_tests
 from dbbstation.diagnosis.compare.pairs import match
 from dbbstation.diagnosis.compare.set_up import with_set_up
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.compare.details import EffectOfCause
+    from dbbstation.diagnosis.compare.findings import EffectOfCause
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.held_out import HeldOut
@@ -45,51 +46,14 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
+SECTORS = 36
+"""Means of ten degrees."""
+
 CENTRED_SIGMA = 4.0
 """Standard uncertainties by noise within which a centre lies, in every run, where it was removed; or within `CENTRED_MM`."""
 
 CENTRED_SHAPE = 25.0
 """... if its form about that centre is this many times the smallest centre that would have been noticed."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunDifference:
-    """A run of B minus that of A.
-
-    Attributes:
-        smooth_mm: up to the highest smooth harmonic, shape (s,).
-        noise_mm: rms noise of the smooth difference.
-        found_mm: by found causes, shape (s,).
-        centre_sigma_mm: standard deviation by noise and stated balls.
-        radial_sigma_mm: by noise, stated bars, and balls of raised bars.
-    """
-
-    pair: Pair
-    smooth_mm: NDArray[np.float64]
-    noise_mm: float
-    found_mm: NDArray[np.float64]
-    sigmas: float
-    centre_mm: tuple[float, float]
-    centre_sigma_mm: float
-    radial_mm: float
-    radial_sigma_mm: float
-    circularity_mm: float
-
-    @property
-    def rms_mm(self) -> float:
-        """Return the smooth difference's rms [mm]."""
-        return rms(self.smooth_mm)
-
-    @property
-    def differs(self) -> bool:
-        """Return whether findings are certain in this run."""
-        return self.sigmas >= OUT
-
-    @property
-    def peak(self) -> tuple[float, float]:
-        """Return angle [deg] and value [mm] of the greatest smooth difference."""
-        at = int(np.argmax(np.abs(self.smooth_mm)))
-        return float(self.pair.theta_deg[at]), float(self.smooth_mm[at])
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,24 +113,19 @@ class Comparison:
         return cancelling({name: settled.effect([name]) for name in sorted(settled.best.names)}, "µm", 1e3)
 
     @property
-    def noise_mm(self) -> float:
-        """Return the rms of noise in smooth differences [mm]."""
-        return self.runs[0].noise_mm
-
-    @property
     def found_rms_mm(self) -> float:
         """Return the rms of findings over all runs [mm]."""
         return rms(np.concatenate([run.found_mm for run in self.runs]))
 
     @property
-    def halves_mm(self) -> tuple[float, float] | None:
+    def directions(self) -> DirectionHalves | None:
         """Return findings common and opposite to both directions, or None."""
         both = np.array(
             [[self.runs[k].found_mm for k in runs] for runs in both_directions([run.pair for run in self.runs])]
         )
         if not len(both):
             return None
-        return rms(both.mean(axis=1)), rms(0.5 * (both[:, 0] - both[:, 1]))
+        return DirectionHalves(1e3 * rms(both.mean(axis=1)), 1e3 * rms(0.5 * (both[:, 0] - both[:, 1])))
 
 
 @with_one_thread
@@ -235,12 +194,7 @@ def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
 
 
 def _run(
-    pair: Pair,
-    settled: Settled,
-    rows: slice,
-    order: NDArray[np.int64],
-    found: NDArray[np.float64],
-    sigmas: float,
+    pair: Pair, settled: Settled, rows: slice, order: NDArray[np.int64], found: NDArray[np.float64], sigmas: float
 ) -> RunDifference:
     theta, count = np.radians(pair.theta_deg), len(pair.theta_deg)
     low, _ = bands(count)
@@ -249,27 +203,52 @@ def _run(
     first = [0, 1, low + 1]
     shape = row.copy()
     shape[first] = 0.0
-    # What is stated of balls, bars and starts, as it shows in constant, first cosine and first sine of this run.
-    base = settled.channel.base
-    by_angle = np.empty((count, len(base.prior)))
-    by_angle[order] = base.samples[rows] * base.prior
-    stated = np.sum((columns[:, first].T @ by_angle) ** 2, axis=1)
     noise = settled.noise.effective
-    sigma = np.sqrt(stated + noise**2)
+    sigma = np.sqrt(_stated(settled, rows, order, columns[:, first]) + noise**2)
     # Of a raised bar the radius on the level is seen along the bar: less by the cosine of its elevation.
     per_mm = np.sqrt(count / 2.0) * float(np.cos(np.radians(pair.circle.elevation_deg)))
+    smooth = np.asarray(columns @ row, dtype=np.float64)
+    at = int(np.argmax(np.abs(smooth)))
     return RunDifference(
+        test=pair.test,
+        direction=str(pair.direction),
+        number=pair.number,
+        repeats_a=tuple(one.repeat for one in pair.a),
+        repeats_b=tuple(one.repeat for one in pair.b),
+        differs=sigmas >= OUT,
+        found_rms_um=1e3 * rms(found),
+        found_sigmas=sigmas,
+        rms_um=1e3 * rms(smooth),
+        noise_rms_um=1e3 * (noise * float(np.sqrt(len(row) / count))),
+        centre_shift_um=(1e3 * float(row[1] / per_mm), 1e3 * float(row[low + 1] / per_mm)),
+        centre_shift_uncertainty_um=1e3 * float(sigma[1:].max() / per_mm),
+        mean_radial_change_um=1e3 * float(row[0] / np.sqrt(count)),
+        mean_radial_change_uncertainty_um=1e3 * float(sigma[0] / np.sqrt(count)),
+        circularity_um=1e3 * float(np.ptp(columns @ shape)),
+        peak_um=1e3 * float(smooth[at]),
+        peak_theta_deg=float(pair.theta_deg[at]),
+        by_angle_um=_by_angle_um(pair.theta_deg, smooth),
         pair=pair,
-        smooth_mm=np.asarray(columns @ row, dtype=np.float64),
-        noise_mm=noise * float(np.sqrt(len(row) / count)),
+        smooth_mm=smooth,
         found_mm=found,
-        sigmas=sigmas,
-        centre_mm=(float(row[1] / per_mm), float(row[low + 1] / per_mm)),
-        centre_sigma_mm=float(sigma[1:].max() / per_mm),
-        radial_mm=float(row[0] / np.sqrt(count)),
-        radial_sigma_mm=float(sigma[0] / np.sqrt(count)),
-        circularity_mm=float(np.ptp(columns @ shape)),
     )
+
+
+def _stated(
+    settled: Settled, rows: slice, order: NDArray[np.int64], columns: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the variances of stated balls, bars and starts in a run's constant, first cosine and first sine [mm²]."""
+    base = settled.channel.base
+    by_angle = np.empty((len(columns), len(base.prior)))
+    by_angle[order] = base.samples[rows] * base.prior
+    return np.asarray(np.sum((columns.T @ by_angle) ** 2, axis=1), dtype=np.float64)
+
+
+def _by_angle_um(theta_deg: NDArray[np.float64], smooth_mm: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return means over ten degrees from +X, 36 of them [µm]."""
+    sector = (theta_deg * (SECTORS / 360.0)).astype(np.int64)
+    count = np.bincount(sector, minlength=SECTORS)
+    return tuple((1e3 * np.bincount(sector, smooth_mm, minlength=SECTORS) / np.maximum(count, 1)).tolist())
 
 
 def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
+from dbbstation.diagnosis.compare.findings import EffectOfCause, LargestEffect
 from dbbstation.inference.read_off import HALF
-from dbbstation.inference.triangle import RANK
+from dbbstation.inference.triangle import RANK, rms
 from dbbstation.inference.verdict import OUT
 from dbbstation.sources.registry import sources_named
 
@@ -21,27 +21,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.settled import Settled
-
-
-@dataclass(frozen=True)
-class EffectOfCause:
-    """A cause's effect on the difference.
-
-    Attributes:
-        share: of the total chi-square reduction, alone.
-        taken_up: share of squares that a kinematic calibration of B absorbs.
-        opposite: share of squares odd in direction, over tests run both ways.
-        theta_deg: arc of at least half its peak, from and to.
-    """
-
-    rms_mm: float
-    share: float
-    taken_up: float
-    opposite: float
-    test: str
-    direction: str
-    theta_deg: tuple[float, float]
-    peak_mm: float
 
 
 def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
@@ -69,17 +48,11 @@ def _placed(sides: Sides, rows: NDArray[np.float64], share: float, taken_up: flo
     ahead = count if rolled.all() else int(np.argmin(rolled))
     back = 0 if rolled.all() else int(np.argmin(rolled[::-1]))
     step = 360.0 / count
-    arc = ((at - back) * step % 360.0, ((at + ahead) * step - 1e-9) % 360.0)
-    return EffectOfCause(
-        float(np.sqrt(np.mean(rows**2))),
-        share,
-        taken_up,
-        opposite_share(sides, by_run),
-        pair.test,
-        str(pair.direction),
-        arc,
-        float(values[at]),
-    )
+    first, last = (at - back) * step % 360.0, ((at + ahead) * step - 1e-9) % 360.0
+    peak_um, run = 1e3 * float(values[at]), f"{pair.test} {pair.direction}"
+    text = f"up to {peak_um:+.1f} µm in test {run}, {first:.0f} to {last:.0f} degrees"
+    where = LargestEffect(pair.test, str(pair.direction), (first, last), peak_um, text)
+    return EffectOfCause(1e3 * rms(rows), share, taken_up, opposite_share(sides, by_run), where)
 
 
 def opposite_share(sides: Sides, by_run: list[NDArray[np.float64]]) -> float:

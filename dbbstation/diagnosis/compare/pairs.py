@@ -83,6 +83,14 @@ class Pair:
         return np.interp(self.theta_deg, self.theta_deg[there], difference[there], period=FULL_TURN_DEG)
 
 
+@dataclass(frozen=True)
+class NotComparable:
+    """A test of both sessions that cannot be compared."""
+
+    test: str
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class Matching:
     """Runs paired for comparison.
@@ -96,7 +104,7 @@ class Matching:
     pairs: tuple[Pair, ...]
     only_a: tuple[str, ...]
     only_b: tuple[str, ...]
-    not_comparable: tuple[tuple[str, str], ...]
+    not_comparable: tuple[NotComparable, ...]
     averaged: tuple[str, ...]
 
 
@@ -131,7 +139,7 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
             averaged.append(f"{' '.join(key)}: mean of {len(one)} against mean of {len(other)}")
         for number, (x, y) in enumerate(sets, start=1):
             pairs.append(Pair(tuple(x), tuple(y), number, _mean(x, sectors), _mean(y, sectors)))
-    return Matching(tuple(pairs), only_a, only_b, tuple(unlike.items()), tuple(averaged))
+    return Matching(tuple(pairs), only_a, only_b, tuple(NotComparable(*one) for one in unlike.items()), tuple(averaged))
 
 
 def common_sectors(raws: Sequence[RawCircle]) -> int:

@@ -1,4 +1,4 @@
-"""Sentences of a comparison, and differences by angle."""
+"""Sentences of a comparison."""
 
 from __future__ import annotations
 
@@ -7,23 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.diagnosis.compare.comparison import Comparison, RunDifference
+    from dbbstation.diagnosis.compare.comparison import Comparison
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.read_off import CauseFinding
-
-SECTORS = 36
-"""Means of ten degrees."""
-
-
-def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
-    """Return smooth means over ten degrees from +X, shape (36,) [µm]."""
-    sector = (run.pair.theta_deg * (SECTORS / 360.0)).astype(np.int64)
-    count = np.bincount(sector, minlength=SECTORS)
-    return np.asarray(
-        1e3 * np.bincount(sector, run.smooth_mm, minlength=SECTORS) / np.maximum(count, 1), dtype=np.float64
-    )
 
 
 def label_of(finding: CauseFinding) -> str:
@@ -47,8 +33,8 @@ def verdict_text(found: Comparison) -> str:
             f"These runs do not decide whether the sessions differ (probability {found.probability:.2f}); if they do, it is "
             f"{', '.join(label_of(finding) for finding in found.there)}."
         )
-    centre = 1e3 * float(np.median([run.centre_sigma_mm for run in found.runs]))
-    radial = 1e3 * float(np.median([run.radial_sigma_mm for run in found.runs]))
+    centre = float(np.median([run.centre_shift_uncertainty_um for run in found.runs]))
+    radial = float(np.median([run.mean_radial_change_uncertainty_um for run in found.runs]))
     return (
         f"No difference beyond noise, balls and bars (probability of one {found.probability:.2f}). A strut that had become "
         f"{1e3 * found.noticed_mm:.2g} µm longer would have been found; centres are compared to ± {centre:.2g} µm, mean lengths "

@@ -1,0 +1,97 @@
+"""What a comparison finds, B minus A; fields are JSON keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dbbstation.diagnosis.compare.pairs import Pair
+from dbbstation.facts.serialise import AsItIs, Kept
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunDifference:
+    """A run of B minus that of A.
+
+    Attributes:
+        differs: whether the found effects are certain in this run.
+        found_rms_um: by found causes.
+        rms_um: of the smooth difference, up to its highest harmonic.
+        noise_rms_um: of the smooth difference.
+        centre_shift_uncertainty_um: by noise and stated balls.
+        mean_radial_change_uncertainty_um: by noise, stated bars, and balls of raised bars.
+        circularity_um: range of the difference about its centre.
+        peak_um: with sign.
+        by_angle_um: means over ten degrees from +X.
+        smooth_mm: shape (s,).
+        found_mm: by found causes, shape (s,).
+    """
+
+    test: str
+    direction: str
+    number: int
+    repeats_a: tuple[int, ...]
+    repeats_b: tuple[int, ...]
+    differs: bool
+    found_rms_um: float
+    found_sigmas: float
+    rms_um: float
+    noise_rms_um: float
+    centre_shift_um: tuple[float, float]
+    centre_shift_uncertainty_um: float
+    mean_radial_change_um: float
+    mean_radial_change_uncertainty_um: float
+    circularity_um: float
+    peak_um: float
+    peak_theta_deg: float
+    by_angle_um: tuple[float, ...]
+    pair: Annotated[Pair, AsItIs, Kept]
+    smooth_mm: Annotated[NDArray[np.float64], AsItIs, Kept]
+    found_mm: Annotated[NDArray[np.float64], AsItIs, Kept]
+
+
+@dataclass(frozen=True)
+class DirectionHalves:
+    """Parts of the difference that are equal or opposite in both directions.
+
+    Attributes:
+        opposite_um: rms of the part with changing sign.
+    """
+
+    same_um: float
+    opposite_um: float
+
+
+@dataclass(frozen=True)
+class LargestEffect:
+    """The run and angle of a cause's largest effect.
+
+    Attributes:
+        theta_deg: arc of at least half its peak, from and to.
+    """
+
+    test: str
+    direction: str
+    theta_deg: tuple[float, float]
+    peak_um: float
+    text: str
+
+
+@dataclass(frozen=True)
+class EffectOfCause:
+    """A cause's effect on the difference.
+
+    Attributes:
+        share: of the total chi-square reduction, alone.
+        taken_up: share of squares that a kinematic calibration of B absorbs.
+        opposite: share of squares odd in direction, over tests run both ways.
+    """
+
+    rms_um: float
+    share: float
+    taken_up: float
+    opposite: float
+    where: LargestEffect

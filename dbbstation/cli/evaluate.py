@@ -29,7 +29,7 @@ def show(result: EvaluationResult) -> None:
     echo(f"model leaves           {result.residual_rms_um:8.2f} µm rms")
     echo(f"uncompensated at Z {result.plane_z_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     if result.plane_without:
-        echo(f"(without {', '.join(result.plane_without)}: no pose alone says what they do)")
+        echo(f"(without {', '.join(result.plane_without)}: their effect does not follow from the pose alone)")
     for label, value_um, u_um in (
         ("flatness           ", result.flatness_um, result.flatness_u_um),
         ("parallelism along X", result.parallelism_um, result.parallelism_u_um),

@@ -149,7 +149,7 @@ def take_in(folder: Path, *, as_json: bool) -> None:
     for name in taken:
         echo(f"{name}: complete, accept or reject it")
     if not taken:
-        echo("every sealed run is listed already")
+        echo("the session lists every sealed run already")
 
 
 @session.command()
@@ -353,7 +353,7 @@ def _reason_for(run: str, unusable: str) -> str:
     asker = Asker()
     if not asker.terminal:
         raise click.UsageError(
-            f"{run}: {unusable}\nsay with --reason why it is to be accepted: whoever reads the session later will ask"
+            f"{run}: {unusable}\ngive the reason with --reason: later readers of the session will want it"
         )
     echo(f"{run}: {unusable}", err=True)
     while True:

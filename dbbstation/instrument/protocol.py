@@ -201,7 +201,7 @@ class Timing(Schema):
             return self
         earliest_s, latest_s = self.latch_bounds_s
         if not 0.0 <= earliest_s <= latest_s or self.latch_delay_s:
-            raise ValueError("latch_bounds_s is [earliest, latest] from 0, and stands instead of latch_delay_s")
+            raise ValueError("write latch_bounds_s as [earliest, latest], both at least 0, and leave latch_delay_s out")
         return self
 
 

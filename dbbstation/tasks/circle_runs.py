@@ -77,7 +77,7 @@ def load_circles(
         warnings += _many(session, used)
     if not circles:
         places = ", ".join(str(session.folder) for session in sessions)
-        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept a run, or exclude fewer tests")])
     return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
 
 

@@ -161,7 +161,7 @@ def load_sessions(
         raise InputError(problems)
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
-        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept a run, or exclude fewer tests")])
     under_correction = {session.name: session.machine for session in sessions if session.machine.control is not None}
     observations = [_under(under_correction.get(one.setup.session), one) for one in observations]
     warnings += [

@@ -428,8 +428,8 @@ def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64]
             f"the length is {length[worst]:.3f} mm, {off[worst]:.3f} mm off the bar's {circle.bar_mm:g} mm, at "
             f"{circle.theta_deg(phi)[worst] % FULL_TURN_DEG:.1f} degrees",
             where=recording.name,
-            remedy="check bar length, units and plan; a ball that left its seat means repeating the run; or the machine is "
-            f"that far off: {coarser if timed else 'set its reference lengths first'}",
+            remedy="check bar length, units and plan; repeat the run if a ball left its seat; if the machine itself errs so much: "
+            f"{coarser if timed else 'set its reference lengths first'}",
         )
     return RawCircle(
         name=recording.name,

@@ -47,7 +47,7 @@ def test_calibrate_follows_the_thermometer_and_keeps_its_form(run, sessions, tmp
     assert again.code == 0
     assert again.data["residual_rms_um"] == pytest.approx(called.data["residual_rms_um"], rel=1e-6)
     assert (
-        "(without thermal-frame: no pose alone says what they do)"
+        "(without thermal-frame: their effect does not follow from the pose alone)"
         in run("evaluate", sessions / "logged", "--model", model).out
     )
     poses.write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")

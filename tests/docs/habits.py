@@ -2,6 +2,7 @@
 
 `python -m tests.docs.habits` prints their shares; `--store` keeps them as limits, `--show HABIT` lists the sentences. Patterns find likely
 cases, not certain ones: "it says" of a person counts too. So a share is a help for whoever writes and no measure of quality.
+`--sample 100 --seed 1` draws sentences for a reader, docstrings among them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import random
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -99,6 +101,25 @@ def in_messages(root: Path) -> Iterator[str]:
                     yield from sentences_of(text)
 
 
+def in_docstrings(root: Path) -> Iterator[str]:
+    """Yield sentences of docstrings, without the lists of arguments and attributes."""
+    for path in sorted((root / "dbbstation").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                prose = re.split(r"^(?:Args|Attributes|Raises):$", ast.get_docstring(node) or "", flags=re.MULTILINE)[0]
+                for block in prose.split("\n\n"):
+                    yield from sentences_of(block)
+
+
+def sample(root: Path, count: int, seed: int) -> Iterator[str]:
+    """Yield as many sentences of each kind, drawn without regard to their number."""
+    every = {**kinds(root), "docstrings": list(in_docstrings(root))}
+    drawn = random.Random(seed)  # noqa: S311 - not for secrets
+    for number in range(count):
+        kind = list(every)[number % len(every)]
+        yield f"{kind}: {drawn.choice(every[kind])}"
+
+
 def _name(call: ast.Call) -> str:
     return call.func.id if isinstance(call.func, ast.Name) else getattr(call.func, "attr", "")
 
@@ -126,8 +147,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--root", type=Path, default=HERE, help="checkout to read")
     parser.add_argument("--show", metavar="HABIT", choices=HABITS, help="list the sentences with this habit")
+    parser.add_argument("--sample", type=int, metavar="N", help="draw sentences for a reader")
+    parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("--store", action="store_true", help="keep the shares as limits of the test")
     given = parser.parse_args()
+    if given.sample:
+        for number, one in enumerate(sample(given.root, given.sample, given.seed), 1):
+            click.echo(f"{number}. {one}")
+        return
     found = kinds(given.root)
     if given.show:
         for kind, sentences in found.items():

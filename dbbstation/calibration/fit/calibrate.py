@@ -454,7 +454,7 @@ def check_raw(observations: Sequence[Observation]) -> None:
     for observation in observations:
         if not isinstance(observation.raw, RawCircle):
             raise CalibrationError(
-                "is a centred circle: its position on the machine is gone",
+                "is a centred circle: centring removed its position on the machine",
                 where=observation.test,
                 remedy="calibrate from the raw recording",
             )

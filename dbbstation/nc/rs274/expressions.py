@@ -141,7 +141,7 @@ class ValueReader:
             return 1
         if abs(number - round(number)) > EQUAL or not 1 <= round(number) <= MOST_PARAMETER:
             raise self._place.fault(
-                at + 1, f"#{number:g} is no parameter", f"their numbers are whole, 1 to {MOST_PARAMETER}"
+                at + 1, f"#{number:g} is no parameter", f"use a whole number from 1 to {MOST_PARAMETER}"
             )
         return round(number)
 

@@ -147,7 +147,7 @@ def check_units(
         if len(numbers) > 1 and float(np.ptp(numbers)) == 0.0:
             raise UnusableTravelError(
                 f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which no gauge reads",
-                "it may be what was wanted and not what was read: name another column with --columns; --trust unit takes the numbers as they are",
+                "the column may hold nominal values: name another with --columns, or take the numbers as they are with --trust unit",
             )
         return
     name = named[found.means]

@@ -202,7 +202,10 @@ def test_a_bar_of_another_length_is_refused():
     recording = trace()
     with pytest.raises(TraceError, match=r"mm off the bar's 150 mm") as refused:
         cut(replace(recording, length_mm=recording.length_mm + 5.0), CIRCLE)
-    assert "if the machine itself errs so much: raise feed_in_mm, or begin with a coarse calibration" in refused.value.remedy
+    assert (
+        "if the machine itself errs so much: raise feed_in_mm, or begin with a coarse calibration"
+        in refused.value.remedy
+    )
 
 
 @pytest.mark.parametrize("feed_in_mm", [0.0, 1.5])

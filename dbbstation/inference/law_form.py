@@ -31,7 +31,7 @@ def law_form(
     settled: Settled,
     one: VariableClass,
     parts: Sequence[NDArray[np.bool_]] | None,
-    found_anew: Collection[str] | None = None,
+    refuted: Collection[str] = (),
 ) -> LawForm:
     """Score single causes, and the best set's own sum, over the variables of a class.
 
@@ -44,12 +44,9 @@ def law_form(
 
     Args:
         parts: rows of each part, shape (n,); None: the evidence of all rows decides.
-        found_anew: causes at picked places that were found again without each part; others are not named. None: not
-            tested.
+        refuted: causes that are not named, since held-out rows speak against them.
     """
-    barred = settled.bank.nameless
-    if found_anew is not None:
-        barred |= settled.bank.looked_for - set(found_anew)
+    barred = settled.bank.nameless | set(refuted)
     whole = _place(settled, one.members, one.wanted, parts, barred)
     if whole.name is not None or len(one.members) == 1:
         return whole

@@ -15,6 +15,8 @@ from dbbstation.facts.value import Value  # noqa: TC001 - types of fields are re
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from dbbstation.inference.verdict import DensityGains
 
 TIME, RUN = "time", "run"
@@ -191,9 +193,7 @@ class Levels:
     @property
     def corrects(self) -> frozenset[str]:
         """Return variables that a correction uses; empty: all."""
-        every = [one for one in self.follows if one.answer in CORRECTS]
-        own = frozenset(name for one in every for names in one.variables for name in names)
-        return own | {name for one in every for name in one.or_variables if name != TIME}
+        return corrects_of(self.follows)
 
     def times(self, factor: float) -> Levels:
         """Return the same in a smaller unit."""
@@ -217,6 +217,14 @@ class Levels:
 CORRECTS = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.NOT_TESTED)
 """Answers of classes that a correction is made of: what happened, or predicts nothing, is true of these rows alone."""
 
+
+def corrects_of(classes: Iterable[Followed]) -> frozenset[str]:
+    """Return variables that a correction by classes uses; empty: all."""
+    every = [one for one in classes if one.answer in CORRECTS]
+    own = frozenset(name for one in every for names in one.variables for name in names)
+    return own | {name for one in every for name in one.or_variables if name != TIME}
+
+
 SAYS_YES = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.HAPPENED)
 
 
@@ -226,8 +234,12 @@ def difference_of(
     gains: DensityGains | None,
     doubts: tuple[str, ...],
     rest: tuple[float, bool, float, tuple[Detectable, ...]],
+    *,
+    correction: bool | None = None,
 ) -> DifferenceFound:
     """Return level 1 from the others.
+
+    What happened once says nothing beside effects that other rows refute: it may make up for them.
 
     Args:
         rest: size of interest, whether stated, independent samples, detectable sizes.
@@ -235,7 +247,10 @@ def difference_of(
     matters, stated, samples, detectable = rest
     answer, why = Differs.NO, ""
     if probability >= SURE:
-        predicts = gains is None or gains.predicts or any(one.answer in SAYS_YES for one in classes)
+        answers = {one.answer for one in classes}
+        if correction is False and FollowsAnswer.DOES_NOT_PREDICT in answers:
+            answers.discard(FollowsAnswer.HAPPENED)
+        predicts = gains is None or gains.predicts or not answers.isdisjoint(SAYS_YES)
         answer = Differs.YES if predicts else Differs.CANNOT_TELL
         why = "" if predicts else "it is found here, and held-out parts gain nothing by it"
         if gains is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +21,7 @@ from dbbstation.inference.followed import (
 )
 from dbbstation.inference.law_form import law_form
 from dbbstation.inference.left_over import SIGNIFICANT
-from dbbstation.inference.levels import ONCE, RUN, TIME, Followed, FollowsAnswer, Levels, difference_of
+from dbbstation.inference.levels import ONCE, RUN, TIME, Followed, FollowsAnswer, Levels, corrects_of, difference_of
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE
 
@@ -67,18 +66,19 @@ def levels_of(
     sizes = detectable(settled) if sizes is None else sizes
     size = settled.channel.size if matters is None else matters
     samples = settled.noise.independent_samples(settled.channel.stretches)
+    correction = False if worse and held_out is None and settled.best.members else None
+    if isinstance(held_out, HeldOutError) and parts is not None and settled.best.members:
+        corrected = held_out.corrected(parts.errors_with(corrects_of(classes)))
+        correction = corrected.after < corrected.as_simulated
     differs = difference_of(
         probability_of_any(settled),
         classes,
         None if parts is None else parts.of(None).gains,
         (*doubts, *_doubts(settled, left, sizes, size)),
         (size, matters is not None, samples, sizes),
+        correction=correction,
     )
-    levels = Levels(differs, classes, False if worse and held_out is None and settled.best.members else None)
-    if not isinstance(held_out, HeldOutError) or parts is None or not settled.best.members:
-        return levels
-    corrected = held_out.corrected(parts.errors_with(levels.corrects))
-    return replace(levels, correction=corrected.after < corrected.as_simulated)
+    return Levels(differs, classes, correction)
 
 
 def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:
@@ -144,7 +144,7 @@ def _followed(
     form, (slope, straight) = None, _straight(settled, one)
     if answer in (FollowsAnswer.FOLLOWS, FollowsAnswer.NOT_TESTED):
         rows = None if parts is None else parts.rows
-        form = law_form(settled, one, rows, None if held_out is None else _found_anew(settled, one, held_out))
+        form = law_form(settled, one, rows, set() if held_out is None else _refuted(settled, held_out))
     return Followed(
         variables=one.each,
         or_variables=one.others,
@@ -166,8 +166,14 @@ def _followed(
     )
 
 
-def _found_anew(settled: Settled, one: VariableClass, held_out: HeldOutError | ChosenAnew) -> list[str]:
-    return [name for name in one.members if held_out.gains_of({settled.bank.kind_of(name)}).predicts]
+def _refuted(settled: Settled, held_out: HeldOutError | ChosenAnew) -> set[str]:
+    """Return causes that held-out rows speak against, and picked ones that they do not confirm."""
+    found, picked = set[str](), settled.bank.looked_for
+    for name in (cause.name for cause in settled.causes):
+        gains = held_out.gains_of({settled.bank.kind_of(name)})
+        if not gains.predicts if name in picked else gains.without_best < 0.0:
+            found.add(name)
+    return found
 
 
 def _in_time(one: VariableClass) -> bool:

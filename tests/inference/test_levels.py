@@ -13,7 +13,7 @@ from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
-from dbbstation.inference.folds import parts_of
+from dbbstation.inference.folds import Fold, HeldOutError, parts_of
 from dbbstation.inference.followed import (
     ChosenWithoutParts,
     VariableProbabilities,
@@ -224,6 +224,28 @@ def followed(answer):
 )
 def test_whether_anything_differs(probability, classes, gains, doubts, answer):
     assert difference_of(probability, classes, gains, doubts, (1.0, False, 100.0, ())).answer is answer
+
+
+def test_what_happened_beside_refuted_effects_is_no_difference():
+    """It can make up for them: one in ten parts is then predicted worse than as simulated, and nothing else speaks for it."""
+    classes = (followed(FollowsAnswer.DOES_NOT_PREDICT), followed(FollowsAnswer.HAPPENED))
+    gains, rest = DensityGains((-1.0, -2.0)), (1.0, False, 100.0, ())
+    assert difference_of(0.99, classes, gains, (), rest, correction=False).answer is Differs.CANNOT_TELL
+    assert difference_of(0.99, classes, gains, (), rest, correction=True).answer is Differs.YES
+    assert difference_of(0.99, classes[1:], gains, (), rest, correction=False).answer is Differs.YES
+
+
+@pytest.mark.parametrize(("parts", "named"), [((3.0, 2.0, 1.0), True), ((3.0, 0.0, -0.5), False), ((0.0,) * 3, True)])
+def test_no_law_is_named_against_held_out_rows(both, parts, named):
+    """Errors of a law's own in parts, without the best of them, decide; a law that other names stood for is not refuted."""
+    _, settled, without = both
+    folds = (
+        Fold("part", 60, 1.0, 1.0, 0.5, {("hysteresis of q",): gain, ("twice per turn of angle",): 1.0})
+        for gain in parts
+    )
+    found = levels_of(settled, left_over(settled), ChosenWithoutParts(without[:3]), HeldOutError(tuple(folds)))
+    forms = {one.name: one.form.name for one in found.follows}
+    assert forms == {"q": "hysteresis of q" if named else None, "angle": "twice per turn of angle"}
 
 
 def test_time_and_single_rows_are_the_time():

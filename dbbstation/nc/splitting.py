@@ -36,7 +36,7 @@ LOOKED_AT = np.array([0.19, 0.5, 0.73, 1.0])
 """Shares of a cell at which the curve is taken: not evenly spaced, so that no wave is met at its zeros each time."""
 
 SHORT_MM, SHORT_DEG, SHORT_OF_A_PERIOD = 1.0, 0.1, 0.02
-"""If all cells at feed are shorter, their middles are enough: the curve is a parabola there."""
+"""Of shorter moves at feed the middle is enough: the curve is a parabola there."""
 
 MIDDLE = np.array([0.5, 1.0])
 
@@ -226,12 +226,44 @@ def off_chord_mm(at: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArra
     return worst
 
 
-def looked_at(curve: CommandCurve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6)."""
-    at = curve.at(np.concatenate([[0.0], along(curve.toolpath, pieces, shares).reshape(-1)]))
-    inside = at[1:].reshape(len(pieces.end), len(shares), 6)
-    begins = np.vstack([at[0], inside[:-1, -1]])
-    return np.concatenate([begins[:, None], inside], axis=1)
+def looked_at(
+    curve: CommandCurve,
+    pieces: Pieces,
+    shares: NDArray[np.float64],
+    bends: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
+    """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6).
+
+    Args:
+        bends: pieces in which the curve may be more than a parabola through begin, `MIDDLE` and end, shape (k,); None: all.
+    """
+    asked = np.ones((len(pieces.end), len(shares)), dtype=np.bool_)
+    if bends is not None:
+        asked = bends[:, None] | np.isin(shares, MIDDLE)
+    found = curve.at(np.concatenate([[0.0], along(curve.toolpath, pieces, shares)[asked]]))
+    at = np.empty((len(pieces.end), 1 + len(shares), 6))
+    at[:, 1:][asked] = found[1:]
+    at[:, 0] = np.vstack([found[0], at[:-1, -1]])
+    if not asked.all():
+        few = np.flatnonzero(~asked.all(axis=1))
+        begin, middle, end = at[few, 0], at[few, 1 + int(np.argmax(shares == MIDDLE[0]))], at[few, -1]
+        for column, share in enumerate(shares.tolist()):
+            weights = (2.0 * share - 1.0) * (share - 1.0), 4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)
+            at[few, 1 + column] = weights[0] * begin + weights[1] * middle + weights[2] * end
+    return at
+
+
+def _halved(
+    curve: CommandCurve, cells: Pieces, shares: NDArray[np.float64], at: NDArray[np.float64], halves: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return what `looked_at` does, from the same of cells of which some are halves now."""
+    if curve.has_history:
+        return looked_at(curve, cells, shares)
+    behind, places = curve.behind, along(curve.toolpath, Pieces(cells.begin[halves], cells.end[halves]), shares)
+    at[halves, 1:] = curve.at(places.reshape(-1)).reshape(*places.shape, 6)
+    at[1:, 0] = at[:-1, -1]
+    curve.behind = behind
+    return at
 
 
 def along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -261,10 +293,11 @@ def _cells(
     cutting = np.maximum(cutting, periods / OF_A_PERIOD)
     short = np.maximum(toolpath.tip_mm / SHORT_MM, toolpath.turn_deg / SHORT_DEG)
     long = (np.maximum(short, periods / SHORT_OF_A_PERIOD) > 1.0) & (toolpath.kind == RowKind.FEED)
-    shares = LOOKED_AT if (long | whole).any() or curve.has_history else MIDDLE
+    bends = long | whole | curve.has_history
+    shares = LOOKED_AT if bends.any() else MIDDLE
     cells = _in(toolpath, np.where(whole, 1.0, np.where(toolpath.kind == RowKind.RAPID, history, cutting)))
+    at = looked_at(curve, cells, shares, bends[cells.row])
     while True:
-        at = looked_at(curve, cells, shares)
         row, share = cells.row, cells.end - cells.begin
         way_mm, turn_deg = share * toolpath.tip_mm[row], share * toolpath.turn_deg[row]
         can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
@@ -278,6 +311,7 @@ def _cells(
         width = (cells.end - cells.begin)[part]
         begin = cells.begin[part] + width * (within - 1.0 / again[part])
         cells = Pieces(begin, np.where(within == 1.0, cells.end[part], cells.begin[part] + width * within))
+        at = _halved(curve, cells, shares, at[part], again[part] > 1)
 
 
 def _in(toolpath: Toolpath, number: NDArray[np.float64]) -> Pieces:

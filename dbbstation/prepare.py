@@ -13,6 +13,7 @@ from dbbstation.circles.strip import strip_widths
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.nc.rs274.plain import letters_of, plain_lines
 from dbbstation.sources.contract import Fitted, Motion, Setup
 from dbbstation.sources.registry import known_sources
 from dbbstation.sources.trial import tried
@@ -35,6 +36,7 @@ def prepare() -> None:
     for one in (MachineModel(machine), model):
         one.actual(motion)
         one.bar(motion).by_source(joints.source, machine, joints.values)
+    plain_lines(letters_of("X1\n"), 0)
     noise = form_and_noise(np.random.default_rng(1).standard_normal(128))
     for path in drawn_paths(noise, np.arange(128.0) * (360.0 / 128.0), np.ones(65), 1, (2, 0)):
         strip_widths(path.highest_um, path.lowest_um, path.theta_deg)

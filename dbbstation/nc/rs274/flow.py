@@ -11,10 +11,16 @@ from typing import TYPE_CHECKING, NamedTuple
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
 from dbbstation.nc.rs274.expressions import ValueReader
+from dbbstation.nc.rs274.plain import letters_of, plain_lines
 from dbbstation.nc.rs274.tokens import BadLine, Place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.rs274.plain import PlainLines
 
 MOST_AGAIN = 500_000
 """Lines that loops and subprograms may run again: what does more is taken to run for ever."""
@@ -84,6 +90,7 @@ class Flow:
         self._counts: dict[tuple[int, int], int] = {}
         self._begun = self.closed = False
         self._text, self._begins, self._ran = text, list[int](), 0
+        self._letters: NDArray[np.uint8] | None = None
 
     def lines(self) -> Iterator[tuple[str, Place]]:
         """Yield lines without O-words in execution order.
@@ -110,20 +117,17 @@ class Flow:
                 self._begun |= bool(_COMMENT.sub("", line).strip(BLANKS))
                 yield line, place
 
-    def lines_like(self, pattern: re.Pattern[str]) -> str:
-        """Return the text from the line yielded last that a pattern of whole lines matches; empty if none."""
-        match = pattern.match(self._text, self._begin_of_line(self._next - 1))
-        return "" if match is None else match[0]
+    def plain_lines(self) -> PlainLines:
+        """Return what plain lines say from the line yielded last on."""
+        if self._letters is None:
+            self._letters = letters_of(self._text)
+            self._begins = [0, *accumulate(len(line) + 1 for line in self._lines)]
+        return plain_lines(self._letters, self._begins[self._next - 1])
 
     def skip(self, lines: int) -> None:
         """Take the next lines as ran."""
         self._next += lines
         self._ran += lines
-
-    def _begin_of_line(self, index: int) -> int:
-        if not self._begins:
-            self._begins = [0, *accumulate(len(line) + 1 for line in self._lines)]
-        return self._begins[index]
 
     def ended(self) -> None:
         """Check after M2 and M30 that the program is complete.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
-import re
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from dbbstation.machine.compiled import compiled, inlined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -14,39 +14,128 @@ if TYPE_CHECKING:
 LEAST_LINES, MOST_LINES = 4, 20_000
 """Lines that are read at once: fewer are sooner read one by one."""
 
-_NUMBER = r"[+-]?(?:[0-9]{1,6}(?:\.[0-9]{0,12})?|\.[0-9]{1,12})"
-"""So long that no line of these is longer than LinuxCNC reads."""
+MOST_DIGITS = 15
+"""A number with more is read by itself: its digits are no exact floating-point number."""
 
-_LINE = (
-    r"(?:N([0-9]{1,8}) ?)?(?:G0?([01])(?![0-9.]) ?)?(?=[XYZABC])"
-    + "".join(rf"(?:{axis}({_NUMBER})[ ]?)?" for axis in "XYZABC")
-    + r"(?:F([0-9]{1,8}(?:\.[0-9]{0,6})?))? ?\r?\n"
-)
-LINES = re.compile(rf"(?:{_LINE}){{{LEAST_LINES},{MOST_LINES}}}+")
-_ONE = re.compile(_LINE)
+MOST_WHOLE = 8
+"""Digits of a line number or F; what has more is looked at by itself."""
+
+_LETTERS = np.frombuffer(b"XYZABCF", dtype=np.uint8)
+_F = 6
+
+_BLANK, _PLUS, _MINUS, _POINT, _ZERO, _ONE, _NINE, _G, _N = b" +-.019GN"
+_LF, _CR = b"\n\r"
 
 
 class PlainLines(NamedTuple):
     """What successive lines say, row by row.
 
     Attributes:
-        numbers: line numbers, of the lines that have one.
+        numbers: line number, -1 if there is none, shape (n,).
         motion: 0 or 1, NaN if not said, shape (n,).
         feed: F, NaN if not said, shape (n,).
         axes: X, Y, Z, A, B, C as written, NaN if not named, shape (n, 6).
     """
 
-    numbers: list[int]
+    numbers: NDArray[np.int64]
     motion: NDArray[np.float64]
     feed: NDArray[np.float64]
     axes: NDArray[np.float64]
 
 
-def plain_lines(text: str) -> PlainLines:
-    """Return what lines say that `LINES` matches."""
-    numbers, *columns = zip(*_ONE.findall(text), strict=True)
-    motion, *axes, feed = (np.array([float(one) if one else math.nan for one in each]) for each in columns)
-    return PlainLines([int(one) for one in numbers if one], motion, feed, np.column_stack(axes))
+def letters_of(text: str) -> NDArray[np.uint8]:
+    """Return a text for `plain_lines`, a byte for each letter and one behind."""
+    return np.frombuffer(text.encode("latin-1", "replace") + b"\0", dtype=np.uint8)
+
+
+def plain_lines(letters: NDArray[np.uint8], at: int) -> PlainLines:
+    """Return what the plain lines from a place on say, up to the first other line."""
+    for most in (LEAST_LINES, MOST_LINES):
+        head, digits = np.full((most, 2), -1, dtype=np.int64), np.zeros((most, 7), dtype=np.int64)
+        decimals = np.full((most, 7), -1, dtype=np.int64)
+        count = _read(letters, at, head, digits, decimals, _LETTERS)
+        if count < most:
+            break
+    decimals = decimals[:count]
+    said = np.where(decimals < 0, np.nan, digits[:count] / 10.0 ** np.abs(decimals))
+    motion = np.where(head[:count, 1] < 0, np.nan, head[:count, 1])
+    return PlainLines(head[:count, 0], motion, said[:, _F], said[:, :_F])
+
+
+@compiled
+def _read(
+    letters: NDArray[np.uint8],
+    at: int,
+    head: NDArray[np.int64],
+    digits: NDArray[np.int64],
+    decimals: NDArray[np.int64],
+    names: NDArray[np.uint8],
+) -> int:
+    """Fill rows with line number and motion, digits and decimals; return their number."""
+    for row in range(len(head)):
+        at = _after_number(letters, at, head[row])
+        at = _after_motion(letters, at, head[row]) if at >= 0 else -1
+        at = _after_axes(letters, at, digits[row], decimals[row], names) if at >= 0 else -1
+        if at < 0:
+            return row
+    return len(head)
+
+
+@inlined
+def _after_number(letters: NDArray[np.uint8], at: int, head: NDArray[np.int64]) -> int:
+    if letters[at] != _N:
+        return at
+    end, head[0], places = _number(letters, at + 1)
+    if end < 0 or places > 0 or letters[at + 1] < _ZERO or letters[end - 1] == _POINT:
+        return -1
+    return end + (letters[end] == _BLANK)
+
+
+@inlined
+def _after_motion(letters: NDArray[np.uint8], at: int, head: NDArray[np.int64]) -> int:
+    if letters[at] != _G:
+        return at
+    at += 1 + (letters[at + 1] == _ZERO and _ZERO <= letters[at + 2] <= _ONE)
+    if not _ZERO <= letters[at] <= _ONE or _ZERO <= letters[at + 1] <= _NINE or letters[at + 1] == _POINT:
+        return -1
+    head[1] = letters[at] - _ZERO
+    return at + 1 + (letters[at + 1] == _BLANK)
+
+
+@inlined
+def _after_axes(
+    letters: NDArray[np.uint8],
+    at: int,
+    digits: NDArray[np.int64],
+    decimals: NDArray[np.int64],
+    names: NDArray[np.uint8],
+) -> int:
+    first = at
+    for name in range(7):
+        if letters[at] == names[name] and (name < _F or (at > first and _ZERO <= letters[at + 1] <= _NINE)):
+            end, digits[name], decimals[name] = _number(letters, at + 1)
+            if end < 0:
+                return -1
+            at = end + (letters[end] == _BLANK)
+    end = at + (letters[at] == _CR)
+    return end + 1 if at > first and letters[end] == _LF else -1
+
+
+@inlined
+def _number(letters: NDArray[np.uint8], at: int) -> tuple[int, int, int]:
+    """Return where a number ends, its digits and its decimals; -1 if it is none."""
+    sign = -1 if letters[at] == _MINUS else 1
+    at += letters[at] == _MINUS or letters[at] == _PLUS
+    value, count, places, behind = 0, 0, 0, False
+    while _ZERO <= letters[at] <= _NINE or (letters[at] == _POINT and not behind):
+        if letters[at] == _POINT:
+            behind = True
+        else:
+            value, count, places = 10 * value + (letters[at] - _ZERO), count + 1, places + behind
+            if count > MOST_DIGITS or count - places > MOST_WHOLE:
+                return -1, 0, 0
+        at += 1
+    return (at, sign * value, places) if count else (-1, 0, 0)
 
 
 def going_on(values: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:

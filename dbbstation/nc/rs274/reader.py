@@ -12,7 +12,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
-from dbbstation.nc.rs274.plain import LINES, going_on, plain_lines
+from dbbstation.nc.rs274.plain import LEAST_LINES, going_on
 from dbbstation.nc.rs274.state import AXES, unknown_place
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup
@@ -113,10 +113,9 @@ class _Interpreter(Moves):
         ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
         if not ready or self._per_move or self._upright or self.path.unknown or self._cutter:
             return False
-        text = self.flow.lines_like(LINES)
-        if not text:
+        lines, unit_mm = self.flow.plain_lines(), self._state.unit_mm
+        if len(lines.axes) < LEAST_LINES:
             return False
-        lines, unit_mm = plain_lines(text), self._state.unit_mm
         modal = np.column_stack([lines.motion, lines.feed])
         motion, feed = going_on(modal, np.array([self._motion, self._speed.deg_min])).T
         scale = np.array([unit_mm] * 3 + [1.0] * 3)
@@ -137,7 +136,8 @@ class _Interpreter(Moves):
             speed = None if self._motion == RAPID else self._speed
             self.path.lines(poses[begin:until], speed, line=first + begin)
         self._state.pose = poses[end - 1].copy()
-        numbers = (*self.path.numbers, *lines.numbers)
+        numbered = lines.numbers[:end][lines.numbers[:end] >= 0]
+        numbers = (*self.path.numbers, *numbered[[0, -1]].tolist()) if len(numbered) else self.path.numbers
         self.path.numbers = (*numbers[:1], *numbers[1:][-1:])
         self.flow.skip(end - 1)
         return True

@@ -24,7 +24,7 @@ from dbbstation.results.report import (
     ReportResult,
 )
 from dbbstation.results.report_verdict import verdict_of
-from dbbstation.results.tolerances import held_against, tolerated_circles, tolerated_pairs
+from dbbstation.results.tolerances import tolerated_circles, tolerated_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -76,7 +76,6 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     tolerances, coverage_factor = reported.settings.tolerances, reported.coverage_factor
     now = tolerated_circles(reported.found.circles, tolerances)
     now_both = (*now, *tolerated_pairs(reported.found.pairs, tolerances))
-    held = held_against(tolerances, now_both, coverage_factor)
     modelled, ranked = reported.modelled, reported.ranked
     identified = None if modelled is None else modelled.identified
     certificate = certified_of(reported)
@@ -84,13 +83,14 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     before = () if former is None else tolerated_circles(former.circles, tolerances)
     before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
     measured = tuple(side_by_side(now, before))
+    held = tuple(compared(one, now_both, before_both, coverage_factor) for one in tolerances)
     return ReportResult(
         report=page,
         verdict=verdict_of(held, reported.found, coverage_factor, identified, ranked),
         certificate=CertificateState(certificate.title, certificate.lacking, certificate.place or None),
         model_warnings=() if identified is None else model_warnings(identified),
         coverage_factor=coverage_factor,
-        tolerances=tuple(compared(one, now_both, before_both, coverage_factor) for one in tolerances),
+        tolerances=held,
         tolerances_by_test=tuple(
             tolerances_by_test(
                 dict.fromkeys(one.test for one in now), tolerances, (now_both, before_both), coverage_factor

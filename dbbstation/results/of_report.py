@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.facts.held import ComparedTolerance, HeldTolerance, ToleranceOfTest, WorstCircle
+from dbbstation.facts.held import ComparedTolerance, ToleranceOfTest
 from dbbstation.plan.tolerance import OF_A_MODEL
-from dbbstation.quality.conformity import Conformity
 from dbbstation.results.report import MeanAndLargest, MeasuredFigures, MeasuredMean, MeasuredSize
-from dbbstation.results.tolerances import filter_words, held_against
-from dbbstation.text.digits import expanded_uncertainty
+from dbbstation.results.tolerances import held_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from dbbstation.plan.tolerance import Tolerance
-    from dbbstation.results.tolerances import Held, ToleratedCircle
+    from dbbstation.results.tolerances import ToleratedCircle
 
 
 def tolerances_by_test(
@@ -36,35 +34,9 @@ def compared(
     tolerance: Tolerance, now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle], coverage_factor: float
 ) -> ComparedTolerance:
     """Return one tolerance against circles now and before, if it applies."""
-    (held,) = held_against((tolerance,), now, coverage_factor)
-    (former,) = held_against((tolerance,), before, coverage_factor)
-    told = None if former.worst is None else _held(former, coverage_factor)
-    return ComparedTolerance(**vars(_held(held, coverage_factor)), before=told)
-
-
-def _held(held: Held, coverage_factor: float) -> HeldTolerance:
-    tolerance = held.tolerance
-    return HeldTolerance(
-        quantity=tolerance.figure.value,
-        filter=filter_words(tolerance),
-        largest_um=tolerance.largest_um,
-        tests=tuple(tolerance.tests),
-        directions=tuple(direction.value for direction in tolerance.directions),
-        conformity=None if held.conformity is None else str(held.conformity),
-        within=held.conformity in {None, Conformity.WITHIN},
-        exceeded=held.exceeded,
-        undecided=held.undecided,
-        circles=held.circles,
-        worst=_worst(held, coverage_factor),
-    )
-
-
-def _worst(held: Held, coverage_factor: float) -> WorstCircle | None:
-    worst, size = held.worst, held.size
-    if worst is None or size is None:
-        return None
-    expanded_um = expanded_uncertainty(size.u_um, coverage_factor)
-    return WorstCircle(worst.test, worst.direction, worst.repeat, size.um, expanded_um, size.why_not or None)
+    former = held_tolerance(tolerance, before, coverage_factor)
+    told = None if former.worst is None else former
+    return ComparedTolerance(**vars(held_tolerance(tolerance, now, coverage_factor)), before=told)
 
 
 def side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[MeasuredFigures]:

@@ -13,17 +13,17 @@ from dbbstation.text.digits import with_uncertainty
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from dbbstation.facts.held import HeldTolerance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.circles import Circled, MeasuredCircle
     from dbbstation.results.ranked import Ranked
-    from dbbstation.results.tolerances import Held
 
 MOST_TOLD = 5
 """Runs that the first page names; the findings name all."""
 
 
 def verdict_of(
-    held: Sequence[Held],
+    held: Sequence[HeldTolerance],
     found: Circled,
     coverage_factor: float,
     identified: IdentifiedModel | None = None,
@@ -37,7 +37,7 @@ def verdict_of(
         write = "Write tolerances into the shop's settings (`dbbstation settings --template` shows how) and make the report anew."
         return ReportVerdict("none", nothing, (), (*repeat, write))
     told = [one for one in held if one.conformity in {Conformity.EXCEEDED, Conformity.UNDECIDED}]
-    reasons = tuple(_reason(one, coverage_factor) for one in told)
+    reasons = tuple(_reason(one) for one in told)
     causes = () if ranked is None else told_causes(ranked, coverage_factor)[:MOST_TOLD]
     if Conformity.EXCEEDED in said:
         headline = "The machine is NOT within the shop's tolerances."
@@ -56,23 +56,23 @@ def verdict_of(
     return ReportVerdict(Conformity.WITHIN, "Every circle is within the shop's tolerances.", (), (*repeat, keep))
 
 
-def _reason(held: Held, coverage_factor: float) -> str:
-    worst, size = held.worst, held.size
-    if worst is None or size is None:
+def _reason(held: HeldTolerance) -> str:
+    worst = held.worst
+    if worst is None:
         return ""
-    name = held.tolerance.figure.value.replace("-", " ").capitalize()
+    name = held.quantity.replace("-", " ").capitalize()
     run = f"{worst.test} {worst.direction} {worst.repeat}"
     exceeded = f"{held.exceeded} of {held.circles} circles exceed it"
     undecided = f"of {held.undecided} it cannot be told" if held.undecided else ""
     counts = ", ".join(part for part in (exceeded, undecided) if part)
-    if size.u_um is None:
+    if worst.expanded_um is None:
         return (
-            f"{name}: run {run} has {size.um:.1f} µm, {size.why_not}. At most {held.tolerance.largest_um:g} µm is allowed. "
+            f"{name}: run {run} has {worst.um:.1f} µm, {worst.why_not}. At most {held.largest_um:g} µm is allowed. "
             f"{counts}."
         )
-    shown, expanded = with_uncertainty(size.um, coverage_factor * size.u_um)
+    shown, expanded = with_uncertainty(worst.um, worst.expanded_um)
     measured = f"{shown} µm, U {expanded} µm"
-    return f"{name}: run {run} has {measured}; at most {held.tolerance.largest_um:g} µm. {counts}."
+    return f"{name}: run {run} has {measured}; at most {held.largest_um:g} µm. {counts}."
 
 
 def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:

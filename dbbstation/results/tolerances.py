@@ -12,9 +12,11 @@ from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.path import Filter
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.rice import without_noise
+from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
+from dbbstation.text.digits import expanded_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -48,23 +50,6 @@ class ToleratedCircle(OfRunInSession):
     def key(self) -> tuple[str, str, int]:
         """Return test, direction and repeat."""
         return self.test, self.direction, self.repeat
-
-
-@dataclass(frozen=True)
-class Held:
-    """A tolerance held against circles.
-
-    Attributes:
-        conformity: exceeded if one circle exceeds it, else undecided if one is; None without circles.
-    """
-
-    tolerance: Tolerance
-    conformity: Conformity | None
-    worst: ToleratedCircle | None
-    size: Size | None
-    exceeded: int
-    undecided: int
-    circles: int
 
 
 def tolerated_circles(
@@ -163,28 +148,31 @@ def filter_words(tolerance: Tolerance) -> str | None:
     return Filter(tolerance.upr).words if tolerance.figure in FILTERED else None
 
 
-def held_against(
-    tolerances: Sequence[Tolerance], circles: Sequence[ToleratedCircle], coverage_factor: float
-) -> tuple[Held, ...]:
-    """Compare every tolerance with its circles; arguments as of `conformity`."""
-    return tuple(_held(tolerance, circles, coverage_factor) for tolerance in tolerances)
-
-
-def _held(tolerance: Tolerance, circles: Sequence[ToleratedCircle], coverage_factor: float) -> Held:
+def held_tolerance(tolerance: Tolerance, circles: Iterable[ToleratedCircle], coverage_factor: float) -> HeldTolerance:
+    """Compare a tolerance with its circles; arguments as of `conformity`."""
     sized = [
         (one, size)
         for one in circles
         if tolerance.holds_for(one.test, one.direction) and (size := one.size(tolerance)) is not None
     ]
     verdicts = [conformity(size, tolerance.largest_um, coverage_factor) for _, size in sized]
-    worst, worst_size = max(sized, key=lambda pair: pair[1].um, default=(None, None))
     order = (Conformity.EXCEEDED, Conformity.UNDECIDED, Conformity.WITHIN)
-    return Held(
-        tolerance=tolerance,
-        conformity=next((each for each in order if each in verdicts), None),
-        worst=worst,
-        size=worst_size,
+    found = next((each for each in order if each in verdicts), None)
+    worst = None
+    if sized:
+        one, size = max(sized, key=lambda pair: pair[1].um)
+        expanded_um = expanded_uncertainty(size.u_um, coverage_factor)
+        worst = WorstCircle(one.test, one.direction, one.repeat, size.um, expanded_um, size.why_not or None)
+    return HeldTolerance(
+        quantity=tolerance.figure.value,
+        filter=filter_words(tolerance),
+        largest_um=tolerance.largest_um,
+        tests=tuple(tolerance.tests),
+        directions=tuple(direction.value for direction in tolerance.directions),
+        conformity=None if found is None else str(found),
+        within=found in {None, Conformity.WITHIN},
         exceeded=verdicts.count(Conformity.EXCEEDED),
         undecided=verdicts.count(Conformity.UNDECIDED),
         circles=len(sized),
+        worst=worst,
     )

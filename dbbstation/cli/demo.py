@@ -115,7 +115,7 @@ def _print(result: DemoResult) -> None:
             hidden = 100 * (source.concealed or 0.0)
             for name, number in vars(source.parameters).items():
                 echo(
-                    f"The diagnosis names {source.name}: {name} {number.value:.3g} ± {number.uncertainty:.1g} {number.unit}; "
+                    f"The diagnosis names {source.name}: {name} {number.in_words}; "
                     f"the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
     held_out = result.diagnosis.held_out_rms_um

@@ -167,8 +167,7 @@ def _print_sources(sources: Sequence[SourceFinding]) -> None:
         for source in named:
             echo()
             for name, number in source.parameters.items():
-                value, uncertainty = f"{number.value:.4g}", f"{number.uncertainty:.2g}"
-                echo(f"{source.name}: {name} {value} ± {uncertainty} {number.unit}")
+                echo(f"{source.name}: {name} {number.in_words}")
             echo(f"  {source.text}")
 
 

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.diagnosis.drive.findings import DriveFinding, ForceLocation, HeldOutForce
-    from dbbstation.facts.value import Value
     from dbbstation.results.drive import DriveResult
 
 
@@ -32,10 +31,10 @@ def show(result: DriveResult) -> None:
     _print_sources(result.sources)
     echo("\nidentified:")
     for name, number in result.parameters.items():
-        known = _number(number) if number.identifiable else "not identifiable from this recording"
+        known = number.in_words if number.identifiable else "not identifiable from this recording"
         echo(f"  {name}: {known}")
     for side, values in result.friction.items():
-        echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))
+        echo(f"  friction {side}: " + ", ".join(f"{name} {n.in_words}" for name, n in values.items()))
     held_back = result.held_back
     first, last = held_back.t_s
     echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
@@ -112,22 +111,16 @@ def _print_sources(sources: Sequence[DriveFinding]) -> None:
 def _print_parts(source: DriveFinding) -> None:
     if source.parameters and len(source.parts) <= 1:
         for name, number in source.parameters.items():
-            echo(f"{source.name}: {name} {_number(number)}")
+            echo(f"{source.name}: {name} {number.in_words}")
         return
     for part in source.parts:
         when = f"from {part.t_s[0]:.3f} to {part.t_s[1]:.3f} s, " if part.t_s else ""
-        numbers = ", ".join(f"{name} {_number(number)}" for name, number in part.parameters.items())
+        numbers = ", ".join(f"{name} {number.in_words}" for name, number in part.parameters.items())
         echo(f"{source.name}: {when}{numbers}")
 
 
 def _probability(probability: float) -> str:
     return "> 0.999" if probability > 0.999 else f"{probability:.3f}"  # noqa: PLR2004 - three digits are shown
-
-
-def _number(number: Value) -> str:
-    if not number.is_known:
-        return f"{number.value:#.4g} {number.unit}"
-    return f"{number.value:#.4g} ± {number.uncertainty:.2g} {number.unit}"
 
 
 identify = command(

@@ -8,6 +8,8 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, PlainSerializer
 
+from dbbstation.text.digits import to_its_place
+
 OrUnknown = Annotated[
     float,
     BeforeValidator(lambda number: math.nan if number is None else number),
@@ -37,7 +39,7 @@ class Value:
     @property
     def in_words(self) -> str:
         """Return the value with its standard uncertainty and unit, in words."""
-        known = f"{self.value:.4g} ± {self.uncertainty:.2g}" if self.is_known else f"{self.value:.4g}"
+        known = " ± ".join(to_its_place(self.value, self.uncertainty)) if self.is_known else f"{self.value:.4g}"
         return f"{known} {self.unit}".rstrip()
 
     def at_least(self, uncertainty: float) -> Value:

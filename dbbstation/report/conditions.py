@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.recordings.anchors import anchor_of
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.text.digits import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -94,7 +95,8 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
     without = (("measured without a fresh calibration of the bar", waiver),) if waiver else ()
     if bar is None:
         return (("bar", _NOT_NOTED), *without)
-    calibrated = f"{bar.calibrated_length_mm:.4f} mm, u {1e3 * bar.calibrator_uncertainty_mm:.2g} µm"
+    length, _ = to_its_place(bar.calibrated_length_mm, bar.calibrator_uncertainty_mm)
+    calibrated = f"{length} mm, u {1e3 * bar.calibrator_uncertainty_mm:.2g} µm"
     when = "" if bar.calibrated is None else f", {bar.calibrated:%Y-%m-%d %H:%M %Z}"
     at = "" if bar.temp_c is None else f", at {_degc(bar.temp_c)}"
     grows = _NOT_NOTED if bar.expansion_um_m_k is None else f"{bar.expansion_um_m_k:g} µm/(m K)"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from dbbstation.facts.serialise import as_objects
 from dbbstation.results.words import unseen_sentence, weak_sentence
 from dbbstation.sources.contract import Owner
+from dbbstation.text.digits import to_its_place
 
 if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
@@ -22,8 +23,10 @@ def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tup
         named = fitted.source.parameters(identified.model.machine)
         for parameter, value in zip(named, fitted.values, strict=True):
             known = u.get((fitted.source.name, fitted.shared, parameter.name))
-            expanded = "-" if known is None else f"{coverage_factor * float(known):.2g}"
-            rows.append((fitted.source.name, parameter.name, f"{float(value):.5g}", expanded, parameter.unit))
+            shown = (f"{float(value):.5g}", "-")
+            if known is not None:
+                shown = to_its_place(float(value), coverage_factor * float(known))
+            rows.append((fitted.source.name, parameter.name, *shown, parameter.unit))
     return tuple(rows)
 
 

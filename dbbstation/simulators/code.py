@@ -73,7 +73,7 @@ def _told(text: str) -> str:
 
 def _values(finding: object) -> list[str]:
     values = getattr(finding, "values", {})
-    return [f"{name}: {one.value:.6g} ± {one.uncertainty:.2g} {one.unit}".rstrip() for name, one in values.items()]
+    return [f"{name}: {one.in_words}" for name, one in values.items()]
 
 
 def function_name(term: Term) -> str:

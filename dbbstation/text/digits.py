@@ -16,12 +16,31 @@ def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | Non
     return None if u is None else coverage_factor * u
 
 
+LONGEST = 6
+"""Decimals or rounded zeros beyond which a number has an exponent."""
+
+
 def decimals_of(expanded: float) -> int:
     """Return the decimals of a value with this expanded uncertainty."""
-    if not expanded > 0.0:
-        return MOST_DECIMALS
-    shown = float(f"{expanded:.{SIGNIFICANT - 1}e}")  # 0.0996 is written as 0.10
-    return min(max(SIGNIFICANT - 1 - math.floor(math.log10(shown)), 0), MOST_DECIMALS)
+    return min(max(_place(expanded), 0), MOST_DECIMALS) if expanded > 0.0 else MOST_DECIMALS
+
+
+def _place(uncertainty: float) -> int:
+    """Return the decimal place of the last digit of an uncertainty that counts."""
+    shown = float(f"{uncertainty:.{SIGNIFICANT - 1}e}")  # 0.0996 is written as 0.10
+    return SIGNIFICANT - 1 - math.floor(math.log10(shown))
+
+
+def to_its_place(value: float, uncertainty: float) -> tuple[str, str]:
+    """Return a value and its uncertainty: two significant digits of this, the value to the same place [GUM 7.2.6]."""
+    if not (0.0 < uncertainty < math.inf and math.isfinite(value)):
+        return f"{value:.4g}", f"{uncertainty:.2g}"
+    place = _place(uncertainty)
+    if abs(place) <= LONGEST:
+        rounded = (round(value, place), round(uncertainty, place))
+        return f"{rounded[0]:z.{max(place, 0)}f}", f"{rounded[1]:.{max(place, 0)}f}"
+    digits = 0 if value == 0.0 else math.floor(math.log10(abs(value))) + place
+    return f"{value:z.{max(digits, 0)}e}", f"{uncertainty:.{SIGNIFICANT - 1}e}"
 
 
 def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tuple[str, str]:

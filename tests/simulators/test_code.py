@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.simulator.terms import Term, TermForm, evaluator
+from dbbstation.facts.value import Value
 from dbbstation.simulators.code import missing_code
 
 T = np.linspace(0.0, 4.0, 401).tolist()
@@ -53,7 +54,7 @@ def test_no_name_that_somebody_gave_becomes_code():
 
     def shape(name):
         term = Term(name, TermForm.LINEAR, (name,), (2.0,))
-        value = SimpleNamespace(value=1.0, uncertainty=0.1, unit=name)
+        value = Value(1.0, 0.1, name)
         finding = SimpleNamespace(name=term.name, verdict="identified", values={name: value})
         tree = ast.parse(
             missing_code(SimpleNamespace(model=SimpleNamespace(name=name), terms=(term,), findings=(finding,)))

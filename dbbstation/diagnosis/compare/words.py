@@ -49,10 +49,7 @@ def organised_text(found: Comparison) -> str:
     parts = []
     for finding in found.there:
         effect = found.effects[finding.name]
-        sizes = "; ".join(
-            f"{name} {value.value:.4g} ± {value.uncertainty:.2g} {value.unit}".strip()
-            for name, value in finding.values.items()
-        )
+        sizes = "; ".join(f"{name} {value.in_words}" for name, value in finding.values.items())
         parts.append(
             f"{label_of(finding)}, {100 * effect.share:.0f} %" + (f" ({sizes})" if 0 < len(sizes) < LONG else "")
         )

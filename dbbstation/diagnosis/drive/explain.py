@@ -59,8 +59,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
             name = after.impossible[0]
             value = after.base[name]
             dropped[name] = (
-                f"{name} would come out at {value.value:.3g} ± {value.uncertainty:.2g} {value.unit}, which cannot be, and is left "
-                f"out: {POINTS_TO[name]}"
+                f"{name} would come out at {value.in_words}, which cannot be, and is left out: {POINTS_TO[name]}"
             )
             continue
         break

@@ -9,11 +9,11 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS
 from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
+from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
-    from dbbstation.facts.value import Value
 
 ACCELERATES = 5.0
 """Root mean square of the acceleration, over its noise, from which the mass can be determined."""
@@ -72,7 +72,7 @@ def sentences(limits: DriveLimits, explained: ExplainedDrive, known: dict[str, b
         force = before.base[VISCOUS]
         sentences.append(
             "Viscous and Coulomb friction cannot be distinguished at one speed. What is known is their sum at "
-            f"{1e3 * speed:.4g} mm/s, {force.value * speed:.4g} ± {force.uncertainty * speed:.2g} N. Record at several speeds."
+            f"{1e3 * speed:.4g} mm/s, {Value(force.value * speed, force.uncertainty * speed, 'N').in_words}. Record at several speeds."
         )
     elif not known[VISCOUS] and VISCOUS not in explained.dropped:
         sentences.append(

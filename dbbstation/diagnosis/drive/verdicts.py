@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -339,6 +340,6 @@ class Verdicts(CauseJudge):
 def _in_words(complement: Complement) -> str:
     size = complement.force_n
     return (
-        f"{complement.pulses} of them are of one size: {-size.value:+.3g} ± {size.uncertainty:.2g} N in these, or {size.value:+.3g} N in the "
+        f"{complement.pulses} of them are of one size: {replace(size, value=-size.value).in_words} in these, or {size.value:+.3g} N in the "
         "stretches between them and a constant load beside it: no recording says which."
     )

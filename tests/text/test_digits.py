@@ -31,7 +31,9 @@ def test_a_value_is_said_to_the_place_of_its_uncertainty(value: float, u: float,
 
 def test_two_digits_of_u_and_the_value_to_the_same_place() -> None:
     rng = np.random.default_rng(57)
-    for value, u in zip(rng.normal(0.0, 1e3, 200).tolist(), (10.0 ** rng.uniform(-4.0, 5.0, 200)).tolist(), strict=True):
+    for value, u in zip(
+        rng.normal(0.0, 1e3, 200).tolist(), (10.0 ** rng.uniform(-4.0, 5.0, 200)).tolist(), strict=True
+    ):
         shown, shown_u = to_its_place(value, u)
         exact = Decimal(u)
         place = Decimal((0, (1,), exact.adjusted() - 1))

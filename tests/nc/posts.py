@@ -1,4 +1,4 @@
-"""Programs of our own writing in the habits of thirteen posts: how they begin, change tools, write arcs and holes, and end."""
+"""Programs of our own writing in the habits of sixteen posts: how they begin, change tools, write arcs and holes, and end."""
 
 from __future__ import annotations
 
@@ -139,6 +139,32 @@ POSTS = (
         cycles=False,
         planes=False,
         percent=False,
+    ),
+    Post(
+        "solidcam",
+        "O1000 (PART.TAP)\n(SUBROUTINES: O2 .. O0)\n(COMPENSATION-WEAR)\nG21\nG90 G17\nG80 G49 G40\nG54\nG91 G28 Z0\nG90\nM01",
+        "(---------------------)\n({name} - PROFILE)\nM6 T{t}\n(TOOL -{t}- MILL DIA 6.0 R0. MM )\nG90 G00 G40 G54\nG43 H{t} D3{t} G0 X{x} Y{y} Z50. S{s} M3\nM8",
+        "M5\nM9\nG91 G28 Z0\nG90\nM30",
+        zeros=False,
+        radius=True,
+    ),
+    Post(
+        "hsmworks",
+        "O01001 ({name})\n(T{t} D=6. CR=0. - ZMIN=-6. - flat end mill)\nG90 G94 G17 G49 G40 G80\nG21\nG28 G91 Z0.\nG90",
+        "(2D Adaptive)\nT{t} M6\nG187 P1\nS{s} M3\nG17 G90 G94\nG54\nM8\nG0 X{x} Y{y}\nG43 Z15. H{t}\nT1",
+        "M9\nG28 G91 Z0.\nG90\nG49\nG187\nM5\nM30",
+        zeros=False,
+        numbers=5,
+    ),
+    Post(
+        "hand-fanuc",
+        "O0100 (HAND)\nG90 G80 G40 G49 G50 G21 G17",
+        "T0{t} M06\nG05.1 Q1\nG54 G00 X{x} Y{y} S{s} M03\nG43 H0{t} Z50 M08",
+        "G05.1 Q0\nG80 G00 Z100. M09\nG91 G28 Z0. M05\nG90\nM30",
+        zeros=False,
+        numbers=1,
+        spaces=False,
+        radius=True,
     ),
     Post(
         "bcnc",

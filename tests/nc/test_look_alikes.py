@@ -155,6 +155,7 @@ FOREIGN = {
     "other axes": ("G1 U1\n", 4, "U"),
     "an extruder": ("G1 X1 E0.5\n", 4, "E"),
     "a subprogram without its call": ("O1234 (PART)\n", 4, "O1234"),
+    "a curve": ("G5.1 X10 Y0 I5 J5\n", 4, "G5.1 with axes"),
     "scaling": ("G51 X0 Y0 P2\n", 4, "G51"),
     "turned coordinates": ("G68 X0 Y0 R30\n", 4, "G68"),
     "more work systems": ("G54.1 P3\n", 4, "G54.1"),

@@ -153,6 +153,17 @@ def test_a_reference_point_that_is_not_declared_stays_with_the_control():
     assert path.text[1] == "G91 G30 X0 Y0 Z0\nG90"
 
 
+def test_high_speed_modes_are_left_out_and_said():
+    path = read_program(FIRST + "G05.1 Q1\nG187 P2\nG50\nG05 P10000\nG0 X1\nM2\n", "part.ngc")
+    assert list(path.text.values()) == ["G5.1 Q1 is left out", "G187 P2 is left out", "G5 P10000 is left out"]
+
+
+def test_a_subprogram_runs_as_often_as_the_digits_before_its_number_say():
+    sub = "O1000\nG91 G0 X1\nG90\nM99\n"
+    path = read_program(FIRST + "M98 P31000\nM98 P1000 L2\nM30\n" + sub, "part.ngc")
+    assert path.poses[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
+
+
 def test_a_program_without_moves_is_refused():
     with pytest.raises(InputError, match="moves nothing"):
         read_program("G21\nM2\n", "part.ngc")

@@ -22,6 +22,7 @@ class ModalGroup(StrEnum):
     RETRACT = "retract"
     OFFSET = "work offset"
     PATH = "path control"
+    SMOOTHING = "how smoothly the control moves"
     SPEED = "spindle speed"
     NOTHING = "ends what is not read"
     CYCLE_END = "end of a cycle"
@@ -44,7 +45,8 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((43, 43.4, 49), ModalGroup.TOOL_LENGTH),
     **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
     **dict.fromkeys((61, 61.1, 64), ModalGroup.PATH),
-    **dict.fromkeys((8, 15, 69), ModalGroup.NOTHING),
+    **dict.fromkeys((8, 15, 50, 50.1, 69), ModalGroup.NOTHING),
+    **dict.fromkeys((5, 5.1, 187), ModalGroup.SMOOTHING),
     80: ModalGroup.CYCLE_END,
     **dict.fromkeys((90, 91), ModalGroup.DISTANCE),
     **dict.fromkeys((90.1, 91.1), ModalGroup.ARC_DISTANCE),
@@ -64,11 +66,12 @@ M_CODES: dict[float, ModalGroup] = {
 
 LETTERS = frozenset("ABCDFGHIJKLMNPQRSTXYZ@^")
 
+CURVES = "post curves as lines or arcs"
 _TURNED = "post the program without rotation: the model is not turned with it"
 _SPINDLE = "motion that follows the spindle has no path in time: run it without compensation"
 _REMEDIES: dict[float, str] = {
     **dict.fromkeys((43.1, 43.2, 43.5), "post the program with G43 and H"),
-    **dict.fromkeys((5, 5.1, 5.2, 5.3, 6.2), "post curves as lines or arcs"),
+    **dict.fromkeys((5.2, 5.3, 6.2), CURVES),
     **dict.fromkeys((32, 33, 33.1, 74, 76, 84, 95, 96), _SPINDLE),
     **dict.fromkeys(
         (31, 38, 38.2, 38.3, 38.4, 38.5), "where probing ends is not known before: run it without compensation"

@@ -28,6 +28,9 @@ MOST_AGAIN = 500_000
 DEEPEST = 10
 """Subprograms within each other [LinuxCNC, INTERP_SUB_ROUTINE_LEVELS]."""
 
+MOST_NUMBER = 9999
+"""Number of a subprogram; the digits before it in P are how often it runs [Fanuc, M98]."""
+
 LOCAL = 30
 """Numbered parameters up to this belong to the subprogram that runs."""
 
@@ -166,6 +169,8 @@ class Flow:
         Raises:
             BadLine: the program has none of this number.
         """
+        if number > MOST_NUMBER and times == 1.0 and f"{number:.0f}" not in self._labels:
+            times, number = divmod(number, MOST_NUMBER + 1.0)
         found = [each for each in self._labels.get(f"{number:.0f}", []) if not each.keyword]
         if len(found) != 1 or number != int(number):
             what = f"M98 calls the subprogram O{number:g}, of which there is {'none' if not found else 'more than one'}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES
-from dbbstation.nc.rs274.codes import ModalGroup, name
+from dbbstation.nc.rs274.codes import CURVES, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.flow import Flow
@@ -241,6 +241,8 @@ class Modes:
             self._motion, self._cycle.numbers = None, {}
         if ModalGroup.PATH in block.codes:
             self._path_control(block)
+        if ModalGroup.SMOOTHING in block.codes:
+            self._smoothing(block)
 
     def _cutter_radius(self, block: ProgramBlock) -> None:
         word, block_number = block.codes.get(ModalGroup.CUTTER), block.words.pop("D", None)
@@ -286,6 +288,14 @@ class Modes:
             # LinuxCNC takes P0 for no bound, as if P were not there.
             corner = allowed.value * self._state.unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
         self.path.corner_mm = corner
+
+    def _smoothing(self, block: ProgramBlock) -> None:
+        """Leave out high-speed modes of other controls (G5 P, G5.1 Q, G187); with axes G5 and G5.1 are curves."""
+        word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "PQ"]
+        if block.words.keys() & set(AXES + CENTRES):
+            raise block.place.fault(word.column, f"{name('G', word.value)} with axes is not read", CURVES)
+        text = " ".join(f"{each.letter}{each.value:g}" for each in (word, *said) if each is not None)
+        self.path.say(RowKind.COMMENT, f"{text} is left out", line=block.place.line)
 
     def _tool_length(self, block: ProgramBlock) -> None:
         word = block.codes.get(ModalGroup.TOOL_LENGTH)

@@ -2,43 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.diagnosis.effects import effects_of
-from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import StationError
-from dbbstation.files.atomic import refuse_outputs, write_bytes
 from dbbstation.files.inputs import in_a_book
-from dbbstation.files.provenance import from_python
-from dbbstation.files.recordings.session import read_session
-from dbbstation.machine.difference import check_model_is_of
-from dbbstation.report.content import Modelled, Reported, certified_of, content_of, numbers_of
-from dbbstation.report.html import report_html
-from dbbstation.report.pdf import chromium, printed
-from dbbstation.results.model_warnings import lacks_physics
-from dbbstation.results.ranked import Ranked
-from dbbstation.results.tolerances import TOLERATED
-from dbbstation.tasks.circle_runs import load_circles
-from dbbstation.tasks.evaluate import evaluate
-from dbbstation.tasks.load import READING, load_sessions, paths_of
-from dbbstation.tasks.models import model_of
-from dbbstation.tasks.telling import StoppedError, Telling, never, silent
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from os import PathLike
+    from collections.abc import Callable, Mapping
 
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
-    from dbbstation.files.recordings.session import SessionFolder
-    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.report import ReportResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.load import Recorded, Sessions
-    from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
 STAGES = {
@@ -55,50 +34,80 @@ STAGES = {
 USUAL_COVERAGE = 2.0
 
 
+@task("report", stages=STAGES)
 @in_a_book
 def report(
-    sessions: Sessions,
-    out: str | PathLike[str],
+    sessions: o.SessionPaths,
+    page: Annotated[File, Option(o.OUTPUTS["page"], kind="file")],
     *,
     settings: Settings,
-    before: str | PathLike[str] | None = None,
-    model: Model | None = None,
-    job: str = "",
-    place: str = "",
-    certificate: bool = False,
-    pdf: str | PathLike[str] | None = None,
+    before: Annotated[File | None, Option("Session that was measured before, to put beside.")] = None,
+    model: o.Model | None = None,
+    job: Annotated[str, Option("Job or reason of the measurement, in place of the session's.")] = "",
+    place: Annotated[
+        str, Option("Place of the measurement, which a certificate needs  [with --certificate a terminal asks for it].")
+    ] = "",
+    certificate: Annotated[bool, Option("Refuse to write if a certificate lacks a fact.")] = False,
+    source_files: o.SourceFiles = (),
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    pdf: Annotated[File | None, Option("Print it here too, by an installed Chromium.", kind="file")] = None,
+    force: o.Force = False,
     coverage_factor: float = USUAL_COVERAGE,
-    tests: Sequence[str] = (),
-    exclude: Sequence[str] = (),
-    force: bool = False,
     known: Mapping[str, ErrorSource] | None = None,
-    provenance: Callable[[], Provenance] = from_python,
+    provenance: Callable[[], Provenance] | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
 ) -> ReportResult:
-    """Write a report as one HTML file that needs no network and prints to A4.
+    r"""Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
+
+    Its first page compares the circles with the tolerances of the shop's settings and states what to do. Then come
+    conditions, polar traces, figures with U, findings of every run, with --model what it leaves and could not see, and all
+    files with their SHA-256. With --before both sessions are shown side by side as measured. The figures are those of
+    `circles` and `evaluate`.
+
+    \b
+    Examples:
+      dbbstation report session --page report.html
+      dbbstation report verified --before measured --model joint.yaml --page report.html
+      dbbstation report session --certificate --place "hall 3" --page report.html --pdf report.pdf
+      dbbstation report session --job "spindle exchanged" --page report.html --pdf report.pdf
 
     Args:
         settings: with tolerances.
-        before: earlier session for comparison.
-        model: a model, its file, or the result of `calibrate` or `diagnose`.
-        job: if the session states none or another.
-        certificate: refuse a report that is no certificate.
-        pdf: file, printed by an installed Chromium; None: none.
-        tests: names; empty for all.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
 
     Raises:
+        ArgumentError: a value that it does not take.
         InputError: faults of files.
         OutputError: a file exists without `force`; no browser prints.
         ModelError: the model is of another machine.
         StationError: `certificate` is set and something is missing; nothing was written.
         StoppedError: `stop` returned True; nothing was written.
     """
-    page, paper = Path(out), None if pdf is None else Path(pdf)
-    refuse_outputs([page, paper], force=force)
+    from dataclasses import replace
+
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.files.provenance import from_python
+    from dbbstation.files.recordings.session import read_session
+    from dbbstation.machine.difference import check_model_is_of
+    from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
+    from dbbstation.report.html import report_html
+    from dbbstation.report.pdf import chromium, printed
+    from dbbstation.results.tolerances import TOLERATED
+    from dbbstation.tasks.circle_runs import load_circles
+    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.models import model_of
+    from dbbstation.tasks.reporting import modelled_runs, ranked_causes, read_runs
+
+    out, paper = Path(page), None if pdf is None else Path(pdf)
+    refuse_outputs([out, paper], force=force)
     browser = None if paper is None else chromium()
-    telling = Telling(progress, stop)
-    identified = None if model is None else model_of(model, known)
+    telling = Telling(progress, stop, say)
+    every = every_source(paths_of(source_files)) if known is None and model is not None else known
+    identified = None if model is None else model_of(model, every)
     # Circles, evaluation and ranking need the same recordings: each is read once.
     now = [read_session(path, keeps=identified is not None) for path in paths_of(sessions)]
     then = None if before is None else read_session(Path(before), keeps=identified is not None)
@@ -112,14 +121,10 @@ def report(
     if identified is not None:
         for session in found.sessions:
             check_model_is_of(session.machine, identified.model.machine)
-        runs = _read(now, (tests, exclude), telling)
-        modelled = _modelled(runs, identified, telling)
-        if lacks_physics(identified.report):
-            ranked = Ranked(why_not=_PHYSICS_MISSING)
-        else:
-            nominal = now if then is None else [then]
-            of_them = runs if then is None else _read(nominal, (tests, exclude), telling)
-            ranked = _ranked(of_them, [session.name for session in nominal], identified, telling)
+        runs = read_runs(now, (tests, exclude), telling)
+        modelled = modelled_runs(runs, identified, telling)
+        nominal = now if then is None else [then]
+        ranked = ranked_causes(nominal, runs if then is None else None, (tests, exclude), identified, telling)
     reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place)
     lacking = certified_of(reported).lacking
     if certificate and lacking:
@@ -131,77 +136,9 @@ def report(
         raise StationError(what, where=", ".join(session.name for session in found.sessions), remedy=remedy)
     numbers = numbers_of(reported, str(out))
     telling.stage("writing")
-    html = report_html(numbers, content_of(reported, numbers, provenance()))
-    write_bytes(page, html, force=force)
+    html = report_html(numbers, content_of(reported, numbers, (provenance or from_python)()))
+    write_bytes(out, html, force=force)
     if paper is not None and browser is not None:
         telling.stage("printing")
         write_bytes(paper, printed(html, browser), force=force)
     return replace(numbers, pdf=paper)
-
-
-_PHYSICS_MISSING = (
-    "Physics is missing from the model: its causes cannot be ranked. `dbbstation diagnose` looks for what it lacks."
-)
-
-
-def _read(
-    sessions: Sequence[SessionFolder], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
-) -> Recorded | StationError:
-    tests, exclude = chosen
-    try:
-        found = load_sessions(sessions, exclude, telling.counted(READING), tests)
-    except StoppedError:
-        raise
-    except StationError as error:
-        return error
-    telling.note(*found.warnings)
-    return found
-
-
-def _modelled(runs: Recorded | StationError, identified: IdentifiedModel, telling: Telling) -> Modelled:
-    """Return a model's residual, with a note on unsuitable runs."""
-    if isinstance(runs, StationError):
-        return Modelled(identified, None, str(runs))
-    try:
-        found = evaluate(runs, identified, progress=telling.stage)
-    except StoppedError:
-        raise
-    except StationError as error:
-        return Modelled(identified, None, str(error))
-    return Modelled(identified, replace(found, tolerances=None, notes=(*found.notes, *runs.warnings)))
-
-
-def _ranked(
-    recorded: Recorded | StationError, names: Sequence[str], identified: IdentifiedModel, telling: Telling
-) -> Ranked:
-    """Return each cause's contribution under nominal programs, with a note on unsuitable sessions."""
-    telling.stage("effects of causes")
-    try:
-        if isinstance(recorded, StationError):
-            raise recorded
-        if any(one.commanded is not None for one in recorded.observations):
-            return Ranked(
-                why_not="The circles ran under compensated programs or a correcting control, in which the model's causes are taken out already: `--before` ranks them on the "
-                "circles before."
-            )
-        runs = [thinned(one) for one in recorded.observations]
-        found = effects_of(
-            identified.model,
-            runs,
-            identified.covariance_rows,
-            identified.covariance,
-            identified.null_space,
-            identified.formula_variance,
-        )
-    except StoppedError:
-        raise
-    except StationError as error:
-        return Ranked(why_not=f"What the model's causes contribute could not be worked out: {error}")
-    if not found:
-        return Ranked(why_not="The model has no cause that acts on these circles.")
-    said = identified.report.get("diagnosis")
-    said = said if isinstance(said, Mapping) else {}
-    told, picture = (tuple(str(one) for one in said.get(name, ())) for name in ("said", "picture"))
-    verdicts = said.get("verdicts", {})
-    effects = tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in found)
-    return Ranked(", ".join(dict.fromkeys(names)), effects, said=told, picture=picture)

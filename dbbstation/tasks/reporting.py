@@ -1,0 +1,104 @@
+"""A model beside measured circles: what it leaves, and what its causes contribute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.effects import effects_of
+from dbbstation.diagnosis.thinned import thinned
+from dbbstation.errors import StationError
+from dbbstation.report.content import Modelled
+from dbbstation.results.model_warnings import lacks_physics
+from dbbstation.results.ranked import Ranked
+from dbbstation.tasks.evaluate import evaluate
+from dbbstation.tasks.load import READING, load_sessions
+from dbbstation.tasks.telling import StoppedError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.tasks.load import Recorded
+    from dbbstation.tasks.telling import Telling
+
+_PHYSICS_MISSING = (
+    "Physics is missing from the model: its causes cannot be ranked. `dbbstation diagnose` looks for what it lacks."
+)
+
+
+def read_runs(
+    sessions: Sequence[SessionFolder], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
+) -> Recorded | StationError:
+    """Return recorded runs, or why they cannot be had."""
+    tests, exclude = chosen
+    try:
+        found = load_sessions(sessions, exclude, telling.counted(READING), tests)
+    except StoppedError:
+        raise
+    except StationError as error:
+        return error
+    telling.note(*found.warnings)
+    return found
+
+
+def modelled_runs(runs: Recorded | StationError, identified: IdentifiedModel, telling: Telling) -> Modelled:
+    """Return a model's residual, with a note on unsuitable runs."""
+    if isinstance(runs, StationError):
+        return Modelled(identified, None, str(runs))
+    try:
+        found = evaluate(runs, identified, progress=telling.stage)
+    except StoppedError:
+        raise
+    except StationError as error:
+        return Modelled(identified, None, str(error))
+    return Modelled(identified, replace(found, tolerances=None, notes=(*found.notes, *runs.warnings)))
+
+
+def ranked_causes(
+    sessions: Sequence[SessionFolder],
+    recorded: Recorded | StationError | None,
+    chosen: tuple[Sequence[str], Sequence[str]],
+    identified: IdentifiedModel,
+    telling: Telling,
+) -> Ranked:
+    """Return each cause's contribution under nominal programs, with a note on unsuitable sessions.
+
+    Args:
+        recorded: the sessions' runs; None: not read yet.
+    """
+    if lacks_physics(identified.report):
+        return Ranked(why_not=_PHYSICS_MISSING)
+    recorded = read_runs(sessions, chosen, telling) if recorded is None else recorded
+    telling.stage("effects of causes")
+    try:
+        if isinstance(recorded, StationError):
+            raise recorded
+        if any(one.commanded is not None for one in recorded.observations):
+            return Ranked(
+                why_not="The circles ran under compensated programs or a correcting control, in which the model's causes are taken out already: `--before` ranks them on the "
+                "circles before."
+            )
+        runs = [thinned(one) for one in recorded.observations]
+        found = effects_of(
+            identified.model,
+            runs,
+            identified.covariance_rows,
+            identified.covariance,
+            identified.null_space,
+            identified.formula_variance,
+        )
+    except StoppedError:
+        raise
+    except StationError as error:
+        return Ranked(why_not=f"What the model's causes contribute could not be worked out: {error}")
+    if not found:
+        return Ranked(why_not="The model has no cause that acts on these circles.")
+    said = identified.report.get("diagnosis")
+    said = said if isinstance(said, Mapping) else {}
+    told, picture = (tuple(str(one) for one in said.get(name, ())) for name in ("said", "picture"))
+    verdicts = said.get("verdicts", {})
+    effects = tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in found)
+    return Ranked(", ".join(dict.fromkeys(session.name for session in sessions)), effects, said=told, picture=picture)

@@ -103,9 +103,8 @@ def is_marked(toolpath: Toolpath) -> bool:
 
     @cache
     def part(first: int, decimals: int) -> NDArray[np.uint64]:
-        only = np.zeros_like(poses)
-        only[:, first : first + 3] = poses[:, first : first + 3]
-        return _sums(_numbers(only, (decimals,) * 6))
+        axes = slice(first, first + 3)
+        return _sums(_numbers(poses[:, axes], (decimals,) * 3), axes)
 
     for decimals in decimals_of(poses):
         sums = part(0, decimals[0]) + part(3, decimals[5])
@@ -164,9 +163,8 @@ def _numbers(poses: NDArray[np.float64], decimals: Sequence[int]) -> NDArray[np.
     return numbers
 
 
-def _sums(numbers: NDArray[np.int64]) -> NDArray[np.uint64]:
-    with np.errstate(over="ignore"):
-        weighted: NDArray[np.uint64] = (numbers.astype(np.uint64) * _ODD).sum(axis=-1, dtype=np.uint64)
+def _sums(numbers: NDArray[np.int64], axes: slice = slice(None)) -> NDArray[np.uint64]:
+    weighted: NDArray[np.uint64] = numbers.astype(np.uint64) @ _ODD[axes]
     return weighted
 
 

@@ -39,7 +39,8 @@ def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
     digest = hashlib.sha256()
     digest.update(toolpath.kind[told].astype("<i1").tobytes())
     digest.update(poses[told].astype("<i8").tobytes())
-    digest.update(" ".join(f"{seconds:.6e}" for seconds in toolpath.dwell_s[told].tolist()).encode())
+    written = {seconds: f"{seconds:.6e}" for seconds in np.unique(toolpath.dwell_s[told]).tolist()}
+    digest.update(" ".join(map(written.__getitem__, toolpath.dwell_s[told].tolist())).encode())
     return 1 + int.from_bytes(digest.digest()[:8]) % CHECKSUMS
 
 

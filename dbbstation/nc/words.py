@@ -208,12 +208,19 @@ class WordDialect(Dialect):
     def _body(self, toolpath: Toolpath) -> Iterator[str]:
         changed = changed_axes(toolpath)
         state = _Modal(math.nan, math.nan if toolpath.corner_mm is None else toolpath.corner_mm)
+        # Most rows only have other axes than the row before: a table's words stand beside these.
+        of_table = self.words.get("feed", "") if type(self).feed is WordDialect.feed else ""
+        plain_feed = of_table.split("{words}") if of_table.count("{") == 1 else []
         for begin in range(0, len(toolpath), AT_ONCE):
             rows = slice(begin, min(begin + AT_ONCE, len(toolpath)))
             words = self._words(toolpath, changed, rows)
             kinds, feeds = toolpath.kind[rows].tolist(), toolpath.feed[rows].tolist()
             corners, in_machine = toolpath.corners_mm[rows].tolist(), toolpath.in_machine[rows].tolist()
             for place, kind in enumerate(kinds):
+                same = kind == RowKind.FEED and feeds[place] == state.feed and not in_machine[place]
+                if plain_feed and same and (corners[place] == state.corner_mm or math.isnan(corners[place])):
+                    yield f"{plain_feed[0]}{words[place]}{plain_feed[-1]}"
+                    continue
                 try:
                     if kind not in _MOVES:
                         yield self._row(RowKind(kind), toolpath, begin + place)

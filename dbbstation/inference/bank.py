@@ -125,6 +125,11 @@ class Bank:
         return [p for p, c, worth in zip(found, causes, scan.log_factor, strict=True) if worth + c.log_prior_odds > 0.0]
 
     @property
+    def count(self) -> int:
+        """Return the number of columns of all causes."""
+        return self._columns.count
+
+    @property
     def looked_for(self) -> set[str]:
         """Return names of patterns that a search picked."""
         return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}

@@ -219,8 +219,8 @@ class Bounds:
     error larger."""
 
     work: float = 2e6
-    """Work of all searches over all rows [`SearchWork`]: half a minute of one processor. Tables of a thousand rows
-    with five effects take a fiftieth of it."""
+    """Work of all searches over all rows [`SearchWork`]: half a minute of one processor. 1,200 rows of a damper
+    end at it."""
 
     work_without: float = 2e5
     """Work of a search without one held-out part, so that ten of these cost as much as all rows."""

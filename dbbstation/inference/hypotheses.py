@@ -35,20 +35,42 @@ NEGLIGIBLE = 40.0
 4e-12 together, and their names are what a search without end fills the memory with."""
 
 
+SCAN, FIT = 1.0 / 3.0, 3e5
+"""Columns of a scan, and multiplications of a fit, that take as long as one cause times one column of an examined set: 16 µs. Measured on
+1,200 rows with 1,100 columns, where sets of 16 causes took 12 ms, scans of 500 columns 2.5 ms, fits 80 ms."""
+
+
 @dataclass(eq=False)
 class SearchWork:
-    """Work that a search may still do: the sum of causes times columns over examined sets."""
+    """Work of a search, counted by what it costs: sets, scans of all causes, and fits.
 
-    left: float = np.inf
+    Attributes:
+        most: work that may be done.
+    """
 
-    def spend(self, members: Sequence[Member]) -> None:
-        """Count one set."""
-        self.left -= len(members) * sum(len(member.columns) for member in members)
+    most: float = np.inf
+    spent: float = 0.0
+
+    def examine(self, members: Sequence[Member]) -> None:
+        """Count one set: causes times columns."""
+        self.spent += len(members) * sum(len(member.columns) for member in members)
+
+    def scan(self, causes: Iterable[Cause], times: int = 1) -> None:
+        """Count scans of all causes."""
+        self.spent += times * SCAN * sum(len(one.columns) for cause in causes for one in cause.variants)
+
+    def fit(self, rows: int, columns: int) -> None:
+        """Count one fit of all columns, as noise is measured and features are looked for: rows times columns squared."""
+        self.spent += rows * float(columns) ** 2 / FIT
+
+    def part(self, stages: int) -> SearchWork:
+        """Return an even share of what is left for so many stages."""
+        return SearchWork(max(self.most - self.spent, 0.0) / stages)
 
     @property
     def is_spent(self) -> bool:
         """Return whether the work is used up."""
-        return self.left <= 0.0
+        return self.spent >= self.most
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +185,7 @@ class _Search:
         self._beyond = -np.inf  # log posterior of the most probable set that is too large
         self._room = BOUNDS.scores
         self._top = -np.inf  # log posterior of the most probable hypothesis so far
+        self._begun = False  # seeds are looked at without a limit: they are the best so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
         """Search until all likely sets are examined."""
@@ -176,6 +199,7 @@ class _Search:
         self._look_at(())
         for members in seeds:
             self._look_at([self._anew(member) for member in members if member.cause.name in self._causes])
+        self._begun = True
         self._pairs((), self._comparison.scan((), self._causes.values()))
         expanded: set[frozenset[str]] = set()
         challenged: set[frozenset[str]] = set()
@@ -226,6 +250,7 @@ class _Search:
         return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[: BOUNDS.replaced]
 
     def _around(self, hypothesis: Hypothesis) -> Around:
+        self._work.scan(self._causes.values(), len(hypothesis.members) + 1)
         return self._comparison.around(hypothesis.members, self._causes.values())
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
@@ -295,9 +320,9 @@ class _Search:
     def _look_at(self, members: Sequence[Member]) -> None:
         """Settle and keep a set; examine it without unworthy members."""
         key = frozenset(member.cause.name for member in members)
-        if key in self._seen or len(key) > self._most_members or (self._seen and self._work.is_spent):
+        if key in self._seen or len(key) > self._most_members or (self._begun and self._work.is_spent):
             return
-        self._work.spend(members)
+        self._work.examine(members)
         found = self._settled(list(members))
         self._seen[key] = found
         self._top = max(self._top, found.log_posterior)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.channel import Channel, Law
+    from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.projection import BesideBase
@@ -66,26 +67,31 @@ def settle(
         most_looks=most_looks,
         in_time=in_time,
         thorough=thorough,
-        most_work=most_work / (len(beginnings) + 1),
     )
+    work, stages = SearchWork(most_work), len(beginnings) + 1
     if not rivals:
-        return _settled(_begun(channel, options), options, progress)
+        return _settled(_begun(channel, options), options, progress, work)
     found: list[Settled] = []
     laid_out = _begun(channel, options)
     begun: tuple[Bank, Settled] | None = None
     # Long tails come last: where nothing has any, they are no rival.
-    for one in sorted(beginnings, key=lambda one: one in LONG_TAILS):
+    for number, one in enumerate(sorted(beginnings, key=lambda one: one in LONG_TAILS)):
+        part = work.part(stages - number)
         if one in LONG_TAILS and found and not _may_have_long_tails(laid_out, found):
             continue
         if one in BESIDE_NOTHING:
-            found.append(_from(laid_out.copy(), (), {}, one, options, progress, found))
+            found.append(_from(laid_out.copy(), (), {}, one, options, progress, part, found))
+            work.spent += part.spent
             continue
         if begun is None:
             # What stands beside everything is worked out once, and gone on with under each kind of noise.
             bank = laid_out.copy()
-            begun = bank, _settled(bank, options, progress)
+            begun = bank, _settled(bank, options, progress, part)
+            work.spent += part.spent
+            part = work.part(stages - number - 1)
         beside_all = begun[1].best.members
-        found.append(_from(begun[0].copy(), beside_all, begun[1].refused, one, options, progress, found))
+        found.append(_from(begun[0].copy(), beside_all, begun[1].refused, one, options, progress, part, found))
+        work.spent += part.spent
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
 
@@ -111,10 +117,11 @@ def _from(
     beginning: Beginning,
     options: _Options,
     progress: Callable[[str], None],
+    work: SearchWork,
     known: Sequence[Settled],
 ) -> Settled:
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
-    settled = _settled(bank, options, progress, members, refused, known)
+    settled = _settled(bank, options, progress, work, members, refused, known)
     if any(settled is one for one in known):
         return replace(settled, beginning=beginning)
     return replace(settled, beginning=beginning, log_probability=log_probability(bank, settled.best.members))
@@ -140,7 +147,6 @@ class _Options:
     most_looks: int
     in_time: bool
     thorough: bool
-    most_work: float
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -160,6 +166,7 @@ def _settled(
     bank: Bank,
     options: _Options,
     progress: Callable[[str], None],
+    work: SearchWork,
     best: tuple[Member, ...] = (),
     impossible: Mapping[str, str] | None = None,
     known: Sequence[Settled] = (),
@@ -170,23 +177,23 @@ def _settled(
     refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
-    most_probable, times_placed, work = -np.inf, 0, SearchWork(options.most_work)
+    most_probable, times_placed = -np.inf, 0
     # Members to begin with come from a comparison that had been looked about for.
     blank = not best
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(BOUNDS.rounds):
-        bank.measure(best)
+        _measured(bank, best, work)
         starts: list[tuple[Member, ...]] = []
         if looking:
-            best, starts = _looked_about(bank, best, refused, progress, options, first=blank and compared is None)
+            best, starts = _looked_about(bank, best, refused, progress, options, work, first=blank and compared is None)
             if compared is not None and _would_be_the_same(compared, bank, best, refused):
                 return compared
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
         causes = bank.but_for(refused)
-        starts = [grown(comparison, causes, members) for members in (*starts, best)]
+        starts = [grown(comparison, causes, members, work) for members in (*starts, best)]
         posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded, work=work)
         seeds |= {h.names: h.members for h in posterior.hypotheses[: BOUNDS.seeds]}
         settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
@@ -236,32 +243,41 @@ def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member], re
     return same and alike(bank.noise, compared.noise)
 
 
+def _measured(bank: Bank, members: Sequence[Member], work: SearchWork) -> Coloured:
+    work.fit(len(bank.channel.target), bank.count)
+    return bank.measure(members)
+
+
 def _looked(
     bank: Bank,
     members: tuple[Member, ...],
     refused: Mapping[str, str],
     progress: Callable[[str], None],
-    most_looks: int,
+    options: _Options,
+    work: SearchWork,
     *,
     in_time: bool = True,
 ) -> tuple[Member, ...]:
     before = log_probability(bank, members)
-    for number in range(most_looks):
+    for number in range(options.most_looks):
+        if work.is_spent:
+            break
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
-        noise = bank.measure(members)
+        work.fit(len(bank.channel.target), bank.count)
+        noise = _measured(bank, members, work)
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
-        more = places_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
+        more = places_anew(bank, grown(comparison, bank.but_for(refused), members, work), set(new))
         fresh = set(bank.patterns) - known
         taken = {member.cause.name for member in more}
         # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
         if bank.measures_beside_members:
-            bank.measure(more)
+            _measured(bank, more, work)
         after = log_probability(bank, more)
         if not taken & fresh or after <= before:
             bank.drop(fresh)
-            bank.measure(members)
+            _measured(bank, members, work)
             break
         bank.drop(fresh - taken)
         members, before = more, after
@@ -274,6 +290,7 @@ def _looked_about(
     refused: Mapping[str, str],
     progress: Callable[[str], None],
     options: _Options,
+    work: SearchWork,
     *,
     first: bool,
 ) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
@@ -283,10 +300,10 @@ def _looked_about(
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
         # follow variables have a start of their own, and what comes at once has one beside the laws alone.
         begun = _grown_in(bank)
-        starts.append(_looked(bank, begun, refused, progress, options.most_looks, in_time=False))
+        starts.append(_looked(bank, begun, refused, progress, options, work, in_time=False))
         laws = tuple(member for member in begun if member.cause.name in bank.laws)
-        starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
-    best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
+        starts.append(_looked(bank, laws, refused, progress, options, work) if laws else ())
+    best = _looked(bank, best, refused, progress, options, work, in_time=options.in_time)
     return best, starts
 
 
@@ -298,11 +315,17 @@ def log_probability(bank: Bank, members: Sequence[Member]) -> float:
     return bank.log_likelihood() + evidence + bank.tails_beyond(members) + odds
 
 
-def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:
+def grown(
+    comparison: ModelComparison,
+    causes: Sequence[Cause],
+    start: Sequence[Member] = (),
+    work: SearchWork | None = None,
+) -> tuple[Member, ...]:
     """Return greedily grown causes, pruned at the end.
 
     Args:
         start: initial members; missing ones are skipped.
+        work: where each scan is counted.
     """
     there = {cause.name: cause for cause in causes}
     members = [
@@ -312,6 +335,8 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
     ]
     while len(members) < BOUNDS.grown:
         taken = {member.cause.name for member in members}
+        if work is not None:
+            work.scan(causes)
         scan = comparison.scan(members, [cause for cause in causes if cause.name not in taken])
         if not scan.causes:
             break

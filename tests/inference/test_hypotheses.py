@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.hypotheses import CLOSE, LIKELY, NEGLIGIBLE, search
-from dbbstation.inference.model_comparison import FLEXIBLE, Around, Member
+from dbbstation.inference.hypotheses import CLOSE, FIT, LIKELY, NEGLIGIBLE, SCAN, SearchWork, search
+from dbbstation.inference.model_comparison import FLEXIBLE, Around, Cause, Member, Variant
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import inclusion, log_posteriors
 
@@ -195,3 +195,22 @@ def test_pairs_that_are_replaced_are_counted(rng, monkeypatch):
     again = search(problem.comparison(), causes, [whole.members], thorough=False)
     assert again.best.names == whole.names
     assert replaced == []
+
+
+def test_work_is_counted_by_what_it_costs():
+    """A fit by rows times columns squared, a scan by columns of all forms, a set by causes times columns; stages share evenly."""
+    work = SearchWork(1000.0)
+    work.fit(2_000, 300)
+    assert work.spent == pytest.approx(2_000 * 300**2 / FIT)
+    causes = [Cause(f"c{k}", (Variant(np.arange(3 * k, 3 * k + 3), np.ones(3)),), 0.0) for k in range(4)]
+    before = work.spent
+    work.scan(causes, 5)
+    assert work.spent - before == pytest.approx(5 * 12 * SCAN)
+    before = work.spent
+    work.examine([Member(cause, cause.variants[0], 1.0) for cause in causes])
+    assert work.spent - before == 4 * 12
+    part = work.part(3)
+    assert part.most == pytest.approx((1000.0 - work.spent) / 3.0)
+    part.fit(10_000, 300)
+    assert part.is_spent
+    assert not work.is_spent

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import bdtrc
 
-from dbbstation.machine.compiled import compiled
+from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
@@ -149,10 +149,7 @@ def _first_marked(
         for step in range(len(step_sums)):
             if moved[step] & fixed[row]:
                 continue
-            mixed = sums[row] + step_sums[step]
-            mixed = (mixed ^ (mixed >> shifts[0])) * mixing[0]
-            mixed = (mixed ^ (mixed >> shifts[1])) * mixing[1]
-            if (mixed ^ (mixed >> shifts[2])) >> shifts[3] == 0:
+            if _mixed(sums[row] + step_sums[step], mixing, shifts) >> shifts[3] == 0:
                 chosen[row] = step
                 break
     return chosen
@@ -170,11 +167,24 @@ def _sums(numbers: NDArray[np.int64], axes: slice = slice(None)) -> NDArray[np.u
 
 def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
     """Return whether a sum, spread over 64 bits, begins with zeros."""
-    with np.errstate(over="ignore"):
-        mixed = (sums ^ (sums >> _SHIFTS[0])) * _MIXING[0]
-        mixed = (mixed ^ (mixed >> _SHIFTS[1])) * _MIXING[1]
-    marked_ones: NDArray[np.bool_] = (mixed ^ (mixed >> _SHIFTS[2])) >> np.uint64(64 - bits) == 0
-    return marked_ones
+    return _begin_with_zeros(sums, _MIXING, np.append(_SHIFTS, np.uint64(64 - bits)))
+
+
+@compiled
+def _begin_with_zeros(
+    sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]
+) -> NDArray[np.bool_]:
+    found = np.zeros(len(sums), dtype=np.bool_)
+    for row in range(len(sums)):
+        found[row] = _mixed(sums[row], mixing, shifts) >> shifts[3] == 0
+    return found
+
+
+@inlined
+def _mixed(mixed: np.uint64, mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> np.uint64:
+    mixed = (mixed ^ (mixed >> shifts[0])) * mixing[0]
+    mixed = (mixed ^ (mixed >> shifts[1])) * mixing[1]
+    return mixed ^ (mixed >> shifts[2])
 
 
 def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int]) -> NDArray[np.bool_]:

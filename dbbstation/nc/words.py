@@ -270,8 +270,10 @@ class WordDialect(Dialect):
             alike = np.flatnonzero(which == one)
             axes = np.flatnonzero(changed[alike[0]])
             form = " ".join(f"{self.axis_words[axis]}%.{self.decimals[axis]}f" for axis in axes.tolist())
-            for row, values in zip(alike.tolist(), poses[np.ix_(alike, axes)].tolist(), strict=True):
-                texts[row] = form % tuple(values)
+            # One format for all rows is twice as quick as one for each.
+            together = "\n".join([form] * len(alike)) % tuple(poses[np.ix_(alike, axes)].reshape(-1).tolist())
+            for row, words in zip(alike.tolist(), together.split("\n"), strict=True):
+                texts[row] = words
         return texts
 
 

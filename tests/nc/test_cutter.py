@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import InputError
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import Toolpath
+from dbbstation.tasks.programs import setup_of
 from tests.nc.interpreter import events, needs_rs274
 from tests.nc.test_fuzz_rs274 import difference
 
@@ -73,6 +75,19 @@ def test_a_dive_at_an_inner_corner_goes_down_where_the_corner_is():
 def test_what_a_cutter_cannot_follow_is_refused(body, says):
     with pytest.raises(InputError, match=says):
         corners(body)
+
+
+def test_lengths_and_diameters_stand_in_the_tool_table(tmp_path):
+    table = tmp_path / "tool.tbl"
+    table.write_text("T1 P1 D6.0 Z12.5 ;mill\nT2 P2 Z-3\n")
+    setup = setup_of({}, {2: 4.0}, None, table)
+    assert setup.diameters == {1: 6.0}
+    assert setup.lengths == {1: (0.0, 0.0, 12.5, 0.0, 0.0, 0.0), 2: (0.0, 0.0, 4.0, 0.0, 0.0, 0.0)}
+
+
+def test_the_header_says_for_which_diameter_a_program_is_right(linuxcnc, crooked):
+    path = linuxcnc.toolpath(f"{HEAD.replace('Z0', 'Z-1000')}G41 D1\nG1 Y0\nY30\nG40\nM2\n", "part.ngc", setup=TOOL)
+    assert "; right for the diameter of tool 1: 4\n" in compensated_program(path, linuxcnc, Inverse(crooked)).text
 
 
 def contour(seed: int) -> str:

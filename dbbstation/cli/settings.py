@@ -98,7 +98,7 @@ def built_in() -> dict[str, str | int | float | None]:
         "limits.largest_bar_age_h": USUAL_AGE_H,
         "numbers.decimal": PLAIN.decimal,
         "numbers.separator": PLAIN.separator,
-        "simulators": None,
+        **dict.fromkeys(("simulators", "report.customer", "report.logo")),
     }
 
 

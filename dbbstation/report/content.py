@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.circles.budget import BudgetTerm
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.report.causes_part import TitledPolar, cause_rows, cured_polars
 from dbbstation.report.certificate import certified
@@ -13,7 +14,7 @@ from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
-from dbbstation.report.shown import ReportContent, ShownCauses, ShownFindings, ShownModel, ShownSession
+from dbbstation.report.shown import ReportContent, ShownBudget, ShownCauses, ShownFindings, ShownModel, ShownSession
 from dbbstation.results.circle_figures import RunWithoutCircle
 from dbbstation.results.circles import circles_result
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
@@ -69,6 +70,7 @@ class Reported:
     job: str = ""
     ranked: Ranked | None = None
     place: str = ""
+    logo: str = ""
 
 
 def numbers_of(reported: Reported, page: str) -> ReportResult:
@@ -147,6 +149,9 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
         notes=[*found.warnings, *_notes_before(reported)],
         files=list(_files(reported, provenance)),
         provenance=provenance,
+        customer="" if (one := reported.settings.values.get("report.customer")) is None else str(one.value),
+        logo=reported.logo,
+        budget=_budget(numbers.circles),
     )
 
 
@@ -222,6 +227,22 @@ def _budgets(circles: CirclesResult) -> Iterable[tuple[str, Budget]]:
     for one in (*circles.runs, *circles.pairs):
         if not isinstance(one, RunWithoutCircle):
             yield from one.uncertainty.items()
+
+
+def _budget(circles: CirclesResult) -> ShownBudget | None:
+    """Return the budget of the circle whose figures have the largest standard uncertainty."""
+    runs = [one for one in circles.runs if not isinstance(one, RunWithoutCircle)]
+    if not runs:
+        return None
+    run = max(runs, key=lambda one: max(budget.known_um for budget in one.uncertainty.values()))
+    budgets = run.uncertainty.values()
+    rows: list[tuple[str, list[float | None]]] = [
+        (str(cause), [budget.terms_um.get(cause) for budget in budgets])
+        for cause in BudgetTerm
+        if any(cause in budget.terms_um for budget in budgets)
+    ]
+    rows.append(("u, all together", [budget.u_um for budget in budgets]))
+    return ShownBudget(f"{run.test} {run.direction} {run.repeat}", list(run.uncertainty), rows)
 
 
 def _not_stated(circles: CirclesResult) -> list[str]:

@@ -59,6 +59,15 @@ class ShownModel:
     not_visible: Sequence[str]
 
 
+@dataclass(frozen=True)
+class ShownBudget:
+    """Standard uncertainties of one circle [µm], a row for each cause and a column for each figure."""
+
+    run: str
+    figures: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[float | None]]]
+
+
 @dataclass(frozen=True, eq=False)
 class ReportContent:
     """Content of the report's template.
@@ -67,6 +76,7 @@ class ReportContent:
         number: of the report, by program, command and inputs.
         before_name: earlier session; may be empty.
         files: name and SHA-256 of every underlying file.
+        logo: address of the picture with its content; may be empty.
     """
 
     machine: str
@@ -90,3 +100,6 @@ class ReportContent:
     notes: Sequence[str]
     files: Sequence[tuple[str, str]]
     provenance: Provenance
+    customer: str
+    logo: str
+    budget: ShownBudget | None

@@ -100,11 +100,12 @@ def report(
     from dbbstation.tasks.circle_runs import load_circles
     from dbbstation.tasks.load import paths_of
     from dbbstation.tasks.models import model_of
-    from dbbstation.tasks.reporting import modelled_runs, ranked_causes, read_runs
+    from dbbstation.tasks.reporting import logo_of, modelled_runs, ranked_causes, read_runs
 
     out, paper = Path(page), None if pdf is None else Path(pdf)
     refuse_outputs([out, paper], force=force)
     browser = None if paper is None else chromium()
+    logo = logo_of(settings)
     telling = Telling(progress, stop, say)
     every = every_source(paths_of(source_files)) if known is None and model is not None else known
     identified = None if model is None else model_of(model, every)
@@ -125,7 +126,7 @@ def report(
         modelled = modelled_runs(runs, identified, telling)
         nominal = now if then is None else [then]
         ranked = ranked_causes(nominal, runs if then is None else None, (tests, exclude), identified, telling)
-    reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place)
+    reported = Reported(found, TOLERATED, settings, coverage_factor, former, modelled, job, ranked, place, logo)
     lacking = certified_of(reported).lacking
     if certificate and lacking:
         what = f"this is no certificate: {', '.join(lacking)}"

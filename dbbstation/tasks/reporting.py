@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.errors import StationError
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.source_text import read_bytes
 from dbbstation.report.content import Modelled
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.ranked import Ranked
@@ -19,6 +21,7 @@ from dbbstation.tasks.telling import StoppedError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dbbstation.files.formats.settings import Settings
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.tasks.load import Recorded
@@ -27,6 +30,31 @@ if TYPE_CHECKING:
 _PHYSICS_MISSING = (
     "Physics is missing from the model: its causes cannot be ranked. `dbbstation diagnose` looks for what it lacks."
 )
+
+
+_PICTURES = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpeg"}
+"""Kinds of pictures by their first bytes."""
+
+LARGEST_LOGO_BYTES = 1_000_000
+"""A report is sent by mail: its picture has at most one megabyte."""
+
+
+def logo_of(settings: Settings) -> str:
+    """Return the shop's picture as an address that holds it; empty without one.
+
+    Raises:
+        InputError: it cannot be read, or is no PNG or JPEG picture.
+    """
+    if (stated := settings.values.get("report.logo")) is None:
+        return ""
+    path, faults = stated.file.parent / stated.value, list[Problem]()
+    data = read_bytes(path, faults, LARGEST_LOGO_BYTES) or b""
+    kind = next((kind for begins, kind in _PICTURES.items() if data.startswith(begins)), "")
+    if not kind and not faults:
+        faults.append(Problem(str(path), 0, 0, "no PNG or JPEG picture", f"name one in {stated.origin}"))
+    if faults:
+        raise InputError(faults)
+    return f"data:image/{kind};base64,{b64encode(data).decode()}"
 
 
 def read_runs(

@@ -21,7 +21,7 @@ BESIDE = "dbbstation-settings.yaml"
 OF_USER = "settings.yaml"
 """Name of the file in the user's configuration folder."""
 
-_OPEN = frozenset({"program", "limits"})
+_OPEN = frozenset({"program", "limits", "report"})
 """Blocks whose keys stand for themselves: two files may each give some. The other blocks are one thing, such as one bar,
 and come from one file whole."""
 

@@ -106,6 +106,15 @@ class ToleranceSettings(Schema):
         return Tolerance(CircleFigure(self.quantity), self.largest * _UM_PER[self.unit], self.tests, directions, upr)
 
 
+class ReportSettings(Schema):
+    """What stands at the head of reports."""
+
+    customer: _Word | None = None
+    """Who has the machine."""
+    logo: _Word | None = None
+    """Picture of the shop, PNG or JPEG; a path from this file's folder."""
+
+
 class SettingsFile(Schema):
     """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
 
@@ -133,6 +142,8 @@ class SettingsFile(Schema):
     """Simulators that `mismatch` may run, by the SHA-256 that it names; not taken from a file beside sessions, which others may write."""
     tolerances: tuple[ToleranceSettings, ...] | None = None
     """What circles may have."""
+    report: ReportSettings = ReportSettings()
+    """What stands at the head of reports."""
 
     @model_validator(mode="after")
     def _profile_of_something(self) -> "SettingsFile":

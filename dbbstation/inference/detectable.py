@@ -55,14 +55,16 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
     laws, found = settled.bank.laws, list[Detectable]()
     for cause in (c for c in settled.causes if c.name in laws and laws[c.name].confirm):
         variant = max(cause.variants, key=lambda one: len(one.columns))
-        samples = settled.bank.samples(variant.columns)
-        whole = float(np.sum(np.square(samples * variant.plausible)))
-        if whole < (NOTHING * settled.noise.sigma) ** 2 * len(samples):
+        samples, white = settled.bank.samples(variant.columns), settled.bank.fitted(variant.columns)
+        whole = float(np.sum(np.square(white * variant.plausible)))
+        if whole < (NOTHING * settled.noise.innovation) ** 2 * len(white):
             continue
         shown = np.diag(settled.comparison.beside((), variant.columns)) * settled.noise.innovation**2
-        products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)
-        size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
-        concealed = float(np.clip(1.0 - variant.plausible**2 @ shown / whole, 0.0, 1.0))
+        seen, size = float(variant.plausible**2 @ shown) / whole, None
+        if seen >= ENTIRELY:
+            products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)
+            size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
+        concealed = float(np.clip(1.0 - seen, 0.0, 1.0))
         found.append(
             Detectable(cause.name, None if size is None else MARGIN * size, concealed, laws[cause.name].confirm)
         )
@@ -70,7 +72,7 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
 
 
 NOTHING = 1e-3
-"""An effect whose rms is below this share of the noise is left out: a million rows would show it by one standard deviation."""
+"""An effect whose rms, whitened, is below this share of the noise is left out: a million rows would show it by one standard deviation."""
 
 
 def _family(bank: Bank, name: str) -> Family | None:

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.special import logsumexp
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.by_level import VerdictsByLevel
-from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.consequence import may_result
-from dbbstation.inference.detectable import MARGIN, POWER, detectable, least_seen
+from dbbstation.inference.detectable import MARGIN, POWER, detectable, detectable_causes, least_seen
 from dbbstation.inference.folds import Fold, HeldOutError, parts_of
 from dbbstation.inference.followed import (
     ChosenWithoutParts,
@@ -187,6 +188,23 @@ def test_the_least_size_is_found_in_nine_of_ten_draws(rng):
         seen += logsumexp(np.array(factors) + LOG_SCALE_WEIGHTS) + odds >= np.log(19.0)
     # 100 draws know it to 3 %, these to 1.5 %.
     assert seen / 400 == pytest.approx(POWER, abs=0.08)
+
+
+def test_slow_noise_conceals_nothing_that_the_base_does_not_take(rng):
+    """Four whole waves have no mean: an offset takes none of them, whatever the noise; of a constant it takes all."""
+    rows = np.arange(800.0)
+    slow = lfilter([1.0], [1.0, -0.9], rng.standard_normal(800))
+    columns = {"wave": np.sin(2.0 * np.pi * rows / 200.0), "constant": np.ones(800)}
+    laws = tuple(
+        Law(name, lambda _, own=own: own[:, None], np.ones(1), ("size",), ("mm",), confirm="measure it")
+        for name, own in columns.items()
+    )
+    base = Base.flat(("offset",), np.ones((800, 1)))
+    whole = Channel(slow, "mm", (slice(0, 800),), ("run",), (), base, laws, time=rows)
+    settled = settle(whole, look=False, static=False, beginnings=(Beginning.NOTHING,))
+    assert settled.noise.correlation_samples > 5.0
+    found = {one.follows: one.concealed for one in detectable_causes(settled)}
+    assert found == pytest.approx({"wave": 0.0, "constant": 1.0}, abs=0.02)
 
 
 def test_a_larger_margin_than_one_is_on_every_size(nothing):
@@ -420,4 +438,4 @@ def test_the_whole_line_is_said_where_no_law_alone_states_it(form, lines):
     one = replace(followed(FollowsAnswer.FOLLOWS), variables=(("y",),), form=form, slope=shear, straight=0.9)
     levels = Levels(DifferenceFound(Differs.YES, "", 1.0, 1.0, False, 900.0, ()), (one,), None)  # noqa: FBT003
     said = " ".join(level_sentences(levels, "mm", {"linear in y": {"slope": Value(-2e-5, 2e-6, "mm/mm")}}))
-    assert said.count("-3.9e-05 ± 1e-06 mm/mm") == lines
+    assert said.count("-3.90e-05 ± 1.0e-06 mm/mm") == lines

@@ -132,6 +132,8 @@ def bar(
     echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
     if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
         echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
+    if file.to_bar(None).certificate_wrong(datetime.now(UTC).date()):
+        echo(f"note: `measure` refuses a calibrator that was certified on {certified}", err=True)
     echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
 
 

@@ -97,11 +97,15 @@ class SessionOptions:
         """Return what a session notes.
 
         Raises:
-            click.UsageError: length without uncertainty, something of the bar without either, or a file and options of the bar.
+            click.UsageError: a blank name, length without uncertainty, something of the bar without either, or a file and options of the bar.
             InputError: faults of the bar's file.
         """
         from dbbstation.files.recordings.session_details import SessionDetails
 
+        for name in ("operator", "job", "serial_number"):
+            if (text := getattr(self, name)) and not text.strip():
+                option = name.replace("_", "-")
+                raise click.UsageError(f"--{option} is blank: state it, or leave --{option} out")
         if self.bar_file is None:
             bar = self._bar(stroke_mm)
         else:
@@ -111,8 +115,8 @@ class SessionOptions:
                 raise click.UsageError("--bar says everything of the bar: leave out --bar-length-mm and the like")
             bar = read_bar(self.bar_file).to_bar(stroke_mm)
         return SessionDetails(
-            self.serial_number,
-            self.operator,
+            self.serial_number.strip(),
+            self.operator.strip(),
             self.ambient_temp_c,
             bar,
             self.bar_waiver.strip(),

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from datetime import date, timedelta
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from datetime import datetime
+
+LONGEST_CALIBRATOR = timedelta(days=5 * 366)
+"""Time from a calibrator's certificate: the longest usual interval of gauge blocks and step gauges [ILAC-G24]."""
 
 USUAL_TEMP_UNCERTAINTY_K = 0.3
 """A thermometer of class B may be off by 0.4 K at 20 degC [IEC 60751]; as a rectangular distribution that is 0.23 K, and the bar is
@@ -50,6 +54,12 @@ class Bar:
     calibrator_certificate: str | None = None
     calibrator_certified: str | None = None
     ball_form_um: float | None = None
+
+    def certificate_wrong(self, day: date) -> bool:
+        """Return whether the calibrator's certificate is of later than a day, or too old on it."""
+        if self.calibrator_certified is None:
+            return False
+        return not timedelta(0) <= day - date.fromisoformat(self.calibrator_certified) <= LONGEST_CALIBRATOR
 
     def reads_long_mm(self, temp_c: float | None) -> tuple[float, float]:
         """Return the expected reading minus true distance, with standard uncertainty [mm].

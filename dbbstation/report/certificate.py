@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, date, datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.files.recordings.entries import RunState
@@ -80,14 +80,9 @@ def _dates(session: SessionFolder) -> Iterator[str]:
         return
     if bar.calibrated is not None and not timedelta(0) <= first - bar.calibrated <= LONGEST_BAR:
         yield f"bar calibrated on {bar.calibrated:%Y-%m-%d}, runs of {first:%Y-%m-%d}"
-    if bar.calibrator_certified is not None:
-        certified_on = date.fromisoformat(bar.calibrator_certified)
-        if not timedelta(0) <= first.date() - certified_on <= LONGEST_CALIBRATOR:
-            yield f"calibrator certified on {certified_on}, runs of {first:%Y-%m-%d}"
+    if bar.certificate_wrong(first.date()):
+        yield f"calibrator certified on {bar.calibrator_certified}, runs of {first:%Y-%m-%d}"
 
 
 LONGEST_BAR = timedelta(days=366)
 """Time from a bar's calibration to a certified run: beyond a year it is another bar by wear of its balls and knocks."""
-
-LONGEST_CALIBRATOR = timedelta(days=5 * 366)
-"""Time from a calibrator's certificate: the longest usual interval of gauge blocks and step gauges [ILAC-G24]."""

@@ -44,6 +44,8 @@ def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: f
         what = f"the bar's calibration is of the future, {bar.calibrated:%Y-%m-%d %H:%M %Z}: a clock was wrong"
     elif (age_h := (now - bar.calibrated) / timedelta(hours=1)) > largest_age_h:
         what = f"the bar was last on its calibrator {age_h:.0f} h ago, {largest_age_h:g} h are allowed"
+    elif bar.certificate_wrong(now.date()):
+        what = f"the calibrator of the bar was certified on {bar.calibrator_certified}; five years at most are taken"
     else:
         return
     raise InputError([Problem("bar", 0, 0, what, _REMEDY)])

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from dbbstation.plan.bar import Bar
 from dbbstation.report.certificate import _dates
 from dbbstation.report.html import _css
 
@@ -32,7 +33,7 @@ def test_a_run_of_the_future():
 def session(run, bar, calibrator):
     return SimpleNamespace(
         in_state=lambda _state: [SimpleNamespace(started=datetime(*run, 8, tzinfo=UTC))],
-        bar=SimpleNamespace(calibrated=datetime(*bar, 7, tzinfo=UTC), calibrator_certified=calibrator),
+        bar=Bar("B-1", 150.0, 5e-4, datetime(*bar, 7, tzinfo=UTC), 20.0, 1.2, calibrator_certified=calibrator),
     )
 
 

@@ -45,6 +45,12 @@ def test_the_bar_is_read_from_an_instrument_and_kept(tmp_path: Path) -> None:
             "bar", "--instrument", "streaming-encoder", "--port", wire.port, *CALIBRATOR, "--out", out, "--json"
         )
         again = call("bar", "--instrument", "streaming-encoder", "--port", wire.port, *CALIBRATOR, "--out", out)
+        old = call(
+            "bar", "--instrument", "streaming-encoder", "--port", wire.port, *CALIBRATOR, "--certified", "2012-03-02",
+            "--out", tmp_path / "old.yaml",
+        )  # fmt: skip
+    assert "`measure` refuses a calibrator that was certified on 2012-03-02" in old.err
+    assert "refuses" not in told.err
     assert told.code == 0, told.err
     bar = read_bar(out)
     # Two hundred independent readings: 0.4 µm / sqrt(200) = 0.03 µm about the true mean, five of them are never seen.
@@ -101,6 +107,9 @@ def test_a_display_that_was_not_preset_is_refused_by_the_file(tmp_path: Path) ->
         (replace(BAR, reading_mm=None), "nobody has read the bar on its calibrator"),
         (replace(BAR, calibrated=NOW - timedelta(hours=25)), "on its calibrator 25 h ago, 24 h are allowed"),
         (replace(BAR, calibrated=NOW + timedelta(hours=1)), "of the future"),
+        (replace(BAR, calibrated=NOW.replace(year=1996)), "262968 h ago"),  # 30 years, of which 7 leap years
+        (replace(BAR, calibrator_certified="2012-03-02"), "certified on 2012-03-02; five years at most"),
+        (replace(BAR, calibrator_certified="2096-03-02"), "certified on 2096-03-02"),
     ],
 )
 def test_places_on_a_plate_need_a_bar_that_was_read_lately(bar: Bar | None, why: str) -> None:
@@ -108,6 +117,15 @@ def test_places_on_a_plate_need_a_bar_that_was_read_lately(bar: Bar | None, why:
         check_bar_known(bar, PLATE, NOW)
     check_bar_known(bar, UNDER_SPINDLE, NOW)
     check_bar_known(BAR, PLATE, NOW)
+
+
+@pytest.mark.parametrize("option", ["--operator", "--job", "--serial-number"])
+def test_a_blank_name_is_refused(tmp_path: Path, option: str) -> None:
+    words = ["measure", "--plan", shipped_folder("protocols") / "plans" / "table2.yaml", "--machine", MACHINE_FILE]
+    words += ["--instrument", "heidenhain-nd281b", "--port", "no-port", "--out", tmp_path / "s", option, "  "]
+    refused = call(*words)
+    assert f"{option} is blank" in refused.err
+    assert not (tmp_path / "s").exists()
 
 
 def test_the_shop_sets_the_age(tmp_path: Path) -> None:

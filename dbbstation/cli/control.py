@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.control_state import numbers_of
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.output import echo
 from dbbstation.cli.shared_options import source_file_option
+from dbbstation.tasks.control_state import numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,12 +106,24 @@ def kinematics(
     _print("The way back", result.way_back)
 
 
+def _six(_context: click.Context, _option: click.Parameter, text: str | None) -> object:
+    try:
+        return None if text is None else numbers_of(text, {6})
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
 @control.command()
 @_MODEL
 @source_file_option
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @_MACHINE
-@click.option("--volume", metavar="X,X,Y,Y,Z,Z", help="Least and greatest X, Y and Z [mm]  [default: 200 mm, middle].")
+@click.option(
+    "--volume",
+    callback=_six,
+    metavar="X,X,Y,Y,Z,Z",
+    help="Least and greatest X, Y and Z [mm]  [default: 200 mm, middle].",
+)
 @click.option("--tilt-deg", type=Finite(0, 90), default=15.0, show_default=True, help="Greatest A and B [deg].")
 @click.option("--ini", type=_FILE, help="INI file in use: tables and backlash that it has are named.")
 @_FORCE
@@ -122,7 +134,7 @@ def parameters(
     source_files: tuple[Path, ...],
     out: Path,
     machine: Path | None,
-    volume: str | None,
+    volume: Sequence[float] | None,
     tilt_deg: float,
     ini: Path | None,
     force: bool,
@@ -150,7 +162,7 @@ def parameters(
         date=datetime.now(UTC).date().isoformat(),
         known=every_source(source_files),
         machine=machine,
-        volume_mm=None if volume is None else numbers_of(volume, {6}, "--volume"),
+        volume_mm=volume,
         tilt_deg=tilt_deg,
         ini=ini,
         force=force,

@@ -137,12 +137,11 @@ def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]
     from dbbstation.cli.output import say
     from dbbstation.cli.provenance import provenance
 
-    if "provenance" in task.signature.parameters:
-        asked = {**asked, "provenance": provenance}
     try:
         with _bar(task, asked) as progress:
             now = getattr(import_module(function.__module__), function.__name__)  # a test may have put another there
-            return now(**{"progress": progress, "say": lambda text: say(f"note: {text}"), **asked})
+            own = {"progress": progress, "say": lambda text: say(f"note: {text}"), "provenance": provenance}
+            return now(**{name: one for name, one in own.items() if name in task.signature.parameters} | dict(asked))
     except ArgumentError as error:
         flags = {name: one.flag for name, one in task.parameters.items()}
         what = f"{error.what}; {error.remedy}" if error.remedy else error.what
@@ -199,6 +198,7 @@ def _written(
 
 _PATHS = {
     "argument": click.Path(path_type=Path),
+    "argument-file": click.Path(path_type=Path, dir_okay=False),
     "path": click.Path(path_type=Path),
     "file": click.Path(path_type=Path, dir_okay=False),
     "folder": click.Path(path_type=Path, file_okay=False),
@@ -208,8 +208,8 @@ _PATHS = {
 def option_of(one: TaskParameter) -> click.Parameter:
     """Return a parameter as click has it."""
     option, kind = one.option, _kind_of(one)
-    required = one.default is inspect.Parameter.empty
-    if option.kind == "argument":
+    required = option.required or one.default is inspect.Parameter.empty
+    if option.kind.startswith("argument"):
         return click.Argument(
             [one.name], nargs=-1 if one.many else 1, required=required, metavar=option.metavar, type=kind
         )

@@ -18,7 +18,7 @@ def show(result: ProgramsResult, out: Path) -> None:
     """Print what was written."""
     from dbbstation.cli.output import say
 
-    print_programs(result, as_json=False)
+    print_programs(result)
     say(f"{len(result.programs)} programs written to {out}, all within the machine's travel")
 
 

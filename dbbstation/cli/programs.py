@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.cli.output import print_result, print_table, say
+from dbbstation.cli.output import print_table, say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -12,11 +12,8 @@ if TYPE_CHECKING:
     from dbbstation.results.programs import ProgramsResult, WrittenProgram
 
 
-def print_programs(result: ProgramsResult, *, as_json: bool) -> None:
-    """Print programs as table or JSON, with the assumed acceleration."""
-    if as_json:
-        print_result(result)
-        return
+def print_programs(result: ProgramsResult) -> None:
+    """Print programs as a table, with the assumed acceleration."""
     rows = [
         [
             each.file,

@@ -78,8 +78,7 @@ def built_in() -> dict[str, str | int | float | None]:
     """Return the program's own values by key, or None; without tolerances."""
     from dbbstation.files.formats.number_language import PLAIN
     from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
-    from dbbstation.nc.compensate import CHORD_MM
-    from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+    from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
     from dbbstation.plan.plan import LARGEST_LOSS_PERCENT
     from dbbstation.station.bar_known import USUAL_AGE_H
 

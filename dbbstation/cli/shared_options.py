@@ -51,8 +51,3 @@ def number_options(decimal: o.Decimal = None, separator: o.Separator = None) -> 
 @_as_options
 def filter_option(filter: o.Filter = "none") -> None:  # noqa: A002 - the standard's word
     """Give a command this option, for `Filter.of_word`."""
-
-
-@_as_options
-def keeping_options(prefer: o.Prefer = "accuracy", strict: o.Strict = False) -> None:  # noqa: FBT002 - an option
-    """Give a command both: what compensated programs keep."""

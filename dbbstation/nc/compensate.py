@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
-from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import LOOKS_AHEAD, cuts
 from dbbstation.nc.splitting import (
     Pieces,
@@ -34,10 +34,6 @@ if TYPE_CHECKING:
     from dbbstation.nc.curve import SpanBehind
     from dbbstation.nc.planner import Planner
     from dbbstation.nc.toolpath import Toolpath
-
-CHORD_MM = 1e-4
-"""Greatest distance between the straight commanded move and the curve that would take the tool exactly along the
-wanted one: 0.1 µm, a tenth of what a ball bar repeats."""
 
 DENSELY = np.arange(1, 14) / 13.0
 """Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some

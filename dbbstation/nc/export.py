@@ -12,9 +12,9 @@ from dbbstation.machine.difference import check_model_is_of
 from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
-from dbbstation.nc.compensate import CHORD_MM, Prefer, compensate_toolpath
+from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm, rounding_mm
-from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
+from dbbstation.nc.limits import CHORD_MM, CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import is_marked, marked
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
 from dbbstation.nc.planner import Planner

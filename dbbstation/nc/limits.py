@@ -9,3 +9,7 @@ LARGEST_ALLOWED_MM = 10.0
 CIRCLE_CHORD_MM = 5e-4
 """How far the moves of a compensated ball-bar program may leave its circle: 0.5 µm, half of what a ball bar's reading
 repeats. At 1 m/s² LinuxCNC needs 0.28 µm of it on 150 mm at 1000 mm/min."""
+
+CHORD_MM = 1e-4
+"""Greatest distance between the straight commanded move and the curve that would take the tool exactly along the
+wanted one: 0.1 µm, a tenth of what a ball bar repeats."""

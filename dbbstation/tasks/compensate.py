@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-
-from dbbstation.control.commands import refuse_second_correction
-from dbbstation.files.atomic import refuse_existing, write_text
-from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.inputs import in_a_book
-from dbbstation.files.own_dialects import dialect_given
-from dbbstation.files.provenance import from_python
-from dbbstation.machine.difference import check_model_is_of
-from dbbstation.nc.compensate import CHORD_MM
-from dbbstation.nc.export import compensated_program
-from dbbstation.nc.limits import LARGEST_CORRECTION_MM
-from dbbstation.nc.registry import dialect_of_file
-from dbbstation.results.model_warnings import model_warnings
-from dbbstation.results.programs import ProgramsResult, programs_result
-from dbbstation.tasks.programs import (
-    NOT_CORRECTED,
-    ProgramText,
-    inverse_of,
-    origin_of,
-    program_text,
-    setup_of,
-    sha256_of,
-)
+from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
+from dbbstation.tasks import options as o
+from dbbstation.tasks.control_state import lengths_by_tool, named_numbers, numbers_of
+from dbbstation.tasks.declare import File, Option, task
 from dbbstation.tasks.telling import Telling, silent
 
 if TYPE_CHECKING:
@@ -38,9 +21,16 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from dbbstation.files.provenance import Provenance
+    from dbbstation.results.programs import ProgramsResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.models import Model
+    from dbbstation.tasks.programs import ProgramText
 
+    Source = File | ProgramText
+    Numbers = ArrayLike
+    Offsets = Mapping[str, Sequence[float]]
+    Lengths = Mapping[int, float]
+else:
+    Source, Numbers, Offsets, Lengths = Any, str, tuple[str, ...], tuple[str, ...]
 
 UNITS_NOT_SAID = (
     "the program says neither G20 nor G21: its lengths are taken for millimetres; a control that still has inches from the program before "
@@ -51,57 +41,94 @@ UNITS_NOT_SAID = (
 OLDER = "the {} is older than the program: its values may be from before the last touch-off"
 
 
+@task("compensate", label="compensation")
 @in_a_book
 def compensate(
-    program: str | PathLike[str] | ProgramText,
-    model: Model,
-    out: str | PathLike[str] | None = None,
+    program: Annotated[Source, Option("NC program, or `Program(text)`.", kind="argument-file", metavar="PROGRAM")],
+    model: o.Model,
+    out: Annotated[File | None, Option(o.OUTPUTS["out"], kind="file", required=True)] = None,
     *,
-    dialect: str = "linuxcnc",
-    written_in: str | None = None,
-    start: ArrayLike | None = None,
-    angles_deg: ArrayLike | None = None,
-    offsets: Mapping[str, Sequence[float]] | None = None,
-    parameters: str | PathLike[str] | None = None,
-    tool_lengths_mm: Mapping[int, float] | None = None,
-    tools: str | PathLike[str] | None = None,
-    chord_um: float = 1e3 * CHORD_MM,
-    prefer: str = "accuracy",
-    strict: bool = False,
-    unexplained: bool = False,
-    time_s: float | None = None,
-    largest_correction_mm: float = LARGEST_CORRECTION_MM,
-    machine: str | PathLike[str] | None = None,
-    force: bool = False,
+    source_files: o.SourceFiles = (),
+    dialect: o.Dialect = "linuxcnc",
+    written_in: Annotated[
+        str | None, Option("Language of PROGRAM, likewise [default: by its extension].", metavar="D")
+    ] = None,
+    start: Annotated[
+        Numbers | None,
+        Option(
+            "Pose before the program in machine coordinates [mm, deg].",
+            metavar="X,Y,Z,A,B,C",
+            parse=partial(numbers_of, counts={6}),
+        ),
+    ] = None,
+    angles_deg: Annotated[
+        Numbers | None,
+        Option(
+            "Angles at which a program of three axes runs [deg].",
+            flag="--angles",
+            metavar="A,B,C",
+            parse=partial(numbers_of, counts={3}),
+        ),
+    ] = None,
+    offsets: Annotated[
+        Offsets | None,
+        Option(
+            "Work offset in the control [mm], G54 to G59.3 or G92; place of G28 or G30. A, B, C may follow [default: zero].",
+            flag="--offset",
+            metavar="G54=X,Y,Z",
+            parse=partial(named_numbers, counts={3, 6}),
+        ),
+    ] = None,
+    parameters: Annotated[
+        File | None, Option("LinuxCNC's parameter file, for offsets and places not given.", kind="file")
+    ] = None,
+    tool_lengths_mm: Annotated[
+        Lengths | None,
+        Option(
+            "Length of a tool in the control, for G43 [mm].",
+            flag="--tool-length",
+            metavar="TOOL=MM",
+            parse=lengths_by_tool,
+        ),
+    ] = None,
+    tools: Annotated[File | None, Option("LinuxCNC's tool table, for lengths not given.", kind="file")] = None,
+    chord_um: Annotated[float, replace(o.CHORD_UM, setting="program.chord_um")] = 1e3 * CHORD_MM,
+    prefer: o.Prefer = "accuracy",
+    strict: o.Strict = False,
+    unexplained: Annotated[
+        bool, Option("Correct an error of unknown cause, too, that a diagnosis kept in the model.")
+    ] = False,
+    time_s: o.TimeS = None,
+    largest_correction_mm: o.LargestCorrectionMm = LARGEST_CORRECTION_MM,
+    machine: Annotated[
+        File | None, Option("Machine file; refused if its control already corrects.", kind="file")
+    ] = None,
+    force: o.Force = False,
     known: Mapping[str, ErrorSource] | None = None,
-    provenance: Callable[[], Provenance] = from_python,
+    provenance: Callable[[], Provenance] | None = None,
     say: Callable[[str], None] = silent,
 ) -> ProgramsResult:
-    """Compensate an NC program, so that the real machine follows `program`.
+    r"""Compensate an NC program, so that the real machine follows PROGRAM.
+
+    Moves at feed are split into the longest pieces that keep the chord error. If the control is slower in such pieces, the
+    output states about how much. --strict refuses the program instead.
+
+    State the control's work offsets and tool lengths, or its files, and the angles of a program that names X, Y and Z only.
+    The result is right for these. Its first lines stop LinuxCNC if others are in force.
+
+    The program must be whole (M2, M30 or percent signs), not compensated yet, and of no other machine. Travel, feeds and
+    the size of corrections are checked before anything is written.
+
+    \b
+    Examples:
+      dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
+      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles 0,0,0 --offset G54=20,-35,-1000 --tool-length 1=52.1
+      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles 0,0,0 --parameters linuxcnc.var --tools tool.tbl
+      dbbstation compensate part.ngc --model model.yaml --out true.ngc --strict
 
     Args:
-        program: file, or `Program(text)`, whole, not compensated, of no other machine.
-        model: a model, its file, or the result of `calibrate` or `diagnose`.
-        out: file; None: only the text in the result.
-        dialect: to write: a name, or a Python file.
-        written_in: dialect of `program`; None: by its extension.
-        start: pose before the program in machine coordinates, X, Y, Z [mm], A, B, C [deg]; None: its first rapids tell.
-        angles_deg: A, B, C at which a program of three axes runs; None: it names them.
-        offsets: `G54` to `G59.3`, `G92`, `G28`, `G30` of the control, X, Y, Z or X to C [mm, deg]; work offsets not given are zero.
-        parameters: LinuxCNC's parameter file, for offsets not given.
-        tool_lengths_mm: by number of the tool, for G43.
-        tools: LinuxCNC's tool table, for lengths not given.
-        chord_um: greatest distance of a move from the path.
-        prefer: `accuracy`, or `position-only` to leave A, B and C as they are.
-        strict: refuse a program that misses the chord error or a feed.
-        unexplained: correct an error of unknown cause, too, that a diagnosis kept in the model.
-        time_s: start of the program after the session's, for models that depend on time.
-        largest_correction_mm: models that shift a point by more are refused.
-        machine: file of the machine as it is now, whose control may correct already; None: as the model has it.
-        force: overwrite `out`.
-        known: error sources by name, for a model file.
-        provenance: called for the header after all reading.
-        say: called with notes.
+        known: error sources by name; None: those of package, installed packages and `source_files`.
+        provenance: called for the header after all reading; None: from Python.
 
     Raises:
         InputError: faults of files.
@@ -113,17 +140,40 @@ def compensate(
         StationError: the control corrects already; the program is compensated or for another machine, corrections are too large, or `strict` refuses it.
         ValueError: an unknown `prefer` or offset, or `start` is no pose.
     """
+    import numpy as np
+
+    from dbbstation.control.commands import refuse_second_correction
+    from dbbstation.files.atomic import refuse_existing, write_text
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.own_dialects import dialect_given
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.files.provenance import from_python
+    from dbbstation.machine.difference import check_model_is_of
+    from dbbstation.nc.export import compensated_program
+    from dbbstation.nc.registry import dialect_of_file
+    from dbbstation.results.model_warnings import model_warnings
+    from dbbstation.results.programs import programs_result
+    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.programs import (
+        NOT_CORRECTED,
+        ProgramText,
+        inverse_of,
+        origin_of,
+        program_text,
+        setup_of,
+        sha256_of,
+    )
+
     source = program if isinstance(program, ProgramText) else Path(program)
     name = source.name if isinstance(source, ProgramText) else str(source)
     pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64).reshape(6)
     if angles_deg is not None:
         pose[3:] = np.asarray(angles_deg, dtype=np.float64).reshape(3)
-    files = {
-        what: Path(file) for what, file in (("parameter file", parameters), ("tool table", tools)) if file is not None
-    }
+    both = (("parameter file", parameters), ("tool table", tools))
+    files = {what: Path(file) for what, file in both if file is not None}
     setup = None
     if offsets or tool_lengths_mm or files:
-        setup = setup_of(offsets or {}, tool_lengths_mm or {}, files.get("parameter file"), files.get("tool table"))
+        setup = setup_of(offsets or {}, tool_lengths_mm or {}, *(files.get(what) for what, _ in both))
     if out is not None:
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)
@@ -132,16 +182,15 @@ def compensate(
     path = reader.toolpath(text, name, start=None if np.isnan(pose).all() else pose, setup=setup)
     inverse = inverse_of(
         model,
-        known,
+        every_source(paths_of(source_files)) if known is None else known,
         time_s=time_s,
         largest_mm=largest_correction_mm,
         prefer=prefer,
         strict=strict,
         unexplained=unexplained,
     )
-    own = inverse.model.machine
-    now = own if machine is None else read_machine(Path(machine))
-    check_model_is_of(now, own)
+    now = inverse.model.machine if machine is None else read_machine(Path(machine))
+    check_model_is_of(now, inverse.model.machine)
     refuse_second_correction(now)
     telling = Telling(say=say)
     left_out = (name for key, name in inverse.origin.items() if key.startswith(NOT_CORRECTED))
@@ -155,7 +204,7 @@ def compensate(
     named = {"program file": source} if isinstance(source, Path) else {}
     older = min((one.stat().st_mtime for one in named.values()), default=0.0)
     telling.note(*(OLDER.format(what) for what, file in files.items() if file.stat().st_mtime < older))
-    origin = origin_of({**named, **files}, inverse, provenance())
+    origin = origin_of({**named, **files}, inverse, (provenance or from_python)())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:
         write_text(Path(out), done.text, force=force)

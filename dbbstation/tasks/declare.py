@@ -48,10 +48,13 @@ class Option:
     Attributes:
         help: one or two sentences, the unit in brackets; for a flag that is True by default, the meaning of its
             absence.
-        kind: `argument` has no flag; `path`, `file` or `folder`; empty: by the type.
+        kind: `argument` and `argument-file` have no flag; `path`, `file` or `folder`; empty: by the type.
         usual: what its absence means, shown as default.
         least: `most`, `above`: range of a number.
         objects: scripts may give other objects than paths.
+        flag: on the command line; empty: the name.
+        required: on the command line, though scripts may leave it out.
+        parse: makes a value of the command line's texts, or raises ValueError.
     """
 
     help: str = field(kw_only=False)
@@ -65,6 +68,9 @@ class Option:
     only_with: str = ""
     not_with: tuple[str, ...] = ()
     objects: bool = False
+    flag: str = ""
+    required: bool = False
+    parse: Callable[[Any], Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -84,9 +90,9 @@ class TaskParameter:
     @property
     def flag(self) -> str:
         """Return its name on the command line."""
-        if self.option.kind == "argument":
+        if self.option.kind.startswith("argument"):
             return self.option.metavar or self.name
-        return f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
+        return self.option.flag or f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
 
     def says(self, value: Any) -> bool:  # noqa: ANN401 - of any parameter
         """Return whether a value differs from the default."""
@@ -109,7 +115,7 @@ class TaskParameter:
     @property
     def in_words(self) -> str:
         """Return its type as signatures show it."""
-        kind = _SIGNED.get(self.type, getattr(self.type, "__name__", "Any"))
+        kind = "Any" if self.option.parse else _SIGNED.get(self.type, getattr(self.type, "__name__", "Any"))
         if get_origin(self.type) is Literal:
             kind = f"Literal[{', '.join(map(repr, get_args(self.type)))}]"
         return f"{kind} | None" if self.default is None else kind
@@ -120,6 +126,9 @@ class TaskParameter:
 
     def _read(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
         kind = self.type
+        if self.option.parse is not None:
+            texts = isinstance(value, str) or (isinstance(value, tuple) and all(isinstance(one, str) for one in value))
+            return self.option.parse(value) if texts else value
         if kind is Path:
             return Path(value)
         if self.many:

@@ -1,0 +1,41 @@
+"""State of a control that a program does not contain, as people write it: offsets, tool lengths, angles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+def numbers_of(text: str, counts: set[int]) -> list[float]:
+    """Return the numbers of `X,Y,Z`, of which there must be one of these counts.
+
+    Raises:
+        ValueError: there are others.
+    """
+    try:
+        numbers = [float(number) for number in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in counts or not all(abs(number) < float("inf") for number in numbers):
+        wanted = " or ".join({1: "one number", 3: "three", 6: "six"}[count] for count in sorted(counts))
+        raise ValueError(f"{text!r}: {wanted} numbers with commas between them are needed")
+    return numbers
+
+
+def named_numbers(texts: Iterable[str], counts: set[int]) -> dict[str, list[float]]:
+    """Return the numbers of each `NAME=1,2,3`; errors as of `numbers_of`."""
+    pairs = [text.partition("=") for text in texts]
+    return {name.strip().upper(): numbers_of(numbers, counts) for name, _, numbers in pairs}
+
+
+def lengths_by_tool(texts: Iterable[str]) -> dict[int, float]:
+    """Return lengths by number of the tool [mm] of each `TOOL=MM`; errors as of `numbers_of`."""
+    found = {}
+    for name, (length,) in named_numbers(texts, {1}).items():
+        number = name.lstrip("TH")
+        if not number.isdecimal():
+            raise ValueError(f"{name!r} is no number of a tool")
+        found[int(number)] = length
+    return found

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.facts.value import finite
 from dbbstation.history.standardised import BASELINE
 from dbbstation.quality.conformity import Size, conformity
 from dbbstation.results.history import (
@@ -25,8 +25,6 @@ from dbbstation.results.history import (
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from dbbstation.history.record import SessionFigures
     from dbbstation.history.trend import MachineHistory, Trend, TrendOptions
@@ -138,9 +136,9 @@ def _quantity(trend: Trend, sessions: Sequence[HistorySession], coverage_factor:
         limit=limit,
         conformity=None if limit is None else str(conformity(last, limit, coverage_factor)),
         exceeded_sessions=None if limit is None else int(np.sum(beyond > limit)),
-        level=None if watched is None else _number(watched.level[-1]),
-        u_level=None if watched is None else _number(watched.u_level[-1]),
-        scatter_in_u=None if watched is None else _number(watched.scatter),
+        level=None if watched is None else finite(float(watched.level[-1])),
+        u_level=None if watched is None else finite(float(watched.u_level[-1])),
+        scatter_in_u=None if watched is None else finite(watched.scatter),
         sessions_lacking=None if watched is None else watched.lacking,
         decided_by=None if watched is None or not watched.watched else DECIDED_BY[watched.by_stated],
         watched_sessions=0 if watched is None else watched.watched,
@@ -162,18 +160,8 @@ def _event(event: TrendEvent, trend: Trend, sessions: Sequence[HistorySession]) 
 
 def _values(trend: Trend, sessions: Sequence[HistorySession]) -> Iterator[HistoryValue]:
     watched = trend.watched
-    none: list[float | None] = [None] * len(trend.at)
-    charted = (
-        [none] * 4 if watched is None else [_numbers(c) for c in (watched.level, watched.z, watched.high, watched.low)]
-    )
-    columns = (trend.at.tolist(), trend.values.tolist(), _numbers(trend.u), *charted)
-    for k, value, u, level, z, high, low in zip(*columns, strict=True):
-        yield HistoryValue(sessions[k].name, sessions[k].started, value, u, level, z, high, low)
-
-
-def _numbers(values: NDArray[np.float64]) -> list[float | None]:
-    return [value if isfinite(value) else None for value in values.tolist()]
-
-
-def _number(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
+    unknown = np.full(len(trend.at), np.nan)
+    charted = [unknown] * 4 if watched is None else [watched.level, watched.z, watched.high, watched.low]
+    columns = (trend.at, trend.values, trend.u, *charted)
+    for k, value, *others in zip(*(column.tolist() for column in columns), strict=True):
+        yield HistoryValue(sessions[k].name, sessions[k].started, value, *map(finite, others))

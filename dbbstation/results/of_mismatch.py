@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
+from dbbstation.facts.value import finite
 from dbbstation.results.mismatch import (
     HeldOutRms,
     MismatchResult,
@@ -75,7 +75,7 @@ def _noise(found: Mismatch) -> NoiseResult:
         rows_as_one=noise.correlation_samples,
         measured_in_order=settled.channel.time is not None,
         order=noise.order,
-        degrees_of_freedom=None if math.isinf(settled.bank.tails) else settled.bank.tails,
+        degrees_of_freedom=finite(settled.bank.tails),
         grows_with=settled.bank.grows_with or None,
         beginnings=tuple(
             SearchBeginning(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.simulator.nodes import spread_of
@@ -44,11 +43,7 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
         levels=answer.levels,
         mismatch=answer.is_there,
         rms=SimulationRms(*answer.rms),
-        noise=SimulationNoise(
-            settled.noise.sigma,
-            settled.noise.correlation_samples,
-            None if math.isinf(settled.bank.tails) else settled.bank.tails,
-        ),
+        noise=SimulationNoise(settled.noise.sigma, settled.noise.correlation_samples, finite(settled.bank.tails)),
         settled=found.is_settled,
         stopped=answer.stopped,
         held_out="not-tested" if answer.held_out is None else "tested",

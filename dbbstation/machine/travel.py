@@ -27,7 +27,11 @@ platform in some direction. Travel limits alone allow such poses: on a PM-600-li
 upper rim, where the determinant passes through zero."""
 
 
-def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) -> None:
+SMALLER = "move the circle, make it smaller or tilt it less"
+"""What helps against a pose outside the travel."""
+
+
+def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str, remedy: str = SMALLER) -> None:
     """Refuse poses, shape (n, 6) [mm, deg], outside the nominal travel.
 
     Raises:
@@ -45,8 +49,8 @@ def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) ->
     pose = " ".join(f"{axis} {coordinate:.3f}" for axis, coordinate in zip("XYZABC", poses[pose_number], strict=True))
     raise TravelError(
         f"{name} is {value[pose_number]:.3f} {unit}, its travel {low:g} to {high:g} {unit} (at {pose})",
-        where=f"{where}, pose {pose_number + 1} of {len(poses)}",
-        remedy="move the circle, make it smaller or tilt it less",
+        where=where if len(poses) == 1 else f"{where}, pose {pose_number + 1} of {len(poses)}",
+        remedy=remedy,
     )
 
 

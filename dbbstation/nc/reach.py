@@ -21,6 +21,8 @@ STEP_DEG = 0.5
 """Spacing of the poses that are checked: struts are shortest somewhere in the middle of a move, where they change by
 less than a micrometre over half a step."""
 
+DECLARED = "move the path into the travel; or state work offsets and tool lengths of the control: undeclared ones count as zero"
+
 AT_ONCE = 20_000
 """Poses that are checked together: ten megabytes."""
 
@@ -73,7 +75,9 @@ class _Poses:
         known = toolpath.is_move[row]
         self.row, self.poses = row[known], poses[known]
         if len(row) and row[0] == 0:
-            self.row, self.poses = np.concatenate([[0], self.row]), np.vstack([toolpath.before[:1], self.poses])
+            # The pose before the first move; lines before that have no place.
+            begins = int(np.argmax(toolpath.is_move))
+            self.row, self.poses = np.concatenate([[begins], self.row]), np.vstack([toolpath.before[:1], self.poses])
 
     def first_outside(self, machine: Machine) -> int | None:
         """Return the first pose outside the travel, or None."""
@@ -92,7 +96,7 @@ class _Poses:
         """Refuse a pose, naming its line."""
         if outside is not None:
             where = toolpath.where(int(self.row[outside]))
-            check_travel(machine, self.poses[outside : outside + 1], where=where)
+            check_travel(machine, self.poses[outside : outside + 1], where=where, remedy=DECLARED)
 
 
 def _is_inside(machine: Machine, poses: NDArray[np.float64]) -> bool:

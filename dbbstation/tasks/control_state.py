@@ -19,14 +19,16 @@ def numbers_of(text: str, counts: set[int]) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) not in counts or not all(abs(number) < float("inf") for number in numbers):
-        wanted = " or ".join({1: "one number", 3: "three", 6: "six"}[count] for count in sorted(counts))
-        raise ValueError(f"{text!r}: {wanted} numbers with commas between them are needed")
+        wanted = " or ".join({1: "one number", 3: "three", 6: "six numbers with commas"}[one] for one in sorted(counts))
+        raise ValueError(f"{text!r} is not {wanted}")
     return numbers
 
 
 def named_numbers(texts: Iterable[str], counts: set[int]) -> dict[str, list[float]]:
     """Return the numbers of each `NAME=1,2,3`; errors as of `numbers_of`."""
     pairs = [text.partition("=") for text in texts]
+    for text in (name for name, equals, _ in pairs if not equals):
+        raise ValueError(f"{text!r} names nothing: write {'1=52.1' if counts == {1} else 'G54=20,-35,-1000'}")
     return {name.strip().upper(): numbers_of(numbers, counts) for name, _, numbers in pairs}
 
 

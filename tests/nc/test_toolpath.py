@@ -11,6 +11,7 @@ from dbbstation.errors import TravelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.nc.reach import check_reach
+from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RAPID_MM_MIN, RowKind, ToolpathBuilder, rounded
 
 HOME = np.array([0.0, 0.0, -1000.0, 0.0, 0.0, 0.0])
@@ -78,8 +79,16 @@ def test_travel_is_checked_between_the_points(reference):
     builder.rapid(moved(X=-280))
     builder.feed(moved(Y=-280)[None], 100.0)
     builder.feed(np.stack([moved(X=290), moved(X=290, Y=100)]), 100.0)
-    with pytest.raises(TravelError, match="across, pose 1 of 1: the distance from the Z axis is 300"):
+    with pytest.raises(TravelError, match="across: the distance from the Z axis is 300"):
         check_reach(reference, builder.built())
+
+
+def test_a_start_outside_is_told_at_the_line_that_commands_it(reference):
+    """Lines before it name a tool and an offset; the offset that is not stated may be what is wrong."""
+    path = read_program("%\nG21 G90 G94\nT1 M6\nG54\nF1000\nG0 X0 Y0 Z10 A0 B0 C0\nG1 X10\nM30\n%\n", "part.ngc")
+    with pytest.raises(TravelError, match=r"part\.ngc:6: Z is 10\.000 mm") as refused:
+        check_reach(reference, path)
+    assert "state work offsets" in str(refused.value.remedy)
 
 
 def test_a_strut_that_is_too_short_in_the_middle_of_a_move_is_found(reference):

@@ -37,6 +37,8 @@ def visibility_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a resul
     """Yield what the tests of a calibration determine, and what they do not."""
     yield f"{found.parameters_identified} parameters identified"
     yield from (unseen_sentence(text, nominal=not found.parameters_prescribed) for text in found.directions_lost)
+    if found.directions_lost and not found.parameters_prescribed:
+        yield "  a parameter without u takes part in such a direction: its value is no result by itself"
     if found.parameters_prescribed:
         yield f"held at nominal instead: {', '.join(found.parameters_prescribed)}"
     for text in found.directions_regularised:

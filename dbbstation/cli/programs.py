@@ -22,7 +22,7 @@ def print_programs(result: ProgramsResult) -> None:
                 _or_empty,
                 (
                     each.greatest_correction_um,
-                    each.model_uncertainty_um,
+                    each.model_uncertainty_um if not each.model_uncertainty_not_known_because else "unknown",
                     each.chord_error_um,
                     each.feed_s,
                     each.nominal_feed_s,
@@ -41,14 +41,20 @@ def print_programs(result: ProgramsResult) -> None:
     _say_uncertainty(result.programs)
 
 
-def _or_empty(value: float | None) -> float | str:
+def _or_empty(value: float | str | None) -> float | str:
     return "" if value is None else value
 
 
 def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:
-    reasons = [each.model_uncertainty_not_known_because for each in programs]
-    for why in dict.fromkeys(one for one in reasons if one):
-        say(f"how well the model knows the path is not known in every coordinate: {why}")
+    unsure = [each for each in programs if each.model_uncertainty_not_known_because]
+    for why in dict.fromkeys(each.model_uncertainty_not_known_because for each in unsure):
+        written_um = max(each.greatest_correction_um or 0.0 for each in unsure)
+        by_axis = [(axis, u) for each in unsure for axis, u in (each.model_uncertainty_by_axis_um or {}).items()]
+        axes = {axis.upper() for axis, u in by_axis if u is None}
+        say(
+            f"corrections of up to {written_um:.0f} µm whose uncertainty in {', '.join(sorted(axes))} is unknown: {why}; "
+            "measure more tests before cutting"
+        )
     known = [each.model_uncertainty_um for each in programs if each.model_uncertainty_um is not None]
     asked_um = next((each.chord_asked_um for each in programs if each.chord_asked_um is not None), None)
     if not known or asked_um is None:

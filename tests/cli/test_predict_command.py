@@ -99,7 +99,8 @@ def test_the_header_of_a_compensated_program_says_what_is_not_known(predicted, r
     assert told["model_uncertainty_by_axis_um"]["z"] is None
     assert told["model_uncertainty_not_known_because"] == BECAUSE
     said = run("compensate", program, "--model", model, "--prefer", "accuracy", "--out", tmp_path / "again.ngc")
-    assert BECAUSE in said.err
+    assert f"whose uncertainty in Z is unknown: {BECAUSE}; measure more tests" in said.err
+    assert "unknown" in said.out.splitlines()[1]
 
 
 def test_the_report_states_no_uncertainty_of_such_a_parameter(predicted, run, level, tmp_path):

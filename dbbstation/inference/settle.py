@@ -122,7 +122,7 @@ def _from(
 ) -> Settled:
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
     settled = _settled(bank, options, progress, work, members, refused, known)
-    if any(settled is one for one in known):
+    if settled.bank is not bank:
         return replace(settled, beginning=beginning)
     return replace(settled, beginning=beginning, log_probability=log_probability(bank, settled.best.members))
 

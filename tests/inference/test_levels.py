@@ -10,6 +10,8 @@ from scipy.signal import lfilter
 from scipy.special import logsumexp
 
 from dbbstation.facts.value import Value
+from dbbstation.inference import settle as settling
+from dbbstation.inference.bank import Bank
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.consequence import may_result
@@ -25,6 +27,7 @@ from dbbstation.inference.followed import (
     log_density,
     probability_of_any,
 )
+from dbbstation.inference.hypotheses import SearchWork
 from dbbstation.inference.law_form import law_form
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import (
@@ -364,6 +367,36 @@ def test_a_search_ends_at_its_limit_with_the_best_so_far(both):
     silent = settle(replace(whole, residual=table(3, rows=600).residual), most_work=1.0)
     assert silent.stopped
     assert levels_of(silent, left_over(silent), None, None).differs.why == "the search ended at its limit of work"
+
+
+def test_a_spent_search_that_meets_an_earlier_outcome_is_judged_in_its_columns(rng, monkeypatch):
+    """A law laid out at its own width has columns that a search without work for that never made."""
+    x = rng.uniform(-1.0, 1.0, 400)
+    law = Law(
+        "turn",
+        lambda point: np.tanh(x / point[0])[:, None],
+        np.ones(1),
+        ("size", "width"),
+        ("mm", "mm"),
+        ((0.1, 0.3, 0.9),),
+    )
+    whole = Channel(
+        np.tanh(x / 0.3) + 0.05 * rng.standard_normal(400),
+        "mm",
+        (slice(0, 400),),
+        ("run",),
+        (),
+        Base.flat(("offset",), np.ones((400, 1))),
+        (law,),
+        time=np.arange(400.0),
+    )
+    first = settle(whole, look=False, static=False, beginnings=(Beginning.NOTHING,))
+    monkeypatch.setattr(settling, "_meets", lambda *_: True)
+    options = settling._Options(look=False, static=False, most_expanded=8, most_looks=1, in_time=True, thorough=True)
+    spent = settling._from(Bank(whole), (), {}, Beginning.NOTHING, options, lambda _: None, SearchWork(1.0), [first])
+    assert first.best.members[0].columns.max() >= Bank(whole).count
+    assert spent.stopped
+    assert spent.log_probability == first.log_probability
 
 
 def test_a_torque_carries_the_difference_and_a_temperature_does_not(rng):

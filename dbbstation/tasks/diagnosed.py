@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.load import Recorded, Sessions
-    from dbbstation.tasks.telling import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,33 +48,16 @@ def diagnose_sessions(
     candidates: Sequence[str] | None,
     exclude: Sequence[str],
     say: Callable[[str], None],
-    known: Mapping[str, ErrorSource] | None = None,
-    progress: Callable[[str], None] = lambda _: None,
-    reading: Callable[[int, int], None] = lambda _done, _of: None,
-    only: Sequence[str] = (),
 ) -> Diagnosed:
     """Read sessions of one machine and find physics beyond a kinematic calibration.
-
-    Args:
-        known: sources by name; None: the package's.
 
     Raises:
         InputError: faults of files and traces.
         ModelError: an unknown source, or one that is no cause.
         CalibrationError: the kinematic model cannot be fitted.
     """
-    telling = Telling(_staged(progress, reading), say=lambda text: say(f"note: {text}"))
-    return diagnosed_of(paths, candidates, (tuple(only), tuple(exclude)), known or known_sources(), telling)
-
-
-def _staged(progress: Callable[[str], None], reading: Callable[[int, int], None]) -> Progress:
-    def tell(text: str, done: int = 0, of: int = 0) -> None:
-        if of:
-            reading(done, of)
-        else:
-            progress(text)
-
-    return tell
+    telling = Telling(say=lambda text: say(f"note: {text}"))
+    return diagnosed_of(paths, candidates, ((), exclude), known_sources(), telling)
 
 
 def diagnosed_of(

@@ -35,7 +35,6 @@ ROUND_IT = {
     "report/pdf.py": "reads what the browser has just printed",
     "files/shipped.py": "reads a file of the package",
     "system/virtual_ports.py": "reads the mark that it wrote beside a port",
-    "system/memory.py": "asks the system in /proc how much memory it took",
     "simulators/program.py": "creates the file that it writes",
 }
 """Files that open files themselves, each with its reason."""

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from dbbstation.system.memory import forget_largest_memory, largest_memory_mb
+from studies.memory import forget_largest_memory, largest_memory_mb
 
 LARGE_MB = 200.0
 

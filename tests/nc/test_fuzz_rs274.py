@@ -166,6 +166,8 @@ def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
 def divided(path: Toolpath, groups: list[tuple[str, np.ndarray]], they: list[Event]) -> list[tuple[str, np.ndarray]]:
     """Groups of chords with no more turns than LinuxCNC's arcs: a loop may run one line's arc again."""
     found, left = [], list(groups)
+    if left and they and left[0][0] == "RAPID" != they[0].kind and path.start is not None:
+        left.pop(0)  # where a program stands that begins with a cut
     while left:
         kind, rows = left.pop(0)
         turned = abs(path.arc[rows[0], 2])

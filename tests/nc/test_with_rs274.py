@@ -10,8 +10,10 @@ import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.compensate import compensate_toolpath
+from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind
-from tests.nc.interpreter import calls, needs_rs274
+from tests.nc.interpreter import calls, events, needs_rs274
+from tests.nc.test_fuzz_rs274 import difference
 
 pytestmark = needs_rs274
 
@@ -78,3 +80,47 @@ def test_it_agrees_about_programs_written_by_hand(canonical, linuxcnc):
         unit = 25.4 if row >= 6 else 1.0
         np.testing.assert_allclose(np.array(said) * ([unit] * 3 + [1.0] * 3), pose, atol=0.51e-4 * unit)
     assert path.dwell_s[path.kind == RowKind.DWELL].tolist() == [0.25]
+
+
+STORED = """\
+G21 G90 G17 G54 F200
+S100 M3
+G0 X0 Y0 Z0
+o100 sub
+M73
+G91 G20 G18
+F10
+G1 X1
+S50
+G55
+o100 endsub
+M70
+G91
+F50
+G1 X5
+M5
+M72
+G1 X20
+o100 call
+o100 call
+G2 X80 I4.6
+M72
+G1 X4
+M71
+M2
+"""
+
+
+def test_stored_modes_come_back_as_in_linuxcnc(tmp_path):
+    they = events(STORED, tmp_path)
+    path = read_program(STORED, "stored.ngc", start=np.zeros(6))
+    assert not difference(path, they)
+    assert [text for text in path.text.values() if text[0] in "SM"] == [
+        "S100 M3",
+        "M5",
+        "M3",
+        "S50",
+        "S100",
+        "S50",
+        "S100",
+    ]

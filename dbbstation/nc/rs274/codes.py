@@ -32,6 +32,7 @@ class ModalGroup(StrEnum):
     COOLANT = "coolant"
     OVERRIDE = "override switches"
     CALL = "subprogram"
+    STATE = "stored modes"
 
 
 CYCLES = (73, 81, 82, 83, 85, 86, 89)
@@ -62,7 +63,21 @@ M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((7, 8, 9), ModalGroup.COOLANT),
     **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
     **dict.fromkeys((98, 99), ModalGroup.CALL),
+    **dict.fromkeys((70, 71, 72, 73), ModalGroup.STATE),
 }
+
+STORED: dict[ModalGroup, str] = {
+    ModalGroup.UNITS: "G21",
+    ModalGroup.PLANE: "G17",
+    ModalGroup.FEED_MODE: "G94",
+    ModalGroup.DISTANCE: "G90",
+    ModalGroup.ARC_DISTANCE: "G91.1",
+    ModalGroup.OFFSET: "",
+    ModalGroup.SPINDLE: "M5",
+    ModalGroup.COOLANT: "M9",
+    ModalGroup.OVERRIDE: "M48",
+}
+"""Groups that M70 to M73 store, in the order in which they come back, and what a program begins with; empty: not known."""
 
 LETTERS = frozenset("ABCDFGHIJKLMNPQRSTXYZ@^")
 

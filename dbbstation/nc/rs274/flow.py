@@ -67,6 +67,7 @@ class _Frame:
     begin: int
     again: int
     by_number: bool
+    number: int
     parameters: dict[int | str, float] = field(default_factory=dict)
 
 
@@ -92,6 +93,7 @@ class Flow:
         self._globals: dict[int | str, float] = {}
         self._counts: dict[tuple[int, int], int] = {}
         self._begun = self.closed = False
+        self._entered = 0
         self._text, self._begins, self._ran = text, list[int](), 0
         self._letters: NDArray[np.uint8] | None = None
 
@@ -131,6 +133,11 @@ class Flow:
         """Take the next lines as ran."""
         self._next += lines
         self._ran += lines
+
+    @property
+    def runs(self) -> list[int]:
+        """Return the running subprograms, each call by a number of its own; 0 is the program."""
+        return [0, *(frame.number for frame in self._frames)]
 
     def ended(self) -> None:
         """Check after M2 and M30 that the program is complete.
@@ -249,7 +256,8 @@ class Flow:
     ) -> None:
         if len(self._frames) >= DEEPEST:
             raise place.fault(1, f"more than {DEEPEST} subprograms within each other", "check what calls itself")
-        self._frames.append(_Frame(self._next, begin, again, by_number, parameters))
+        self._entered += 1
+        self._frames.append(_Frame(self._next, begin, again, by_number, self._entered, parameters))
         self._next = begin
 
     def _leave(self, place: Place) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES
-from dbbstation.nc.rs274.codes import CURVES, ModalGroup, name
+from dbbstation.nc.rs274.codes import CURVES, STORED, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.flow import Flow
@@ -54,6 +54,8 @@ _SHOWS_VALUES = re.compile(r"(?:debug|print|log),", re.IGNORECASE)
 _SHOWN = re.compile(r"#(?:(\d+)|<([^<>]*)>)")
 
 
+_BY_M = frozenset({ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE})
+
 _NOT_BESIDE = frozenset(
     {
         ModalGroup.UNITS,
@@ -73,6 +75,21 @@ class Feed(NamedTuple):
 
     mm_min: float
     deg_min: float
+
+
+class Stored(NamedTuple):
+    """Modes that M70 or M73 stored.
+
+    Attributes:
+        codes: in force, by group.
+        modes: F, rounding of corners, retract mode, tool length.
+        by_itself: they come back at the end of the subprogram (M73).
+    """
+
+    codes: dict[ModalGroup, str]
+    spindle_speed: str
+    modes: tuple[Feed, float | None, bool | None, tuple[float, ...]]
+    by_itself: bool
 
 
 class Modes:
@@ -97,6 +114,8 @@ class Modes:
         self._turning, self._stopped = "", 0
         self._upright = self._moved = False
         self._away: set[int] = set()
+        self._in_force, self._spindle_speed = dict(STORED), "S0"
+        self._stored: dict[int, Stored] = {}
         self._cutter: Cutter | None = None
         self._beside: Beside | None = None
         self._radius_number: Word | None = None
@@ -173,6 +192,7 @@ class Modes:
                 raise block.place.fault(change.column, "M61 needs Q", "give the number of the tool")
         said = [block.words.pop("T", None), change, number_set]
         said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
+        self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
@@ -279,6 +299,13 @@ class Modes:
         diameter_mm = self._state.setup.diameters[int(tool)]
         self._hold(f"D{tool:g}", (diameter_mm,))
         return diameter_mm
+
+    def _note(self, block: ProgramBlock) -> None:
+        self._in_force |= {
+            group: name("M" if group in _BY_M else "G", word.value)
+            for group, word in block.codes.items()
+            if group in STORED
+        }
 
     def _path_control(self, block: ProgramBlock) -> None:
         word = block.codes[ModalGroup.PATH]

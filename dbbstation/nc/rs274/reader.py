@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.rs274.flow import Flow
+    from dbbstation.nc.rs274.tokens import Place
 
 
-from dbbstation.nc.rs274.modes import DWELL, LINEAR, MACHINE, RAPID, TAKES_AXES, Feed
+from dbbstation.nc.rs274.modes import DWELL, LINEAR, MACHINE, RAPID, TAKES_AXES, Feed, Stored
 from dbbstation.nc.rs274.moves import FARTHEST_DEG, MOST_ROWS, Moves, named_axes, too_long
 
 MOST_FAULTS = 20
@@ -90,6 +91,8 @@ class _Interpreter(Moves):
             BadLine: the first one that makes no sense.
         """
         for line, place in self.flow.lines():
+            if self._stored:
+                self._end_stored(place)
             if self._ran_lines(place.line):
                 continue
             block = block_of(line, place, self.flow.value_of)
@@ -107,6 +110,39 @@ class _Interpreter(Moves):
         unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
         if unknown and self._moved:
             raise unknown_place(block, unknown, "")
+
+    def _end_stored(self, place: Place) -> None:
+        """Bring back what subprograms stored for their own time (M73)."""
+        for level in [each for each in self._stored if each not in self.flow.runs]:
+            stored = self._stored.pop(level)
+            if stored.by_itself:
+                self._bring_back(stored, place)
+
+    def _store(self, block: ProgramBlock) -> None:
+        """Run M70 to M73, which store modes and bring them back [LinuxCNC, M70 to M73]."""
+        code, level = block.code(ModalGroup.STATE), self.flow.runs[-1]
+        if code in {70.0, 73.0}:
+            modes = self._speed, self.path.corner_mm, self._cycle.to_clear, self._state.length
+            self._stored[level] = Stored(dict(self._in_force), self._spindle_speed, modes, by_itself=code == 73.0)  # noqa: PLR2004
+            return
+        if level not in self._stored:
+            what = f"M{code:g} without modes that were stored"
+            raise block.place.fault(block.codes[ModalGroup.STATE].column, what, "write M70 before it")
+        if code == 72.0:  # noqa: PLR2004
+            self._bring_back(self._stored[level], block.place)
+        else:
+            del self._stored[level]
+
+    def _bring_back(self, stored: Stored, place: Place) -> None:
+        speed, corner_mm, to_clear, length = stored.modes
+        changed = [code for group, code in stored.codes.items() if code != self._in_force[group]]
+        changed += [stored.spindle_speed] if stored.spindle_speed != self._spindle_speed else []
+        if self._cutter is not None or length != self._state.length or not all(changed):
+            what = "stored modes would change a work system that no line names, a tool length or G41"
+            raise place.fault(1, what, "write the modes that hold from here on")
+        for code in changed:
+            self.run(block_of(code, place))
+        self._speed, self.path.corner_mm, self._cycle.to_clear = speed, corner_mm, to_clear
 
     def _ran_lines(self, first: int) -> bool:
         """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""
@@ -156,10 +192,13 @@ class _Interpreter(Moves):
             if block.code(ModalGroup.ONCE) == DWELL:
                 self.path.dwell(self._dwell_s(block), line=block.place.line)
             self._modes(block)
+            self._note(block)
             self._cutter_radius(block)
             self._tool_length(block)
             self._offsets(block)
         self._move(block)
+        if ModalGroup.STATE in block.codes:
+            self._store(block)
         if block.codes:
             self._stop(block)
         self._nothing_left(block)

@@ -19,6 +19,7 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.session import BAR_LENGTH
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.simulator import parse_simulator
+from dbbstation.files.inputs import note_virtual
 from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.entries import RunState
@@ -252,13 +253,20 @@ def _session(checked: Checked) -> None:
     except TravelError as error:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
     _judge(checked, session, wanted)
+    _amended(checked, session)
+    checked.summary = f"session: {_states(session)}; {_seal(session)}"
+    if session.virtual:
+        note_virtual(session.name)
+
+
+def _amended(checked: Checked, session: SessionFolder) -> None:
+    """Add what amendments, log and seal say."""
     checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
     log = read_event_log(session.folder, [])
     if log is not None:
         checked.warnings += few([Problem(str(log.path), 0, 0, what) for what in set_back(log)])
     if session.seal is not None:
         checked.problems += copy_faults(session.folder, session.seal, session.amendments)
-    checked.summary = f"session: {_states(session)}; {_seal(session)}"
 
 
 def _seal(session: SessionFolder) -> str:

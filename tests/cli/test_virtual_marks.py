@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
+import pytest
 import yaml
 
 from dbbstation.files.formats.model import read_model
@@ -41,6 +44,57 @@ def test_what_comes_from_a_virtual_session_says_so(tmp_path: Path) -> None:
     assert next(iter(comments.items())) == ("VIRTUAL MACHINE", "computed from model.yaml")
     # Its history is one of its own.
     assert session_figures(session).machine == "virtual PM600-0007"
+
+
+@pytest.mark.slow
+def test_every_command_on_a_virtual_session_marks_what_it_makes(tmp_path: Path) -> None:
+    fixtures, here = shipped_folder("fixtures"), tmp_path
+    plan = shipped_folder("protocols") / "plans" / "table2.yaml"
+    machine = fixtures / "machines" / "reference.yaml"
+    model, session = here / "model.yaml", here / "sim"
+    told = call(
+        "simulate", "--model", fixtures / "models" / "small.yaml", plan, "--tests", "a,b,c,d", "--samples", 60,
+        "--out", session,
+    )  # fmt: skip
+    assert told.code == 0, told.err
+    shutil.copytree(fixtures / "sessions" / "small", here / "real")
+    shutil.copytree(fixtures / "sessions" / "virtual", here / "other")
+    commands = (
+        ("check", session),
+        ("session", "list", session),
+        ("circles", session, "--table", here / "circles.csv"),
+        ("export", session, "--out", here / "samples.csv"),
+        ("calibrate", session, "--sources", "strut-reference-length", "--out", model),
+        ("evaluate", session, "--model", model),
+        ("compare", session, here / "other"),
+        ("history", here, "--page", here / "history.html"),
+        ("report", session, "--page", here / "report.html"),
+        ("program", "--plan", plan, "--machine", machine, "--model", model, "--out", here / "programs"),
+        ("simulate", "--model", model, plan, "--tests", "a", "--samples", 60, "--out", here / "predicted"),
+        *(("plot", session, "--out", here / f"circles.{ending}") for ending in ("svg", "png", "pdf")),
+    )
+    for words in commands:
+        done = python("-m", "dbbstation", *map(str, words))
+        assert done.returncode == 0, (words, done.stderr)
+        assert "VIRTUAL MACHINE" in done.stderr, words
+    assert "sim" in yaml.safe_load(model.read_text("utf-8"))["provenance"]["virtual"]
+    for path in (*(here / "programs").iterdir(), here / "report.html", here / "circles.svg"):
+        assert "VIRTUAL MACHINE" in path.read_text("utf-8"), path
+    for path in here.glob("*.provenance.json"):
+        assert json.loads(path.read_text("utf-8"))["virtual"] == ["sim"], path
+    assert b"VIRTUAL MACHINE" in (here / "circles.png").read_bytes()
+    assert read_session(here / "predicted").virtual
+    # Charts of virtual and real machines of one number are apart.
+    machines = json.loads(call("history", here, "--json").out)["machines"]
+    names = [one["machine"] for one in machines]
+    assert len(names) == len(set(names))
+    assert any(name.startswith("virtual ") for name in names)
+    assert not all(name.startswith("virtual ") for name in names)
+
+
+def python(*words: str) -> subprocess.CompletedProcess[str]:
+    """Run the command as a user does: the mark is printed when it ends."""
+    return subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
 
 
 def test_a_virtual_session_beside_a_real_one_does_not_mark_it(tmp_path: Path) -> None:

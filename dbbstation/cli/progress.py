@@ -183,7 +183,7 @@ def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
     with count_bar(READING) as reading, stage_bar(label, stages) as rest:
 
         def tell(text: str, done: int = 0, of: int = 0) -> None:
-            if text == READING:
+            if text == READING and READING not in stages:
                 reading(done, of)
             else:
                 rest(text, done, of)

@@ -23,11 +23,16 @@ if TYPE_CHECKING:
 
 SEPARATORS = ",;\t"
 MOST_FAULTS = 20
-NO_NUMBER = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+OF_SHEETS = frozenset({"#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#ref!", "#bezug!"})
+"""Cells that a spreadsheet could not compute, in small letters."""
+
+NO_NUMBER = frozenset({"", "nan", "na", "n/a", "null", "none", "-"}) | OF_SHEETS
 """Cells that say that there is no number, in small letters."""
 
 _COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 """A number with a decimal comma."""
+
+_WHOLE = re.compile(r"[+-]?\d+")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +62,9 @@ class TableFile:
         if np.isfinite(self.values[name]).all():
             return found
         comma = next((cell for cell in self.cells[name] if _COMMA.fullmatch(cell)), None)
-        if comma is not None and all(_COMMA.fullmatch(cell) or not cell for cell in self.cells[name]):
+        if comma is not None and all(
+            _COMMA.fullmatch(cell) or _WHOLE.fullmatch(cell) or cell.lower() in NO_NUMBER for cell in self.cells[name]
+        ):
             what = f"{name} has decimal commas, such as `{shortened(comma)}`"
             return [Problem(self.file, self.header, 0, what, "state the decimal sign: `--decimal ,`")]
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):

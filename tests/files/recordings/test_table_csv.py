@@ -31,10 +31,16 @@ def test_empty_cells_say_that_there_is_no_number_and_words_do_not():
 
 
 def test_a_column_of_decimal_commas_is_told_once():
-    faults = parse_table("x;y\n1,5;2\n2,5;3\n", "x.csv").faults_of("x")
+    faults = parse_table("x;y\n1,5;2\n2,5;3\n4;5\n#NV;6\n", "x.csv").faults_of("x")
     assert list(map(str, faults)) == [
         "x.csv:1: x has decimal commas, such as `1,5`; state the decimal sign: `--decimal ,`"
     ]
+
+
+def test_a_cell_that_a_spreadsheet_could_not_compute_is_an_empty_one():
+    table = parse_table("y,x\n2,1\n3,#N/A\n4,#DIV/0!\n", "x.csv")
+    assert table.faults_of("x") == []
+    assert np.isnan(table.values["x"]).tolist() == [False, True, True]
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def _print(result: MismatchResult) -> None:
 def _print_first(result: MismatchResult) -> None:
     """Print faults of the answer as a whole."""
     unit, held_out = result.unit, result.held_out_rms
-    if held_out and held_out.worse:
+    if held_out and held_out.worse and result.levels.follows:
         echo(
             f"Held-out rows are predicted worse than as simulated: {held_out.after:.3g} corrected, {held_out.as_simulated:.3g} "
             f"{unit} rms as simulated.\n".replace("  ", " ")
@@ -133,10 +133,15 @@ def _print_whether(result: MismatchResult) -> None:
     offset = result.offset
     if offset and offset.significant:
         echo(f"Measured less simulated is {offset.in_words} on average; this is fitted and is not counted below.")
-    if not result.mismatch:
-        echo(f"No mismatch: what differs, {rms.before:.3g} {unit} rms, is noise.".replace("  ", " "))
+    # The levels above tell whether something differs; what follows them is its size.
+    differs = result.levels.differs.answer
+    if differs == "cannot tell":
+        said = f"These rows differ by {rms.before:.3g} {unit} rms, of which {rms.after:.3g} {unit} is not explained."
+    elif result.mismatch and differs == "yes":
+        said = f"There is a mismatch: {rms.before:.3g} {unit} rms, of which {rms.after:.3g} {unit} is not explained."
     else:
-        echo(f"There is a mismatch: {rms.before:.3g} {unit} rms, of which {rms.after:.3g} {unit} is not explained.")
+        said = f"No mismatch: what differs, {rms.before:.3g} {unit} rms, is noise."
+    echo(said.replace("  ", " "))
     fitted = (
         "" if noise.measured_in_order else "; fitted jointly, since nothing says in which order the rows were measured"
     )

@@ -250,6 +250,7 @@ class _Reader:
             what = f"{len(rows)} rows with all values are too few to compare, {FEWEST_ROWS} are needed"
             raise InputError([Problem(file.file, file.header, 0, what, "record more")])
         kept = {name: column[rows] for name, column in values.items()}
+        self._refuse_constant(kept[asked.measured], kept[asked.simulated])
         variables = [self._variable(name, kept[name]) for name in chosen]
         varying = [v for v in variables if v is not None and not self._is_the_difference(v, kept)]
         at = self._variable(clock, kept[clock], quiet=True) if clock else None
@@ -329,6 +330,16 @@ class _Reader:
                 if any(_words(one) == partner for one in self._names if one != name):
                     return True
         return False
+
+    def _refuse_constant(self, measured: NDArray[np.float64], simulated: NDArray[np.float64]) -> None:
+        """Refuse values that differ by one number: what rounding adds to it is no noise."""
+        apart = measured - simulated
+        rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
+        if float(np.ptp(apart)) > rounding:
+            return
+        file, size = self._files[0], f"{float(np.mean(apart)):.6g} {self._unit}".strip()
+        what = f"`{self._asked.measured}` less `{self._asked.simulated}` is {size} in every row: no difference is left to explain"
+        raise InputError([Problem(file.file, file.header, 0, what, "check that these are the columns that you mean")])
 
     def _is_numeric(self, name: str, column: NDArray[np.float64]) -> bool:
         bad = sum(len(file.faults_of(name)) for file in self._files)

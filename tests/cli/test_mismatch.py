@@ -9,6 +9,7 @@ import shutil
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.files.shipped import shipped_folder
@@ -242,6 +243,32 @@ def test_bad_input_is_answered(run, tmp_path, arguments, said):
     assert outcome.code == FAILED
     assert outcome.out == ""
     assert said in outcome.err
+
+
+@pytest.mark.parametrize(("more", "told"), [(0.0, "is 0 mm in every row"), (0.25, "is 0.25 mm in every row")])
+def test_columns_that_differ_by_one_number_are_refused(run, tmp_path, more, told):
+    """Rounding of a sum is no noise, and no effect."""
+    path, place = tmp_path / "x.csv", np.random.default_rng(7).uniform(-9.0, 9.0, 60)
+    rows = "".join(f"{one + more!r},{one!r},{k}\n" for k, one in enumerate(place.tolist()))
+    path.write_text(f"measured_mm,simulated_mm,load_n\n{rows}")
+    outcome = run("mismatch", path, *COLUMNS)
+    assert outcome.code == FAILED
+    assert told in outcome.err
+    assert outcome.out == ""
+
+
+def test_where_nothing_can_be_told_no_sentence_tells_it(run, tmp_path):
+    """A slow wander of the reading: the first line, and what follows it."""
+    path, draws = tmp_path / "x.csv", np.random.default_rng(5)
+    walk = lfilter([1e-3], [1.0, -0.95], draws.normal(size=400))
+    rows = "".join(
+        f"{k},{one},0.0,{load}\n" for k, (one, load) in enumerate(zip(walk, draws.normal(size=400), strict=True))
+    )
+    path.write_text(f"t_s,measured_mm,simulated_mm,load_n\n{rows}")
+    told = run("mismatch", path, *COLUMNS).out
+    assert told.startswith("Whether measured and simulated values differ cannot be told")
+    assert "o mismatch" not in told
+    assert "is a mismatch" not in told
 
 
 def test_an_unknown_unit_is_a_wrong_use(run, warm):

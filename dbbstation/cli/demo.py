@@ -99,6 +99,8 @@ class DemoShown:
 def _print(result: DemoResult) -> None:
     from dbbstation.cli.figures import G_LOW_PASSED
     from dbbstation.cli.output import print_table
+    from dbbstation.facts.serialise import read_plain
+    from dbbstation.facts.value import Value
 
     echo()
     echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
@@ -115,7 +117,7 @@ def _print(result: DemoResult) -> None:
             hidden = 100 * (source.concealed or 0.0)
             for name, number in vars(source.parameters).items():
                 echo(
-                    f"The diagnosis names {source.name}: {name} {number.in_words}; "
+                    f"The diagnosis names {source.name}: {name} {read_plain(Value, vars(number)).in_words}; "
                     f"the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
     held_out = result.diagnosis.held_out_rms_um

@@ -191,7 +191,7 @@ def test_a_run_that_cannot_be_used_is_accepted_with_a_reason_only(capsys, folder
     before = (folder / "session.yaml").read_bytes()
     code, out, err = run(capsys, "accept", folder, half_lost)
     assert (code, out) == (2, "")
-    assert "say with --reason why" in err
+    assert "give the reason with --reason" in err
     assert "lost" in err
     assert (folder / "session.yaml").read_bytes() == before
     code, out, err = run(capsys, "accept", folder, half_lost, "--reason", " gauge was slow ")

@@ -55,7 +55,7 @@ def test_what_a_formula_may_be_off_by_is_in_every_uncertainty_of_a_value(diagnos
     told = calibration_figures(after, evaluate(after.model, after.observations)).parameters[f"gravity.{NAME}"]
     assert told.uncertainty == pytest.approx(expected)
     (row,) = (row for row in parameters(identified, 2.0) if row[1] == NAME)
-    assert row[3] == f"{2.0 * expected:.2g}"
+    assert row[3] == f"{2.0 * expected:#.2g}"
     between = identified.uncertainties_between_sessions["gravity", "", NAME]
     assert between == pytest.approx(np.sqrt(after.solution.covariance[column, column]))
 

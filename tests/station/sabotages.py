@@ -255,7 +255,8 @@ class Shop:
                 self._judged(event)
             case events.RunDoubted():
                 self._look_back(event.run, event.finding)
-            case events.FeedInMissed() if self.late:
+            case events.FeedInMissed():
+                # A wrong ball too may hide the feed-in: the operator is told of a late start then.
                 self.seen, self.late = "late start", False
                 self._announced and send(Quit())
             case events.StateChanged(state=State.ANNOUNCED):

@@ -64,7 +64,7 @@ class SearchWork:
         self.spent += rows * float(columns) ** 2 / FIT
 
     def part(self, stages: int) -> SearchWork:
-        """Return an even share of what is left for so many stages."""
+        """Return the work for one of so many stages; the stages share evenly what may still be done."""
         return SearchWork(max(self.most - self.spent, 0.0) / stages)
 
     @property

@@ -239,7 +239,7 @@ def difference_of(
 ) -> DifferenceFound:
     """Return level 1 from the others.
 
-    What happened once says nothing beside effects that other rows refute: it may make up for them.
+    An effect that happened once is no evidence beside effects that other rows refute. It may only make up for them.
 
     Args:
         rest: size of interest, whether stated, independent samples, detectable sizes.

@@ -92,9 +92,9 @@ class Assigned:
         self._planned = [one.planned for one in self.read]
         # Log densities, or what they are at most, by what differs from the plan.
         self.most: dict[_Changes, float] = {}
-        goes_on = before is not None and before.runs == self.runs[: len(before.runs)]
-        self._known_before = before.most if before is not None and goes_on else {}
-        self._fresh = range(len(before.runs) if before is not None and goes_on else 0, len(self.runs))
+        past = before if before is not None and before.runs == self.runs[: len(before.runs)] else None
+        self._known_before = {} if past is None else past.most
+        self._fresh = range(0 if past is None else len(past.runs), len(self.runs))
 
     def odds(self, one: Seen) -> float:
         """Return the logarithm of the odds against a run's own circle."""
@@ -115,8 +115,8 @@ class Assigned:
         """Return the runs that contradict the others, each with the circle that it shows instead."""
         known = self._looked_up
         floor, top = known[()], max(known.values())
-        likely = [dict(each) for each, score in known.items() if score > floor and score >= top - LOG_ODDS_LIMIT]
-        likely.sort(key=lambda each: known[tuple(each.items())], reverse=True)
+        scored = [one for one in known.items() if one[1] > floor and one[1] >= top - LOG_ODDS_LIMIT]
+        likely = [dict(changes) for changes, _ in sorted(scored, key=lambda one: one[1], reverse=True)]
         found = {}
         for at, one in enumerate(self.runs):
             changed = [labels[at] for labels in likely if at in labels]

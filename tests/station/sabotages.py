@@ -256,7 +256,7 @@ class Shop:
             case events.RunDoubted():
                 self._look_back(event.run, event.finding)
             case events.FeedInMissed():
-                # A wrong ball too may hide the feed-in: the operator is told of a late start then.
+                # A wrong ball can hide the feed-in, too. The operator then reads of a late start.
                 self.seen, self.late = "late start", False
                 self._announced and send(Quit())
             case events.StateChanged(state=State.ANNOUNCED):

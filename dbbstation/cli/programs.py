@@ -46,8 +46,9 @@ def _or_empty(value: float | str | None) -> float | str:
 
 
 def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:
-    unsure = [each for each in programs if each.model_uncertainty_not_known_because]
-    for why in dict.fromkeys(each.model_uncertainty_not_known_because for each in unsure):
+    reasons = [each.model_uncertainty_not_known_because for each in programs]
+    for why in dict.fromkeys(one for one in reasons if one):
+        unsure = [each for each, one in zip(programs, reasons, strict=True) if one == why]
         written_um = max(each.greatest_correction_um or 0.0 for each in unsure)
         by_axis = [(axis, u) for each in unsure for axis, u in (each.model_uncertainty_by_axis_um or {}).items()]
         axes = {axis.upper() for axis, u in by_axis if u is None}

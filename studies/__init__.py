@@ -1,1 +1,1 @@
-"""Reproducible experiments of a checkout: `dbbstation study`."""
+"""Reproducible experiments of a checkout: `python -m studies`."""

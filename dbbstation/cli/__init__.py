@@ -58,13 +58,13 @@ COMMANDS = {
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
     "sources": "The causes of error that are known, and how to confirm them.",
-    "study": "Reproducible experiments.",
     "station": "Measure a plan on a terminal screen.",
 }
 """Name and one line of help of every command; each is a module of this folder with a command of its name."""
 
 
 @click.group(
+    "dbbstation",
     cls=LazyGroup,
     table=COMMANDS,
     package="dbbstation.cli",
@@ -98,8 +98,8 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: A
         raise InputError([Problem(settings, 0, 0, "there is no such file", "check the path")])
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit with its code."""
+def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> None:
+    """Run the command line, or another group of commands, and exit with its code."""
     open_missing()
     # All work of this process is the program's own: the threads that `dbbstation.computing.threads` takes away are not even started.
     # Read when NumPy is imported.
@@ -113,9 +113,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with (
             politely_ended(),
             input_book(),
-            cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context,
+            group.make_context(group.name, _own_first(given), obj=tuple(given)) as context,
         ):
-            code = _invoked(context)
+            code = _invoked(group, context)
             if virtual := virtual_so_far():
                 echo(f"VIRTUAL MACHINE: {', '.join(virtual)}: computed, and not measured on a real machine", err=True)
             flush_output()
@@ -157,10 +157,10 @@ def _with_new_name(problem: click.ClickException) -> click.ClickException:
     return click.UsageError(f"No such option {problem.option_name!r}; it is now {now}", problem.ctx) if now else problem
 
 
-def _invoked(context: click.Context) -> object:
+def _invoked(group: click.Group, context: click.Context) -> object:
     """Return what a command returns."""
     try:
-        return cli.invoke(context)
+        return group.invoke(context)
     except SystemExit as left:
         what = f"code that a file brings ended the program, with {left.code!r}"
         raise StationError(what, remedy="let it raise an error in place of sys.exit") from left

@@ -59,7 +59,7 @@ class LazyGroup(click.Group):
         """Find the command, or suggest similar ones."""
         name = args[0]
         if name in self._renamed:
-            ctx.fail(f"No such command {name!r}; it is now `{self._renamed[name]}`")
+            ctx.fail(f"No such command {name!r}; it is now {self._renamed[name]}")
         near = difflib.get_close_matches(name, self._table, n=3)
         if name not in self._table and not name.startswith("-") and near:
             ctx.fail(f"No such command {name!r}; did you mean {' or '.join(near)}?")

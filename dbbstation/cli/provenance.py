@@ -55,8 +55,7 @@ def provenance() -> Provenance:
 
 def command_of(context: click.Context) -> str:
     """Return a command as typed, with options of settings, files without folders."""
-    path = context.command_path.split()
-    words = ["dbbstation", *(path[1:] if path[:1] == ["dbbstation"] else path)]
+    words = context.command_path.split()
     for parameter in context.command.params:
         given = context.get_parameter_source(parameter.name or "") in _GIVEN
         if given and parameter.name not in _NO_CONTENT:

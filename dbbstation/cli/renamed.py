@@ -1,12 +1,13 @@
 """Former names of commands and flags: an unknown one is answered with the new one."""
 
 RENAMED = {
-    "drive": "identify",
-    "emulate": "instrument emulate",
-    "instruments": "instrument list",
-    "monitor": "instrument monitor",
-    "ports": "instrument ports",
-    "replay": "instrument replay",
+    "drive": "`identify`",
+    "emulate": "`instrument emulate`",
+    "instruments": "`instrument list`",
+    "monitor": "`instrument monitor`",
+    "ports": "`instrument ports`",
+    "replay": "`instrument replay`",
+    "study": "`python -m studies` in a checkout",
 }
 
 RENAMED_FLAGS = {

@@ -7,12 +7,6 @@ from pathlib import Path
 from dbbstation.errors import InputError, Problem
 
 
-def checkout() -> Path | None:
-    """Return the checkout of this package; None for a wheel."""
-    root = Path(__file__).resolve().parents[2]
-    return root if (root / "pyproject.toml").is_file() and (root / "studies").is_dir() else None
-
-
 def shipped_folder(name: str) -> Path:
     """Return a shipped folder, such as `protocols`.
 

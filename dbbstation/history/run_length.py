@@ -26,7 +26,7 @@ STATES = 201
 
 REFERENCE = 0.5
 """k [standard deviations]: half the change that is to be found soonest [Page 1954], which is one standard deviation of a session.
-`dbbstation study history` shows what others would bring."""
+`python -m studies history` shows what others would bring."""
 
 SINGLE_SHARE = 0.5
 """Share of the false alarms that the limit for single sessions may make; the CUSUM has the rest. A large step is then seen at once,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 BASELINE = 10
 """Values from which level and scatter are known well enough to stand for the stated uncertainty: the level to u / 3, the scatter
-to 24 %. `dbbstation study history` shows what 5 and 20 would bring."""
+to 24 %. `python -m studies history` shows what 5 and 20 would bring."""
 
 CONTRADICTS = 0.05
 """Probability below which a scatter contradicts the stated uncertainties. One quantity in twenty that scatters as stated is held

@@ -1,4 +1,4 @@
-"""The commands `dbbstation study NAME`: one module per experiment."""
+"""The commands `python -m studies NAME`: one module per experiment."""
 
 STUDIES = {
     "blind": "Effects hidden by an independent simulation: found, named, or rightly not.",

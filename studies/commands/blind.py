@@ -1,4 +1,4 @@
-"""`dbbstation study blind`: hidden effects, judged blind, then compared with the answers."""
+"""`python -m studies blind`: hidden effects, judged blind, then compared with the answers."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ def blind(
     \b
     Examples:
       python -m tests.plant.blind hidden --clean 100 --single 200 --pairs 40 --outside 40 --concealed 20 --seed 1
-      dbbstation study blind hidden
-      dbbstation study blind first second
-      dbbstation study blind hidden --again --json > blind.json
-      dbbstation study blind hidden --figure reliability.svg
+      python -m studies blind hidden
+      python -m studies blind first second
+      python -m studies blind hidden --again --json > blind.json
+      python -m studies blind hidden --figure reliability.svg
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import progress_bar

@@ -1,4 +1,4 @@
-"""`dbbstation study concealed-gravity`: gravity hidden in a kinematic calibration."""
+"""`python -m studies concealed-gravity`: gravity hidden in a kinematic calibration."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
 
     \b
     Examples:
-      dbbstation study concealed-gravity
-      dbbstation study concealed-gravity --seed 5 --figure concealed.svg --json
+      python -m studies concealed-gravity
+      python -m studies concealed-gravity --seed 5 --figure concealed.svg --json
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import stage_bar

@@ -1,4 +1,4 @@
-"""`dbbstation study coverage`: do stated intervals contain the truth?"""
+"""`python -m studies coverage`: do stated intervals contain the truth?"""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ def coverage(
 
     \b
     Examples:
-      dbbstation study coverage
-      dbbstation study coverage --part calibration --draws 20
-      dbbstation study coverage --machines 100 --plan elevated --json
-      dbbstation study coverage --part circles --draws 1000 --keep draws
+      python -m studies coverage
+      python -m studies coverage --part calibration --draws 20
+      python -m studies coverage --machines 100 --plan elevated --json
+      python -m studies coverage --part circles --draws 1000 --keep draws
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import progress_bar

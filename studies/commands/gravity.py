@@ -1,4 +1,4 @@
-"""`dbbstation study gravity`: gravity identified after the kinematics and with them."""
+"""`python -m studies gravity`: gravity identified after the kinematics and with them."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def gravity(*, machines: int, seed: int, figure: Path | None, force: bool, as_js
 
     \b
     Examples:
-      dbbstation study gravity
-      dbbstation study gravity --machines 20 --figure gravity.svg --json
+      python -m studies gravity
+      python -m studies gravity --machines 20 --figure gravity.svg --json
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import progress_bar

@@ -1,4 +1,4 @@
-"""`dbbstation study history`: false alarms and delays of what watches a machine over its sessions."""
+"""`python -m studies history`: false alarms and delays of what watches a machine over its sessions."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def history(*, tables: int, quantities: int, length: int, changes: int, seed: in
 
     \b
     Examples:
-      dbbstation study history
-      dbbstation study history --tables 100 --quantities 10 --changes 50 --json
+      python -m studies history
+      python -m studies history --tables 100 --quantities 10 --changes 50 --json
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import count_bar

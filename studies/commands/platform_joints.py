@@ -1,4 +1,4 @@
-"""`dbbstation study platform-joints`: the hard case, carried through."""
+"""`python -m studies platform-joints`: the hard case, carried through."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:
 
     \b
     Examples:
-      dbbstation study platform-joints
-      dbbstation study platform-joints --size-um 20 --seed 4 --json
+      python -m studies platform-joints
+      python -m studies platform-joints --size-um 20 --seed 4 --json
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import stage_bar

@@ -1,4 +1,4 @@
-"""`dbbstation study sensitivities`: answers with the constants that decide them halved and doubled."""
+"""`python -m studies sensitivities`: answers with the constants that decide them halved and doubled."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ def sensitivities(
 
     \b
     Examples:
-      dbbstation study sensitivities drive.csv
-      dbbstation study sensitivities --pair before after --jobs 1
-      dbbstation study sensitivities drive.csv --only APART --only LEAST_SHARE
-      dbbstation study sensitivities --table room.csv measured_c simulated_c
+      python -m studies sensitivities drive.csv
+      python -m studies sensitivities --pair before after --jobs 1
+      python -m studies sensitivities drive.csv --only APART --only LEAST_SHARE
+      python -m studies sensitivities --table room.csv measured_c simulated_c
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import count_bar

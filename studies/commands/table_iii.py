@@ -1,4 +1,4 @@
-"""`dbbstation study table-iii`: the paper's three ways to calibrate."""
+"""`python -m studies table-iii`: the paper's three ways to calibrate."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def table_iii(*, machines: int, rigid: bool, seed: int, as_json: bool) -> None:
 
     \b
     Examples:
-      dbbstation study table-iii
-      dbbstation study table-iii --machines 20 --rigid --json
+      python -m studies table-iii
+      python -m studies table-iii --machines 20 --rigid --json
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import progress_bar

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dbbstation.cli import main
+from dbbstation.cli import cli, main
+from studies.__main__ import study
 from tests.once import OF_SESSIONS, OF_TABLES, computed_once, made_once
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import elevated, subset, table_ii_plan
@@ -36,10 +37,11 @@ class Outcome:
 
 
 def call(*arguments, err=None) -> Outcome:
-    """Run the command line as `dbbstation ARGUMENTS` would; standard error may be a stream that is there already."""
+    """Run the command line as `dbbstation ARGUMENTS` would, or a study; standard error may be a stream that is there already."""
+    group, arguments = (study, arguments[1:]) if arguments[:1] == ("study",) else (cli, arguments)
     out, err = io.StringIO(), err or io.StringIO()
     with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
+        main([str(argument) for argument in arguments], group)
     return Outcome(left.value.code, out.getvalue(), err.getvalue() if isinstance(err, io.StringIO) else "")
 
 

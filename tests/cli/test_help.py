@@ -15,7 +15,7 @@ from dbbstation.cli.control import control
 from dbbstation.cli.instrument import TABLE
 from dbbstation.cli.jig import jig
 from dbbstation.cli.session import session
-from dbbstation.cli.study import STUDIES
+from studies.__main__ import STUDIES, study
 
 HEAVY = ("numba", "scipy", "rich", "textual", "matplotlib", "pydantic", "numpy")
 
@@ -27,6 +27,8 @@ GROUPS = {
     "instrument": TABLE,
     "control": control.commands,
 }
+COMMAND = r"(?:dbbstation|python -m studies) "
+
 LINES = [name for name in sorted(COMMANDS) if name not in GROUPS]
 LINES += [f"{group} {name}" for group, names in GROUPS.items() for name in sorted(names)]
 """Everything that can be called."""
@@ -44,6 +46,8 @@ def command(line):
 
 def found(words):
     group, context = cli, click.Context(cli, info_name="dbbstation")
+    if words[0] == "study":
+        group, words = study, words[1:]
     while isinstance(group, click.Group):
         name, *words = words
         group = group.get_command(context, name)
@@ -53,22 +57,23 @@ def found(words):
 
 def examples(text):
     joined = re.sub(r"\\\n\s*", "", text)
-    return [line.strip() for line in joined.splitlines() if line.strip().startswith("dbbstation ")]
+    return [line.strip() for line in joined.splitlines() if re.match(COMMAND, line.strip())]
 
 
 def test_each_command_has_help_with_an_example(run, line):
     outcome = run(*line, "--help")
     assert (outcome.code, outcome.err) == (DONE, "")
-    assert outcome.out.startswith(f"Usage: dbbstation {' '.join(line)}")
+    assert re.match(f"Usage: {COMMAND}{line[-1] if line[0] == 'study' else ' '.join(line)}", outcome.out)
     assert re.search(r"^  Examples?:$", outcome.out, re.MULTILINE)
     assert r"\b" not in outcome.out
     assert examples(outcome.out)
 
 
 def test_examples_use_options_that_exist(command):
-    for line in examples(command.help):
+    for example in examples(command.help):
         # Comments and placeholders are for people.
-        words = [word for word in shlex.split(re.sub(r"   \(.*\)$| > .*$", "", line))[1:] if word != "..."]
+        line = re.sub(r"   \(.*\)$| > .*$", "", example).replace("python -m studies", "dbbstation study")
+        words = [word for word in shlex.split(line)[1:] if word != "..."]
         known, arguments = found(words)
         known.make_context(known.name, arguments, resilient_parsing=True)
 

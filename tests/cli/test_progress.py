@@ -251,7 +251,7 @@ INTERRUPTED = {
     "calibrate": ["calibrate", "SESSION", "--out", "model.yaml", "--force"],
     "evaluate": ["evaluate", "SESSION", "--model", MODEL],
     "predict": ["predict", "--model", MODEL, "poses.csv", "--table", "out.csv"],
-    "study": ["study", "coverage", "--machines", "50"],
+    "study": ["coverage", "--machines", "50"],
     "program": ["program", "--plan", PLAN, "--machine", MACHINE, "--model", MODEL, "--out", "nc"],
 }
 
@@ -267,7 +267,7 @@ def test_ctrl_c_ends_with_one_line_and_leaves_whole_files(tmp_path, name, after_
     words = [{"SESSION": "session"}.get(word, str(word)) for word in INTERRUPTED[name]]
     before = set(tmp_path.rglob("*"))
     process = subprocess.Popen(
-        [sys.executable, "-m", "dbbstation", *words],
+        [sys.executable, "-m", "studies" if name == "study" else "dbbstation", *words],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -58,14 +58,17 @@ EXEMPT = {
     ("docs/getting-started.md", "cat in.csv"): "an input that the reader writes",
     ("docs/getting-started.md", "cat out.csv"): "the answer of that model",
     ("docs/getting-started.md", "dbbstation program"): "the model of that session",
-    ("docs/gravity.md", "dbbstation study gravity"): "sixty machines, minutes; see tests/studies/test_gravity_study.py",
+    (
+        "docs/gravity.md",
+        "python -m studies gravity",
+    ): "sixty machines, minutes; see tests/studies/test_gravity_study.py",
 }
 """Commands whose output is shown and not compared, by document and beginning of the line, with the reason."""
 
 SLOW = {
     ("README.md", "dbbstation mismatch fixtures/tables/axis.csv"),
     ("docs/compare.md", "dbbstation compare before after"),
-    ("docs/diagnosis.md", "dbbstation study concealed-gravity"),
+    ("docs/diagnosis.md", "python -m studies concealed-gravity"),
     ("docs/mismatch.md", "dbbstation mismatch fixtures/tables/axis.csv"),
     ("docs/mismatch-simulator.md", "dbbstation mismatch fixtures/simulators/pendulum.csv"),
 }
@@ -206,6 +209,7 @@ class Workshop:
 
     def _run(self, words: list[str], patch: pytest.MonkeyPatch) -> Outcome:
         patch.chdir(self.folder)
+        words = ["dbbstation", "study", *words[3:]] if words[:3] == ["python", "-m", "studies"] else words
         assert words[0] == "dbbstation"
         if words[1:4] == ["compare", "before", "after"]:
             record_before_and_after(self.folder)

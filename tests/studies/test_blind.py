@@ -10,6 +10,7 @@ import pytest
 
 from dbbstation.cli import main
 from dbbstation.errors import InputError
+from studies.__main__ import study as studies
 from studies.blind import judge_sessions, read_answers, verdict_folder
 from studies.blind_figure import reliability_figure
 from studies.blind_reliability import Forecast, reliability
@@ -317,7 +318,7 @@ def test_a_study_goes_on_where_it_stopped(study):
 
 def test_the_command_prints_the_tables(study, capsys):
     with pytest.raises(SystemExit) as left:
-        main(["study", "blind", str(study), "--candidates", "gravity,backlash", "--jobs", "1"])
+        main(["blind", str(study), "--candidates", "gravity,backlash", "--jobs", "1"], studies)
     assert left.value.code == 0
     printed = capsys.readouterr().out
     assert "clean: false alarm" in printed
@@ -327,7 +328,7 @@ def test_the_command_prints_the_tables(study, capsys):
 def test_the_command_draws_what_was_given_a_probability(study, tmp_path, capsys):
     names = ("gravity", "backlash")
     figure = tmp_path / "reliability.svg"
-    arguments = ["study", "blind", str(study), "--candidates", ",".join(names), "--jobs", "1", "--figure", str(figure)]
+    arguments = ["blind", str(study), "--candidates", ",".join(names), "--jobs", "1", "--figure", str(figure)]
     kept = verdict_folder(study, names)
     judge_sessions(study, names, 1, lambda _done, _total: None)
     before = {path: path.read_text() for path in kept.iterdir()}
@@ -337,7 +338,7 @@ def test_the_command_draws_what_was_given_a_probability(study, tmp_path, capsys)
             source.pop("probability", None)
         path.write_text(json.dumps(said))
     with pytest.raises(SystemExit) as left:
-        main(arguments)
+        main(arguments, studies)
     assert left.value.code == 1
     assert "no verdict has a probability" in capsys.readouterr().err
     assert not figure.exists()
@@ -347,7 +348,7 @@ def test_the_command_draws_what_was_given_a_probability(study, tmp_path, capsys)
             source |= {"probability": 0.99 if source["verdict"] == "identified" else 0.004, "log_evidence": 90.0}
         path.write_text(json.dumps(said))
     with pytest.raises(SystemExit) as left:
-        main(arguments)
+        main(arguments, studies)
     printed = capsys.readouterr().out
     assert left.value.code == 0
     assert "probabilities of all verdicts" in printed

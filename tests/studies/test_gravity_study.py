@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from dbbstation.cli import cli
 from dbbstation.errors import OutputError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
+from studies.__main__ import study as studies
 from studies.gravity import (
     JOINT,
     POSITION_ONLY,
@@ -109,14 +109,14 @@ def test_the_figure_has_the_conditions_of_one_place_by_tilt_and_is_the_same_ever
 @pytest.mark.nightly  # table and figure are those of the tests above
 def test_the_command_prints_the_table_and_writes_the_figure(tmp_path):
     picture = tmp_path / "gravity.svg"
-    arguments = ["study", "gravity", "--machines", "3", "--seed", "300"]
-    said = CliRunner().invoke(cli, [*arguments, "--figure", str(picture)])
+    arguments = ["gravity", "--machines", "3", "--seed", "300"]
+    said = CliRunner().invoke(studies, [*arguments, "--figure", str(picture)])
     assert said.exit_code == 0, said.output
     assert picture.read_bytes().startswith(b"<?xml")
     for text in ("published, without compensation", "76.3", "141.4", "does not explain the published rows"):
         assert text in said.stdout
-    again = CliRunner().invoke(cli, [*arguments, "--figure", str(picture)])
+    again = CliRunner().invoke(studies, [*arguments, "--figure", str(picture)])
     assert isinstance(again.exception, OutputError)
-    answer = json.loads(CliRunner().invoke(cli, [*arguments, "--json"]).stdout)
+    answer = json.loads(CliRunner().invoke(studies, [*arguments, "--json"]).stdout)
     assert answer["seed"] == 300
     assert list(answer["conditions"]) == list(PUBLISHED_UM)

@@ -1,4 +1,4 @@
-"""`dbbstation study history`, in little."""
+"""`python -m studies history`, in little."""
 
 from __future__ import annotations
 

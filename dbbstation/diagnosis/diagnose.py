@@ -12,10 +12,9 @@ from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missin
 from dbbstation.calibration.outliers.stray_balls import beside
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.after_reversals import after_reversals
-from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained
-from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests
+from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests, without_tests
 from dbbstation.diagnosis.left_where import where_left
 from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.limits import limits_of
@@ -93,7 +92,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     rivals = [f.name for f in sorted(findings, key=lambda f: -(f.gain or 0.0))[: BOUNDS.found_again]]
-    again = {} if stopped else found_again(explained, rivals)
+    again = {} if stopped else found_again(explained, outcome, rivals)
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
     rest = _unexplained(explained, settled.left)
     mismatch = is_missing_physics(explained.first) or bool(members) or bool(outliers) or rest.variable is not None

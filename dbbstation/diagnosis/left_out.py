@@ -1,8 +1,9 @@
-"""Held-out predictions, and causes found again."""
+"""Held-out tests: predictions, gains, and causes found again."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,12 +11,18 @@ import numpy as np
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import LEAST_PARTS
+from dbbstation.inference.chosen_anew import (
+    LEAST_PARTS,
+    columns_of,
+    gains_of_tests,
+    rows_of_groups,
+    selection_frequency,
+)
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn, numbered
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
+from dbbstation.inference.hypotheses import CLOSE
 from dbbstation.inference.jackknife import widening
-from dbbstation.inference.selection_frequency import renumbered, selection_frequency
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
@@ -23,6 +30,8 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explained import Explained
+    from dbbstation.inference.chosen_anew import KnownGains
+    from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
     from dbbstation.model.observation import Observation
 
@@ -66,20 +75,36 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
     return found
 
 
-def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
+def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
+    """Return gains of named causes and classes in groups of tests; None for too few, or without causes.
+
+    The reference is the kinematic calibration of the same tests.
+    """
+    groups = groups_of(explained.channel.observations)
+    if not outcome.best.members or groups is None:
+        return None
+    return gains_of_tests(
+        outcome,
+        rows_of_groups(groups, explained.channel.runs),
+        partial(predicted_without, explained),
+        lambda cause: cause.named,
+        most_members=BOUNDS.members,
+        likely=CLOSE,
+        thorough=False,
+    )
+
+
+def found_again(explained: Explained, outcome: Settled, names: Sequence[str]) -> dict[str, float]:
     """Return causes' shares of selections in seven tenths of tests; may be empty."""
     channel, settled = explained.channel, explained.settled
     if not settled.members:
         return {}
-    wanted = {*names, *settled.best.names}
-    columns, causes = renumbered([cause for cause in settled.causes if cause.name in wanted])
+    causes = [cause for cause in settled.causes if cause.name in {*names, *settled.best.names}]
+    lengths, used = [rows.stop - rows.start for rows in channel.runs], columns_of(causes)
     return selection_frequency(
-        channel.blocks(columns, channel.target(settled.after)),
         numbered([o.test for o in channel.observations]),
-        channel.base,
-        channel.held,
         causes,
-        max(settled.noise_mm, SMALLEST_NOISE_MM),
+        lambda out: outcome.bank.without(np.repeat(out, lengths), used),
         np.random.default_rng(len(channel.observations)),
         settled.best.members,
         BOUNDS.members,

@@ -58,7 +58,7 @@ def outcome_of(explained: Explained) -> Settled:
     circles, settled = explained.channel, explained.settled
     base = circles.base
     rows = Channel(
-        residual=circles.target(settled.after),
+        residual=settled.target,
         unit="mm",
         blocks=tuple(circles.runs),
         names=tuple(f"{o.test} {o.raw.circle.direction}" for o in circles.observations),

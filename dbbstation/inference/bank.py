@@ -168,6 +168,11 @@ class Bank:
         columns = self._columns if but_for is None else self._columns.but_for(but_for, only)
         return BesideBase(columns, self.channel.known, self.channel.held, self.noise.innovation)
 
+    def without(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> ModelComparison:
+        """Return the comparison without some of all rows, shape (n,), in the same noise; `only` as of `beside`."""
+        out = rows[self.channel.kept]
+        return self.beside(out, only).comparison(np.where(out, 0.0, self.target))
+
     def add(self, more: Sequence[Pattern]) -> list[str]:
         """Add new patterns and return their names."""
         fresh = [p for p in {p.name: p for p in more}.values() if p.name not in self.patterns]

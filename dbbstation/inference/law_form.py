@@ -142,14 +142,12 @@ def _scores(
     parts: Sequence[NDArray[np.bool_]],
 ) -> dict[str, NDArray[np.float64]]:
     """Return each part's conditional log evidence over an empty place, shape (parts,) each."""
-    bank, kept = settled.bank, settled.channel.kept
+    bank = settled.bank
     every = np.unique(np.concatenate([m.columns for ms in (others, *candidates.values()) for m in ms]))
-    target = bank.target
-    whole = bank.beside().comparison(target, every)
+    whole = bank.beside().comparison(bank.target, every)
     found: dict[str, list[float]] = {name: [] for name in candidates}
     for rows in parts:
-        out = rows[kept]
-        rest = bank.beside(out, every).comparison(np.where(out, 0.0, target))
+        rest = bank.without(rows, every)
         nothing = whole.log_evidence(others) - rest.log_evidence(others)
         for name, members in candidates.items():
             both = (*members, *others)

@@ -7,7 +7,6 @@ condition.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -181,71 +180,28 @@ class CauseColumns:
         """Return products with a target, shape (n,), of columns, shape (p,), and axes, shape (k,)."""
         return self.samples.T @ target, self.axes.T @ target
 
-    def part(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> RowProducts:
-        """Return products of rows, shape (n,), with all or some columns, shape (q,)."""
-        part = self._rows_of(rows, only)
-        return replace(part, of_columns=part.columns @ part.columns.T, columns=NO_COLUMNS)
-
-    def _rows_of(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None) -> RowProducts:
-        own = np.arange(self.count) if only is None else only
-        axes, columns = self.axes[rows], self.samples.T[np.ix_(own, np.flatnonzero(rows))]
-        return RowProducts(rows, only, axes.T @ axes, (columns @ axes).T, NO_COLUMNS, columns)
-
     def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
         """Return the causes without some rows, where targets must be zero.
 
         Args:
             only: rising, shape (q,); None: all.
         """
-        return _Without(self, self._rows_of(rows, only))
-
-    def without(self, part: RowProducts) -> CauseColumns:
-        """Return the causes without a part, as `but_for`."""
-        return _Without(self, part)
-
-
-NO_COLUMNS = np.zeros((0, 0))
-
-
-@dataclass(frozen=True, eq=False)
-class RowProducts:
-    """Products over some rows, for subtraction.
-
-    Attributes:
-        of_columns: empty if `columns` are given.
-        columns: shape (q, rows), where products of all of them are not worth their memory.
-    """
-
-    rows: NDArray[np.bool_]
-    numbers: NDArray[np.int64] | None
-    of_axes: NDArray[np.float64]
-    across: NDArray[np.float64]
-    of_columns: NDArray[np.float64]
-    columns: NDArray[np.float64] = field(default_factory=lambda: NO_COLUMNS)
-
-    def __add__(self, other: RowProducts) -> RowProducts:
-        """Return disjoint parts together."""
-        return RowProducts(
-            self.rows | other.rows,
-            self.numbers,
-            self.of_axes + other.of_axes,
-            self.across + other.across,
-            self.of_columns + other.of_columns,
-        )
+        return _Without(self, rows, only)
 
 
 class _Without(CauseColumns):
     """All rows but a part; axes are renewed from few products."""
 
-    def __init__(self, whole: CauseColumns, part: RowProducts) -> None:
-        self._whole, self._rows, self.numbers, self.count = whole, part.rows, part.numbers, whole.count
-        share, turned = np.linalg.eigh(np.eye(len(part.of_axes)) - part.of_axes)
+    def __init__(self, whole: CauseColumns, rows: NDArray[np.bool_], only: NDArray[np.int64] | None) -> None:
+        self._whole, self.numbers, self.count = whole, only, whole.count
+        own = np.arange(whole.count) if only is None else only
+        axes, self._out = whole.axes[rows], whole.samples.T[np.ix_(own, np.flatnonzero(rows))]
+        share, turned = np.linalg.eigh(np.eye(axes.shape[1]) - axes.T @ axes)
         turned, size = turned[:, share > LEAST_SHARE], np.sqrt(share[share > LEAST_SHARE])
         self._turned = turned / size
         self.on_axes = (turned * size).T @ whole.on_axes
-        self._part = part
-        along = whole.along if part.numbers is None else whole.along[:, part.numbers]
-        self._along_left = self._turned.T @ (along - part.across)
+        along = whole.along if only is None else whole.along[:, only]
+        self._along_left = self._turned.T @ (along - (self._out @ axes).T)
 
     @property
     def samples(self) -> NDArray[np.float64]:
@@ -256,12 +212,8 @@ class _Without(CauseColumns):
         return self.own_gram()
 
     def own_gram(self) -> NDArray[np.float64]:
-        gram, part = self._whole.gram, self._part
-        left = gram.copy() if part.numbers is None else gram[np.ix_(part.numbers, part.numbers)]
-        if len(part.columns):
-            return _less(left, part.columns.T)
-        left -= part.of_columns
-        return left
+        gram, own = self._whole.gram, self.numbers
+        return _less(gram.copy() if own is None else gram[np.ix_(own, own)], self._out.T)
 
     @property
     def along(self) -> NDArray[np.float64]:

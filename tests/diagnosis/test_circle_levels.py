@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.diagnose import without_doubtful
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.findings import Verdict
+from dbbstation.diagnosis.left_out import without_tests
 from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import judge

@@ -171,22 +171,6 @@ def test_rows_that_are_held_back_say_nothing(samples, rng, alone, only):
     assert whole.samples == pytest.approx(causes)
 
 
-def test_parts_that_are_held_back_together_say_nothing(samples, rng):
-    base, causes, target = samples
-    first, second = (np.zeros(SAMPLES, dtype=bool) for _ in range(2))
-    first[5:15], second[30:40] = True, True
-    out, held = first | second, held_rows(rng, 1)
-    whole, others = CauseColumns(base), CauseColumns(base[~out])
-    whole.add(causes)
-    others.add(causes[~out])
-    members = [Member(cause("a", variant(0, 2)), variant(0, 2), 1.0), Member(cause("b", variant(4)), variant(4), 0.3)]
-    left = whole.without(whole.part(first) + whole.part(second))
-    held_back = BesideBase(left, KNOWN, held, NOISE).comparison(np.where(out, 0.0, target))
-    expected = BesideBase(others, KNOWN, held, NOISE).comparison(target[~out])
-    assert held_back.log_evidence(members) == pytest.approx(expected.log_evidence(members), rel=1e-8)
-    assert held_back.estimates(members).values == pytest.approx(expected.estimates(members).values, rel=1e-8)
-
-
 def test_columns_take_the_places_of_those_that_were_given_back(samples, rng):
     base, causes, target = samples
     columns = CauseColumns(base)

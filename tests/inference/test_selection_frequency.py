@@ -8,10 +8,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from dbbstation.inference.blocks import Columns, compress
+from dbbstation.inference.blocks import Columns
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.model_comparison import Variant
-from dbbstation.inference.selection_frequency import SHARE, renumbered, selection_frequency
+from dbbstation.inference.chosen_anew import SHARE, columns_of, selection_frequency
+from dbbstation.inference.projection import BesideBase, CauseColumns
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import log_posteriors
 
@@ -19,7 +19,6 @@ ODDS = float(np.log(0.05 / 0.95))
 NOISE = 0.5
 T = np.linspace(0.0, 1.0, 40, endpoint=False)
 FLAT = Columns(np.full(2, np.inf), np.ones(2), np.zeros(2, dtype=bool))
-NONE_HELD = np.zeros((0, 2))
 BASE = np.column_stack([np.ones(40), T])
 WAVES = np.column_stack([np.sin(2 * np.pi * T), np.cos(6 * np.pi * T), np.sign(np.sin(2 * np.pi * T)), T**2])
 CAUSES = [cause(name, variant(k), odds=ODDS) for k, name in enumerate(("sine", "cosine", "square", "parabola"))]
@@ -28,11 +27,20 @@ CAUSES = [cause(name, variant(k), odds=ODDS) for k, name in enumerate(("sine", "
 def frequencies(rng, targets, groups, causes=CAUSES, columns=None):
     """Of runs that share base and causes' columns, or have columns of their own."""
     columns = [WAVES] * len(targets) if columns is None else columns
-    blocks = [
-        compress(np.arange(2 + own.shape[1]), np.hstack([BASE, own]), target)
-        for own, target in zip(columns, targets, strict=True)
-    ]
-    return selection_frequency(blocks, groups, FLAT, NONE_HELD, causes, NOISE, rng)
+    return chosen_of(rng, np.tile(BASE, (len(targets), 1)), np.vstack(columns), targets, groups, FLAT, causes)
+
+
+def chosen_of(rng, base, columns, targets, groups, known, causes):
+    whole, target, lengths = CauseColumns(base), np.concatenate(targets), [len(own) for own in targets]
+    whole.add(columns)
+    held = np.zeros((0, 2))
+
+    def without(runs):
+        out = np.repeat(runs, lengths)
+        part = whole.but_for(out, columns_of(causes))
+        return BesideBase(part, known, held, NOISE).comparison(np.where(out, 0.0, target))
+
+    return selection_frequency(groups, causes, without, rng)
 
 
 def runs(rng, *amplitudes):
@@ -96,29 +104,23 @@ def test_draws_never_split_a_group():
         np.r_[np.full(2, np.inf), np.full(pairs, 50.0)], np.ones(2 + pairs), np.r_[False, False, np.ones(pairs, bool)]
     )
     half = np.sin(2 * np.pi * T)
-    # Columns: base, one random sine of each pair, a cause in the first pair's difference, one in its first run alone.
-    blocks = []
+    # Columns: base and one random sine of each pair; a cause in the first pair's difference, one in its first run alone.
+    bases, columns, targets = [], [], []
     for k in range(pairs):
         shift = rng.normal(0, 20.0)
         for sign in (1.0, -1.0):
-            hidden = np.column_stack([sign * half, WAVES[:, 1] * (sign > 0)]) * (k == 0)
-            jacobian = np.column_stack([BASE, half, hidden])
-            target = jacobian @ [3.0, -1.0, shift, 2.0, 2.0] + rng.normal(0, NOISE, 40)
-            blocks.append(compress(np.array([0, 1, 2 + k, 2 + pairs, 3 + pairs]), jacobian, target))
+            bases.append(np.hstack([BASE, half[:, None] * (np.arange(pairs) == k)]))
+            columns.append(np.column_stack([sign * half, WAVES[:, 1] * (sign > 0)]) * (k == 0))
+            own = np.column_stack([BASE, half, columns[-1]])
+            targets.append(own @ [3.0, -1.0, shift, 2.0, 2.0] + rng.normal(0, NOISE, 40))
     causes = [cause("difference", variant(0), odds=ODDS), cause("alone", variant(1), odds=ODDS)]
     groups = [k // 2 for k in range(2 * pairs)]
-    held = np.zeros((0, 2))
-    found = [
-        selection_frequency(blocks, groups, random, held, causes, NOISE, np.random.default_rng(seed))
-        for seed in range(8)
-    ]
+    given = np.vstack(bases), np.vstack(columns), targets
+    found = [chosen_of(np.random.default_rng(seed), *given, groups, random, causes) for seed in range(8)]
     assert all(one["difference"] == one["alone"] for one in found)
     assert np.mean([one["alone"] for one in found]) == pytest.approx(SHARE, abs=0.13)  # 160 draws: known to 0.036
     # Runs that are drawn one by one do split it: then the difference is seen in fewer draws than the run alone.
-    apart = [
-        selection_frequency(blocks, range(2 * pairs), random, held, causes, NOISE, np.random.default_rng(seed))
-        for seed in range(8)
-    ]
+    apart = [chosen_of(np.random.default_rng(seed), *given, range(2 * pairs), random, causes) for seed in range(8)]
     assert np.mean([one["difference"] for one in apart]) < np.mean([one["alone"] for one in apart]) - 0.1
 
 
@@ -141,39 +143,3 @@ def test_of_two_groups_both_are_kept(rng):
     first, second = (WAVES * np.eye(4)[k] for k in (0, 1))
     found = frequencies(rng, targets, range(2), columns=[first + nothing, second + nothing])
     assert (found["sine"], found["cosine"]) == (1.0, 1.0)
-
-
-def renamed():
-    """Causes with columns far apart, slack, and a form that is part of another."""
-    whole = np.array([40, 11])
-    slack = {"slack": np.array([95, 7]), "slack_sd": np.array([0.3, 0.1])}
-    many = Variant(whole, np.array([1.0, 2.0]), (8.0,), log_weight=-0.7, **slack)
-    one = Variant(whole[1:], np.array([2.0]), (8.0,), "strut 2", "law", whole, -0.7)
-    return [cause("many", many, one, odds=ODDS), cause("other", variant(60, plausible=3.0), odds=ODDS, named=False)]
-
-
-def test_renumbering_keeps_every_column_and_all_else():
-    before = renamed()
-    wanted, after = renumbered(before)
-    assert wanted.tolist() == [7, 11, 40, 60, 95]
-    for old, new in zip(before, after, strict=True):
-        assert (new.name, new.log_prior_odds, new.named) == (old.name, old.log_prior_odds, old.named)
-        for was, found in zip(old.variants, new.variants, strict=True):
-            for part in ("columns", "slack", "whole"):
-                assert wanted[getattr(found, part)].tolist() == getattr(was, part).tolist()
-            for kept in ("plausible", "slack_sd"):
-                assert getattr(found, kept).tolist() == getattr(was, kept).tolist()
-            for kept in ("nonlinear", "label", "law", "log_weight", "slack_at"):
-                assert getattr(found, kept) == getattr(was, kept)
-
-
-def test_renumbered_causes_are_found_as_often_as_before():
-    rng = np.random.default_rng(6)
-    wide = [rng.normal(size=(40, 96)) for _ in range(6)]
-    targets = [BASE @ [3.0, -1.0] + 0.1 * own[:, 40] + 0.14 * own[:, 60] + rng.normal(0, NOISE, 40) for own in wide]
-    causes = renamed()
-    wanted, moved = renumbered(causes)
-    before = frequencies(np.random.default_rng(2), targets, range(6), causes, wide)
-    after = frequencies(np.random.default_rng(2), targets, range(6), moved, [own[:, wanted] for own in wide])
-    assert after == before
-    assert any(0.0 < share < 1.0 for share in before.values())

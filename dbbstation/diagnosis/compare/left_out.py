@@ -11,18 +11,17 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import LEAST_PARTS, KnownGains, gains_of_tests, rows_of_groups
 from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.held_out import held_out
-from dbbstation.inference.hypotheses import search
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.read_off import Trial
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.held_out import HeldOut
-    from dbbstation.inference.model_comparison import Member, ModelComparison
+    from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
 
 
@@ -38,19 +37,11 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
 
 def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> KnownGains:
     """Return each cause's gain, and each class's; the reference is an unchanged machine."""
-    bank, kept = settled.bank, settled.channel.kept
-
-    def of_others() -> Iterator[ModelComparison]:
-        for rows in parts:
-            yield bank.beside(but_for=rows[kept]).comparison(np.where(rows[kept], 0.0, bank.target))
-
-    def choose(comparison: ModelComparison) -> Sequence[Member]:
-        return search(comparison, settled.causes, [settled.best.members], BOUNDS.expanded_of_table).best.members
 
     def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
         return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
 
-    return gains_of_tests(settled, parts, (settled.comparison, of_others()), choose, errors)
+    return gains_of_tests(settled, parts, errors, most_expanded=BOUNDS.expanded_of_table)
 
 
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     help="Standard uncertainty u of the calibrator's length (U/2).",
 )
 @click.option("--certified", required=True, metavar="YYYY-MM-DD", help="Date of the certificate.")
+@click.option("--valid-until", metavar="YYYY-MM-DD", help="Last day on which it holds  [default: five years].")
 @click.option("--certificate", default="", help="Number of the certificate, and who issued it.")
 @click.option("--temp-c", type=Finite(-30, 80), required=True, help="Temperature of the bar [degC].")
 @click.option(
@@ -72,6 +73,7 @@ def bar(
     calibrator_mm: float,
     calibrator_u_um: float,
     certified: str,
+    valid_until: str | None,
     certificate: str,
     temp_c: float,
     temp_u_k: float,
@@ -116,6 +118,7 @@ def bar(
             "length_mm": calibrator_mm,
             "uncertainty_um": calibrator_u_um,
             "certified": certified,
+            "valid_until": valid_until,
             "certificate": certificate,
         },
         instrument,
@@ -132,8 +135,8 @@ def bar(
     echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
     if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
         echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
-    if file.to_bar(None).certificate_wrong(datetime.now(UTC).date()):
-        echo(f"note: `measure` refuses a calibrator that was certified on {certified}", err=True)
+    if fault := file.to_bar(None).certificate_fault(datetime.now(UTC).date()):
+        echo(f"note: `measure` refuses this bar: {fault}", err=True)
     echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
 
 

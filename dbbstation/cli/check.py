@@ -161,7 +161,7 @@ def _file(result: Checked) -> CheckedFile:
     from dbbstation.results.checked import CheckedFile, CheckedRun
 
     runs = tuple(CheckedRun(one.run.label, tuple(one.findings)) for one in result.judgements)
-    return CheckedFile(str(result.path), result.kind, not result.problems, result.summary, runs or None)
+    return CheckedFile(str(result.path), result.kind, not result.problems, result.summary, runs or None, result.virtual)
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRunResult]) -> None:

@@ -67,7 +67,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
             )
             for run in repeats_in_order(read.runs)
         )
-        print_result(ListedSession(read.name, runs, tuple(missing)))
+        print_result(ListedSession(read.name, read.virtual, runs, tuple(missing)))
         return
     rows = [
         [

@@ -54,6 +54,7 @@ class Checked:
         kind: format; `run`, `drive`, or empty if unknown.
         summary: one line; empty if there are problems.
         judgements: of accepted and waiting runs of a session; else empty.
+        virtual: whether a session is of a virtual machine; None if unknown.
     """
 
     path: Path
@@ -62,6 +63,7 @@ class Checked:
     problems: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
     judgements: tuple[Judgement, ...] = ()
+    virtual: bool | None = None
 
 
 def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
@@ -255,6 +257,7 @@ def _session(checked: Checked) -> None:
     _judge(checked, session, wanted)
     _amended(checked, session)
     checked.summary = f"session: {_states(session)}; {_seal(session)}"
+    checked.virtual = session.virtual
     if session.virtual:
         note_virtual(session.name)
 

@@ -53,13 +53,22 @@ class Bar:
     calibrator_serial_number: str | None = None
     calibrator_certificate: str | None = None
     calibrator_certified: str | None = None
+    calibrator_valid_until: str | None = None
     ball_form_um: float | None = None
 
-    def certificate_wrong(self, day: date) -> bool:
-        """Return whether the calibrator's certificate is of later than a day, or too old on it."""
-        if self.calibrator_certified is None:
-            return False
-        return not timedelta(0) <= day - date.fromisoformat(self.calibrator_certified) <= LONGEST_CALIBRATOR
+    def certificate_fault(self, day: date) -> str:
+        """Return why the calibrator's certificate does not hold on a day, or an empty text.
+
+        A stated last day replaces the longest usual interval.
+        """
+        of, until = self.calibrator_certified, self.calibrator_valid_until
+        if until is not None and day > date.fromisoformat(until):
+            return f"the calibrator's certificate was valid until {until}"
+        if of is None or (until is not None and of <= day.isoformat()):
+            return ""
+        if timedelta(0) <= day - date.fromisoformat(of) <= LONGEST_CALIBRATOR:
+            return ""
+        return f"the calibrator was certified on {of}; without a stated last day its certificate holds for five years from then"
 
     def reads_long_mm(self, temp_c: float | None) -> tuple[float, float]:
         """Return the expected reading minus true distance, with standard uncertainty [mm].

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
+from dbbstation.files.recordings.anchors import impossible_day, sealed_at
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.event_log import CLOCK_S
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
 
 MOST_NAMED = 3
@@ -65,7 +68,21 @@ def _lacking(session: SessionFolder, job: str) -> list[str]:
         (any(run.started is None for run in accepted), "dates unknown"),
         (session.seal is None, "not sealed"),
     )
-    return [text for lacks, text in checks if lacks] + list(_dates(session))
+    return [text for lacks, text in checks if lacks] + list(_dates(session)) + _early(session)
+
+
+def _early(session: SessionFolder) -> list[str]:
+    """Return the first run that was sealed before it was measured."""
+    early = [run for run, after in sealed_after(session) if after < -timedelta(seconds=CLOCK_S)]
+    return [f"run {early[0].label} sealed before it was measured"] if early else []
+
+
+def sealed_after(session: SessionFolder) -> list[tuple[RunEntry, timedelta]]:
+    """Return accepted runs with the time from start to seal; a virtual machine has a clock of its own."""
+    at = {} if session.virtual or session.seal is None else sealed_at(session.folder)
+    runs = session.in_state(RunState.ACCEPTED) if at else ()
+    dated = [(run, run.started, at.get((run.test, run.direction.value, run.repeat))) for run in runs]
+    return [(run, sealed - began) for run, began, sealed in dated if began is not None and sealed is not None]
 
 
 def _dates(session: SessionFolder) -> Iterator[str]:
@@ -74,14 +91,13 @@ def _dates(session: SessionFolder) -> Iterator[str]:
     if not moments:
         return
     first, last, bar = min(moments), max(moments), session.bar
-    if last > datetime.now(UTC) + timedelta(days=1):
-        yield f"a run of {last:%Y-%m-%d}, which is still to come"
+    yield from (f"a run of {wrong}" for wrong in dict.fromkeys(map(impossible_day, (first, last))) if wrong)
     if bar is None:
         return
     if bar.calibrated is not None and not timedelta(0) <= first - bar.calibrated <= LONGEST_BAR:
         yield f"bar calibrated on {bar.calibrated:%Y-%m-%d}, runs of {first:%Y-%m-%d}"
-    if bar.certificate_wrong(first.date()):
-        yield f"calibrator certified on {bar.calibrator_certified}, runs of {first:%Y-%m-%d}"
+    if fault := bar.certificate_fault(first.date()):
+        yield f"{fault.removeprefix('the ').split(';')[0]}, runs of {first:%Y-%m-%d}"
 
 
 LONGEST_BAR = timedelta(days=366)

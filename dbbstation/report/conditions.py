@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.recordings.anchors import anchor_of
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.report.certificate import sealed_after
 from dbbstation.text.digits import to_its_place
 
 if TYPE_CHECKING:
@@ -58,9 +59,14 @@ def identity(session: SessionFolder) -> tuple[tuple[str, str], ...]:
             "seal",
             "none"
             if session.seal is None
-            else f"anchor {(anchor_of(session.seal) or 'none')[:ANCHOR_SHOWN]}, {len(session.amendments)} amendments",
+            else f"anchor {(anchor_of(session.seal) or 'none')[:ANCHOR_SHOWN]}, {len(session.amendments)} amendments{_late(session)}",
         ),
     )
+
+
+def _late(session: SessionFolder) -> str:
+    days = max((after.days for _, after in sealed_after(session)), default=0)
+    return f", {days} {'day' if days == 1 else 'days'} after the measurement" if days > 0 else ""
 
 
 ANCHOR_SHOWN = 16
@@ -101,7 +107,10 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
     at = "" if bar.temp_c is None else f", at {_degc(bar.temp_c)}"
     grows = _NOT_NOTED if bar.expansion_um_m_k is None else f"{bar.expansion_um_m_k:g} µm/(m K)"
     of = bar.calibrator_certificate or "certificate without number"
-    certified = f"{of} of {bar.calibrator_certified}" if bar.calibrator_certified else f"certificate {_NOT_NOTED}"
+    until = f", valid until {bar.calibrator_valid_until}" if bar.calibrator_valid_until else ""
+    certified = (
+        f"{of} of {bar.calibrator_certified}{until}" if bar.calibrator_certified else f"certificate {_NOT_NOTED}"
+    )
     form = "" if bar.ball_form_um is None else f", form of its ball {bar.ball_form_um:g} µm"
     return (
         ("bar", (bar.serial_number or _NOT_NOTED) + form),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import BudgetTerm
@@ -122,6 +123,7 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
     return ReportContent(
         machine=found.sessions[0].machine.name,
         number=hashlib.sha256(provenance.text().encode()).hexdigest()[:NUMBER_DIGITS].upper(),
+        issued=datetime.now().astimezone().date(),
         virtual=[session.name for session in found.sessions if session.virtual],
         job=reported.job or found.sessions[0].job,
         sessions=list(_sessions(reported, bad)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from datetime import date
 from pathlib import Path
 
 from dbbstation.errors import StationError
@@ -51,8 +50,7 @@ def printed(html: bytes, browser: str) -> bytes:
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, out = Path(folder) / "report.html", Path(folder) / "report.pdf"
-        issued = f'<style>@page {{ @top-right {{ content: "issued {date.today()}"; font: 8pt sans-serif; }} }}</style>'  # noqa: DTZ011 - of the shop
-        page.write_bytes(html.replace(b"</head>", issued.encode() + b"</head>", 1))
+        page.write_bytes(html)
         command = [
             browser,
             "--headless",

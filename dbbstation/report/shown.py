@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from datetime import date
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.quality.finding import Finding
@@ -74,6 +75,7 @@ class ReportContent:
 
     Attributes:
         number: of the report, by program, command and inputs.
+        issued: day on which it was written, where it was written.
         before_name: earlier session; may be empty.
         files: name and SHA-256 of every underlying file.
         logo: address of the picture with its content; may be empty.
@@ -81,6 +83,7 @@ class ReportContent:
 
     machine: str
     number: str
+    issued: date
     virtual: Sequence[str]
     job: str
     sessions: Sequence[ShownSession]

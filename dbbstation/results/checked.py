@@ -25,6 +25,7 @@ class CheckedFile:
 
     Attributes:
         runs: judged ones of a session; else absent.
+        virtual: whether a session is of a virtual machine; absent where nothing says it.
     """
 
     file: str
@@ -32,6 +33,7 @@ class CheckedFile:
     ok: bool
     summary: str
     runs: Annotated[tuple[CheckedRun, ...] | None, Absent] = None
+    virtual: Annotated[bool | None, Absent] = None
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,14 @@ class ListedRun:
 
 @dataclass(frozen=True)
 class ListedSession:
-    """The runs of a session."""
+    """The runs of a session.
+
+    Attributes:
+        virtual: whether of a virtual machine; None where nothing says it.
+    """
 
     session: str
+    virtual: bool | None
     runs: tuple[ListedRun, ...]
     missing: tuple[str, ...]
 

@@ -34,6 +34,7 @@ class Stated:
     calibrator_u_um: float
     certified: str
     temp_c: float
+    valid_until: str = ""
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ class BarCalibration:
                     "length_mm": stated.calibrator_mm,
                     "uncertainty_um": stated.calibrator_u_um,
                     "certified": stated.certified,
+                    "valid_until": stated.valid_until or None,
                 },
                 self._line.protocol.name,
                 datetime.now(UTC),

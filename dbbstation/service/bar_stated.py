@@ -29,8 +29,8 @@ def fault_of(
     name: str, text: str, reads_mm: float | None = None, stroke_mm: float | None = None, today: date | None = None
 ) -> str:
     """Return the fault of a typed text, or an empty text."""
-    if name == "certified":
-        return _fault_of_day(text, today or datetime.now().astimezone().date())
+    if name == "certified" or (name == "valid_until" and text):
+        return _fault_of_day(name, text, today or datetime.now().astimezone().date())
     if name not in _RANGES:
         return ""
     try:
@@ -56,11 +56,17 @@ def doubt_of(name: str, text: str, today: date | None = None) -> str:
     return f"the certificate of {text} is {int(years)} years old: is that the date on it, and does it still hold?"
 
 
-def _fault_of_day(text: str, today: date) -> str:
+def _fault_of_day(name: str, text: str, today: date) -> str:
     try:
         day = date.fromisoformat(text)
     except ValueError:
         return f"`{text}` is no date, expected such as 2026-11-20"
+    if name == "valid_until":
+        return (
+            f"the certificate was valid until {text} only: the calibrator has to be certified anew"
+            if day < today
+            else ""
+        )
     return f"the certificate of {text} is of the future" if day > today else ""
 
 

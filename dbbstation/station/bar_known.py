@@ -23,7 +23,7 @@ _REMEDY = (
 
 
 def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: float = USUAL_AGE_H) -> None:
-    """Refuse a plan with balls at known places if the bar's length is unknown or stale.
+    """Refuse a calibrator whose certificate does not hold, and for balls at known places an unknown or stale length of the bar.
 
     An error of the bar's length is an error of the machine's scale. Balls under the spindle and circularity alone need no
     length.
@@ -34,9 +34,12 @@ def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: f
     Raises:
         InputError: what is wrong with the bar, and what to do.
     """
-    if not any(test.ball.place_known for test in plan.tests.values()):
+    places = any(test.ball.place_known for test in plan.tests.values())
+    if bar is not None and (fault := bar.certificate_fault(now.date())):
+        what = fault
+    elif not places:
         return
-    if bar is None or bar.reading_mm is None or bar.calibrated is None:
+    elif bar is None or bar.reading_mm is None or bar.calibrated is None:
         what = (
             "nobody has read the bar on its calibrator, and the plan has balls at known places, which need its length"
         )
@@ -44,8 +47,6 @@ def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: f
         what = f"the bar's calibration is of the future, {bar.calibrated:%Y-%m-%d %H:%M %Z}: a clock was wrong"
     elif (age_h := (now - bar.calibrated) / timedelta(hours=1)) > largest_age_h:
         what = f"the bar was last on its calibrator {age_h:.0f} h ago, {largest_age_h:g} h are allowed"
-    elif bar.certificate_wrong(now.date()):
-        what = f"the calibrator of the bar was certified on {bar.calibrator_certified}; five years at most are taken"
     else:
         return
     raise InputError([Problem("bar", 0, 0, what, _REMEDY)])

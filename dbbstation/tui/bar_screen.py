@@ -142,12 +142,14 @@ class BarScreen(RowScreen):
         return None if reading is None or reading.status == DOUBTFUL else reading.length_mm
 
     def _missing(self) -> list[str]:
-        return [name for name, value in self._values.items() if not value]
+        return [name for name, value in self._values.items() if not value and name not in texts.BAR_MAY_BE_EMPTY]
 
     def _show(self) -> None:
         self.put(
             [
-                Content.assemble(f"{'·' if self._values[name] else '!'} {title:{_NAME}} ", (self._values[name], "bold"))
+                Content.assemble(
+                    f"{'!' if name in self._missing() else '·'} {title:{_NAME}} ", (self._values[name], "bold")
+                )
                 for name, title in texts.BAR_ROWS.items()
             ]
         )

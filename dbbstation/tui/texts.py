@@ -233,8 +233,10 @@ BAR_ROWS: Mapping[str, str] = {
     "calibrator_mm": "its length at 20 °C [mm]",
     "calibrator_u_um": "its standard uncertainty [µm]",
     "certified": "certified, YYYY-MM-DD",
+    "valid_until": "valid until, may stay empty",
     "temp_c": "temperature of the bar [°C]",
 }
+BAR_MAY_BE_EMPTY = {"valid_until"}
 BAR_MISSING = "Still missing: {rows}. Enter changes a row."
 BAR_READY = "Put the bar on the calibrator, wait until it is as warm as the shop; then B reads it."
 BAR_NO_NUMBER = "{row}: `{text}` is no number."

@@ -59,7 +59,12 @@ def test_a_date_that_may_be_two_is_refused_with_its_line(run, tmp_path):
     assert done.code == FAILED
     assert "old.csv:2" in done.err
     assert "--started" in done.err
-    assert imported(run, file, tmp_path / "s", "--started", "2026-12-11T08:00Z").code == DONE
+    for day, why in (("2096-11-12", "which is still to come"), ("1970-01-01", "before there were ball bars")):
+        done = imported(run, file, tmp_path / "s", "--started", f"{day}T08:00Z")
+        assert done.code == FAILED
+        assert f"this run is of {day}, {why}" in done.err
+        assert not (tmp_path / "s").exists()
+    assert imported(run, file, tmp_path / "s", "--started", "2026-11-12T08:00Z").code == DONE
 
 
 def test_a_zone_that_nobody_says_is_said_to_be_the_computers(run, tmp_path):

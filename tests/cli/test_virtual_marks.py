@@ -29,6 +29,8 @@ def test_what_comes_from_a_virtual_session_says_so(tmp_path: Path) -> None:
     told = call("circles", session)
     assert "VIRTUAL MACHINE: virtual" in told.err
     assert json.loads(call("circles", session, "--json").out)["provenance"]["virtual"] == ["virtual"]
+    assert json.loads(call("check", session, "--json").out)["files"][0]["virtual"] is True
+    assert json.loads(call("session", "list", session, "--json").out)["virtual"] is True
     figure = tmp_path / "circle.svg"
     assert call("plot", session, "--out", figure).code == 0
     assert figure.read_text("utf-8").count("VIRTUAL MACHINE") >= 1

@@ -25,6 +25,9 @@ TODAY = date(2026, 11, 24)
         ("certified", "2026-03-01", ""),
         ("certified", "1.3.2026", "is no date"),
         ("certified", "2027-03-01", "is of the future"),
+        ("valid_until", "2027-03-01", ""),
+        ("valid_until", "", ""),
+        ("valid_until", "2026-11-23", "was valid until 2026-11-23 only"),
         ("serial_number", "anything", ""),
     ],
 )

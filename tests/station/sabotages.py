@@ -41,7 +41,7 @@ from dbbstation.sources.registry import known_sources
 from dbbstation.station import events
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Accept, Quit, Repeat, Start
-from dbbstation.station.states import State
+from dbbstation.station.states import RECORDING, State
 from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.machine import VirtualMachine, VirtualRun
 from dbbstation.virtual.path import circle_path
@@ -339,7 +339,7 @@ class _DirectCell:
                 continue
             length_mm = made.length_mm_at(t_s) + shop.virtual.noise_mm()
             shop.readings.append(Reading(shop.now_s + BEFORE_S + t_s, length_mm, lost=lost))
-            lost = 0
+            lost, shop.rest_mm = 0, length_mm
         shop.cut_at_s = None
         shop.now_s += made.path.duration_s + 5.0 * BEFORE_S
 
@@ -350,12 +350,17 @@ class DirectShop(Shop):
     def __init__(self, case: Case) -> None:
         super().__init__(case)
         self.readings: list[Reading] = []
-        self.now_s = 0.0
+        self.now_s, self.rest_mm = 0.0, 0.0
         self.cell = _DirectCell(self)
         self.clock = _Clock(self)
 
     def drain(self) -> list[Reading]:
+        """Return what the run became; behind it the bar stands, as long as the station waits for its feed-out."""
         readings, self.readings = self.readings, []
+        if not readings and self._workplace.station.state in RECORDING:
+            steps = range(1, round(RATE_HZ) + 1)
+            readings = [Reading(self.now_s + k / RATE_HZ, self.rest_mm + self.virtual.noise_mm()) for k in steps]
+            self.now_s = readings[-1].t_s
         return readings
 
     def measure(self, folder: Path) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -27,6 +28,9 @@ from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 from tests.station.bench import MACHINE_FILE, SHORT_PLAN, bench
+
+if TYPE_CHECKING:
+    from dbbstation.plan.plan import Plan
 
 NOW = datetime(2026, 11, 20, 8, 0, tzinfo=UTC)
 BAR = Bar("DBB-0042", 150.0003, 0.0003, NOW, 20.0, 10.0, 10.0, 150.0023, 0.3, "ZB-17")
@@ -49,7 +53,7 @@ def test_the_bar_is_read_from_an_instrument_and_kept(tmp_path: Path) -> None:
             "bar", "--instrument", "streaming-encoder", "--port", wire.port, *CALIBRATOR, "--certified", "2012-03-02",
             "--out", tmp_path / "old.yaml",
         )  # fmt: skip
-    assert "`measure` refuses a calibrator that was certified on 2012-03-02" in old.err
+    assert "`measure` refuses this bar: the calibrator was certified on 2012-03-02" in old.err
     assert "refuses" not in told.err
     assert told.code == 0, told.err
     bar = read_bar(out)
@@ -108,8 +112,6 @@ def test_a_display_that_was_not_preset_is_refused_by_the_file(tmp_path: Path) ->
         (replace(BAR, calibrated=NOW - timedelta(hours=25)), "on its calibrator 25 h ago, 24 h are allowed"),
         (replace(BAR, calibrated=NOW + timedelta(hours=1)), "of the future"),
         (replace(BAR, calibrated=NOW.replace(year=1996)), "262968 h ago"),  # 30 years, of which 7 leap years
-        (replace(BAR, calibrator_certified="2012-03-02"), "certified on 2012-03-02; five years at most"),
-        (replace(BAR, calibrator_certified="2096-03-02"), "certified on 2096-03-02"),
     ],
 )
 def test_places_on_a_plate_need_a_bar_that_was_read_lately(bar: Bar | None, why: str) -> None:
@@ -117,6 +119,28 @@ def test_places_on_a_plate_need_a_bar_that_was_read_lately(bar: Bar | None, why:
         check_bar_known(bar, PLATE, NOW)
     check_bar_known(bar, UNDER_SPINDLE, NOW)
     check_bar_known(BAR, PLATE, NOW)
+
+
+@pytest.mark.parametrize(
+    ("certified", "valid_until", "why"),
+    [
+        ("2012-03-02", None, "certified on 2012-03-02; without a stated last day its certificate holds for five years"),
+        ("2012-03-02", "2096-03-02", ""),
+        ("2096-03-02", None, "certified on 2096-03-02"),
+        ("2026-03-02", "2026-11-18", "valid until 2026-11-18"),
+        ("2026-03-02", f"{NOW:%Y-%m-%d}", ""),
+    ],
+)
+@pytest.mark.parametrize("plan", [PLATE, UNDER_SPINDLE])
+def test_a_calibrator_whose_certificate_does_not_hold_is_refused(
+    plan: Plan, certified: str, valid_until: str | None, why: str
+) -> None:
+    bar = replace(BAR, calibrator_certified=certified, calibrator_valid_until=valid_until)
+    if not why:
+        check_bar_known(bar, plan, NOW)
+        return
+    with pytest.raises(InputError, match=why):
+        check_bar_known(bar, plan, NOW)
 
 
 @pytest.mark.parametrize("option", ["--operator", "--job", "--serial-number"])

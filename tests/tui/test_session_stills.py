@@ -150,7 +150,7 @@ def prepare_in_turn(app: StationApp) -> RowScreen:
 
 def bar(_app: StationApp) -> RowScreen:
     screen = BarScreen(front(), DISPLAY, lambda _path: None)
-    values = dict(zip(texts.BAR_ROWS, ("DBB-0042", "ZB-17", "150.0003", "0.25", "2026-03-01", "20.3"), strict=True))
+    values = dict(zip(texts.BAR_ROWS, ("DBB-0042", "ZB-17", "150.0003", "0.25", "2026-03-01", "", "20.3"), strict=True))
     screen._values = values
     screen._reopen = lambda: setattr(screen, "_calibration", StillCalibration())
     return screen

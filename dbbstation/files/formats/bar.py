@@ -30,6 +30,8 @@ class CalibratorSchema(Schema):
     """Standard uncertainty of that length: half of a certificate's U (k = 2) [µm]."""
     certified: Day
     """Date of the certificate."""
+    valid_until: Day | None = None
+    """Last day on which it holds."""
     certificate: str = ""
     """Its number and who issued it."""
     expansion_um_m_k: ExpansionUmMK = 0.0
@@ -112,6 +114,7 @@ class BarFile(Schema):
             calibrator_serial_number=self.calibrator.serial_number,
             calibrator_certificate=self.calibrator.certificate or None,
             calibrator_certified=self.calibrator.certified,
+            calibrator_valid_until=self.calibrator.valid_until,
             ball_form_um=self.ball_form_um,
         )
 

@@ -78,6 +78,8 @@ class BarSchema(Schema):
     """Number of its certificate and who issued it."""
     calibrator_certified: Day | None = None
     """Date of its certificate."""
+    calibrator_valid_until: Day | None = None
+    """Last day on which it holds."""
     ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
     """Largest deviation of the bar's ball from a sphere by its certificate [µm]."""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
-from dbbstation.files.recordings.event_log import read_event_log
+from dbbstation.files.recordings.event_log import read_event_log, run_key
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,6 +26,27 @@ def links_of(folder: Path) -> tuple[str, ...]:
     """Return every anchor that a session has had, by its files."""
     log = read_event_log(folder, [])
     return () if log is None else log.links
+
+
+def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
+    """Return when each run was sealed, by test, direction and repeat; without what the event log does not date."""
+    log, found = read_event_log(folder, []), dict[tuple[str, str, int], datetime]()
+    for event in () if log is None else log.events:
+        for run in (*event.runs, *(event.all_runs or ())):
+            if event.at is not None and run.get("chain_sha256"):
+                found.setdefault(run_key(run), event.at)
+    return found
+
+
+def impossible_day(at: datetime) -> str:
+    """Return a run's day and why it cannot be that one, or an empty text."""
+    if at > datetime.now(UTC) + timedelta(days=1):  # zones differ by up to 26 hours
+        return f"{at:%Y-%m-%d}, which is still to come"
+    return f"{at:%Y-%m-%d}, before there were ball bars" if at.year < FIRST_BARS else ""
+
+
+FIRST_BARS = 1982
+"""Year of the first paper on the magnetic ball bar [Bryan 1982]; zero of a clock is 1970, of a table 1900."""
 
 
 def anchor_told(folder: Path, anchor: str) -> Problem:

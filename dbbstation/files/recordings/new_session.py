@@ -72,8 +72,9 @@ def write_session(
     runs: Sequence[FinishedRun],
     details: SessionDetails | None = None,
     more: Mapping[str, str | bytes] | None = None,
+    at: datetime | None = None,
 ) -> None:
-    """Write a whole session at once, all or nothing.
+    """Write a whole session at once, all or nothing; `at` as of `make_session_folder`.
 
     Raises:
         OutputError: the folder exists, lies in another session, or cannot be written.
@@ -102,7 +103,7 @@ def write_session(
             centre_mm=None,
         )
         entries.append(entry)
-    make_session_folder(folder, machine, plan, details or SessionDetails(), entries, files)
+    make_session_folder(folder, machine, plan, details or SessionDetails(), entries, files, at)
 
 
 def make_session_folder(

@@ -11,6 +11,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.gateway import digest_of
+from dbbstation.files.recordings.anchors import impossible_day
 from dbbstation.files.recordings.entries import run_entry
 from dbbstation.files.recordings.event_log import read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
@@ -113,6 +114,15 @@ def sealing(folder: Path) -> Sealing:
         raise InputError(faults)
     hashed, files = _with_hashes(text, path)
     runs, seal, log = _chain(hashed, path)
+    faults += [
+        Problem(str(path), 0, 0, f"run {run.label} is of {wrong}: it is not sealed", "set its date right")
+        for run in runs
+        if run.started is not None
+        and not (run.instrument and run.instrument.virtual)
+        and (wrong := impossible_day(run.started))
+    ]
+    if faults:
+        raise InputError(faults)
     whole, linked = _with_links(hashed, path, runs)
     spoilt = [copy for copy, digest in _copies(seal).items() if hashes(path.parent, (copy,)).get(copy) != digest]
     return Sealing(path, whole, files, linked, seal, text, log is not None and bool(log.events), tuple(spoilt))

@@ -26,6 +26,7 @@ from dbbstation.files.formats.mapping import (
     UNITS,
     in_run_units,
 )
+from dbbstation.files.recordings.anchors import impossible_day
 from dbbstation.files.recordings.entries import RunState, count_in
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
@@ -350,6 +351,16 @@ class Reader:
         return RunState(text) if text in _STATES else RunState.ACCEPTED
 
     def _started(
+        self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
+    ) -> datetime | None:
+        at = self._stated_start(table, rows, said, computed)
+        wrong = "" if at is None else impossible_day(at)
+        if wrong:
+            remedy = "say the right one, such as --started FILE=2026-11-20T08:04:11+01:00, and check the clock of what recorded it"
+            self._fault(table.table.file, int(table.table.lines[rows[0]]), f"this run is of {wrong}", remedy)
+        return at
+
+    def _stated_start(
         self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
     ) -> datetime | None:
         later = timedelta(seconds=self._later_s(table, rows))

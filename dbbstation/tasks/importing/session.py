@@ -6,6 +6,7 @@ import json
 import tempfile
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,7 +81,7 @@ def staged(
         raise OutputError(f"cannot be written: {error.strerror}", where=str(folder), remedy="check the disk") from error
     try:
         written = made / folder.name
-        write_session(written, machine, plan, [one.run for one in runs], details, more)
+        write_session(written, machine, plan, [one.run for one in runs], details, more, datetime.now(UTC))
         _try_out(written, runs)
 
         def put() -> None:

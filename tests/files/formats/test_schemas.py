@@ -73,7 +73,12 @@ def test_the_json_schema_is_plain_json_and_closed(name: str) -> None:
 
 
 SHOWN_BESIDE = {
-    ("dbb-session/1", "bar"): {"calibrator_certificate", "calibrator_certified", "ball_form_um"},
+    ("dbb-session/1", "bar"): {
+        "calibrator_certificate",
+        "calibrator_certified",
+        "calibrator_valid_until",
+        "ball_form_um",
+    },
     ("dbb-model/1", "provenance"): {"virtual"},
 }
 """Keys that the example of a bar shows, and one that would call an example computed."""

@@ -272,6 +272,15 @@ def test_sealing_begins_a_log_and_leaves_the_text_as_it_is(tmp_path: Path) -> No
     assert sound(folder)
 
 
+def test_a_run_of_the_future_is_not_sealed(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(SESSIONS / "small", tmp_path / "small"))
+    file = folder / "session.yaml"
+    file.write_text(re.sub(r"started: \d{4}", "started: 2096", file.read_text("utf-8"), count=1), "utf-8")
+    refused = call("session", "seal", folder)
+    assert refused.code == FAILED
+    assert re.search(r"is of 2096-\d\d-\d\d, which is still to come: it is not sealed", refused.err)
+
+
 def test_readings_that_are_written_in_are_no_change_and_those_that_are_changed_are(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(SESSIONS / "under-spindle", tmp_path / "session"))
     entry = re.search(r"  - \{test: g, mounting: 2, fixed.*\n", (folder / "session.yaml").read_text())[0]

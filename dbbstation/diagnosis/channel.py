@@ -24,6 +24,8 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.triangle import axes_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -46,6 +48,9 @@ SETUP_ODDS = float(np.log(0.01 / 0.99))
 
 SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 """Random effects of the base that may be far larger than stated."""
+
+SEEN = 1e-5
+"""Relative singular value of machine parameters below which a direction is not identifiable and takes up nothing."""
 
 OUTSIZE = 20.0
 """Size of such an effect in units of the stated one, one standard deviation."""
@@ -191,6 +196,15 @@ class CircleChannel:
             touched = np.flatnonzero(samples.any(axis=0))
             found.append(compress(every[touched], samples[:, touched], target[rows]))
         return found
+
+    def unconcealed(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what identifiable machine parameters leave of an effect, unweighted, shape (n,)."""
+        return np.asarray(effect - self._of_parameters @ (self._of_parameters.T @ effect))
+
+    @cached_property
+    def _of_parameters(self) -> NDArray[np.float64]:
+        machine = np.flatnonzero(~self.base.random)
+        return axes_of(self.columns.base[:, machine] @ free_directions(self.base, machine, self.held), SEEN)
 
     def refine(self, name: str, law: str, values: Mapping[str, NDArray[np.float64]], fit: Calibration) -> None:
         """Lay out a cause at parameter values, with tangents and slack."""

@@ -14,10 +14,9 @@ import numpy as np
 from dbbstation.diagnosis.findings import Curve, CurvePoint
 from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, TOWARDS, UNITS
 from dbbstation.diagnosis.unmodelled import EACH
-from dbbstation.inference.concealment import concealment
 from dbbstation.inference.forms import LinearSplines, Plane, PlaneStep, Walk
 from dbbstation.inference.model_comparison import Member
-from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,10 +75,7 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
     spread = found.covariance[np.ix_(rows, rows)]
     values, covariance = to_points @ amplitudes, to_points @ spread @ to_points.T
     covariance = covariance + np.eye(len(at)) * _not_followed(settled, together) * np.mean(values**2)
-    known, machine = channel.base, np.flatnonzero(~channel.base.random)
-    free = free_directions(known, machine, channel.held)
-    blocks = channel.blocks(columns, np.zeros(channel.runs[-1].stop))
-    signature = concealment(blocks, machine, len(known.prior) + np.arange(len(columns)), amplitudes, free)
+    effect = channel.columns.of(columns) @ amplitudes
     alone = len(own) == 1
     alike = len({each[k].kind for k in own}) == 1
     return Curve(
@@ -90,8 +86,8 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
         period=shape.period if alone else None,
         direction=pieces[0].direction,
         convention=", ".join(dict.fromkeys(piece.words for piece in pieces if piece.words)),
-        readings_um=1e3 * signature.whole_rms,
-        unconcealed_um=1e3 * signature.rest_rms,
+        readings_um=1e3 * rms(effect),
+        unconcealed_um=1e3 * rms(channel.unconcealed(effect)),
         points=tuple(
             CurvePoint(float(x), 1e3 * float(value), 1e3 * float(np.sqrt(max(variance, 0.0))))
             for x, value, variance in zip(at, values, np.diag(covariance), strict=True)

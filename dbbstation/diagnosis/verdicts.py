@@ -10,11 +10,9 @@ import numpy as np
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.inference.alternatives import standing_out
-from dbbstation.inference.concealment import concealment
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
-from dbbstation.inference.read_off import CauseJudge, Trial
-from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.read_off import CauseJudge, Trial, concealed
 from dbbstation.inference.verdict import OUT, SURE
 
 if TYPE_CHECKING:
@@ -50,10 +48,6 @@ class _CircleJudge(CauseJudge):
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
         # A method of this would keep it, and all columns, alive in a ring.
         super().__init__(outcome, Trial(anew), levels, partial(form_uncertainty, explained.channel.sources))
-        shown = [self._members.get(name) or self._beside[name][1] for name in self._named]
-        # One compression of all runs serves the signatures of all causes.
-        self._columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in shown)]))
-        self._blocks = self._circles.blocks(self._columns, np.zeros(self._circles.runs[-1].stop))
 
     def findings(self) -> tuple[SourceFinding, ...]:
         """Return all findings."""
@@ -123,16 +117,10 @@ class _CircleJudge(CauseJudge):
         self, shown: Member, effect: NDArray[np.float64], values: NDArray[np.float64]
     ) -> tuple[float, float, float]:
         """Return an effect's rms, as found or plausible, its unconcealed rms [mm], and the concealed share."""
-        del effect
         columns = shown.variant.columns
-        found = shown.cause.name in self._members
-        base = self._circles.base
-        machine = np.flatnonzero(~base.random)
-        free = free_directions(base, machine, self._circles.held)
-        own = len(base.prior) + np.searchsorted(self._columns, columns)
-        amplitudes = values[: len(columns)] if found else shown.variant.plausible
-        one = concealment(self._blocks, machine, own, amplitudes, free)
-        return one.whole_rms, one.rest_rms, one.share
+        amplitudes = values[: len(columns)] if shown.cause.name in self._members else shown.variant.plausible
+        effect = self._circles.columns.of(columns) @ amplitudes
+        return concealed(effect, self._circles.unconcealed(effect))
 
     def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
         unseen_at = self._unseen_points(cause)

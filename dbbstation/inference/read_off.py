@@ -365,11 +365,15 @@ class CauseJudge:
     ) -> tuple[float, float, float]:
         """Return an effect's rms, its rms beyond the base, and the absorbed share."""
         kept = effect[self._settled.channel.kept]
-        whole = rms(kept - kept.mean())
         fitted = self._settled.bank.base_values(-effect) - self._without
-        rest = rms(kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept])
-        share = 1.0 - (rest / whole) ** 2 if whole > 0.0 else 0.0
-        return whole, rest, float(np.clip(share, 0.0, 1.0))
+        rest = kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept]
+        return concealed(kept - kept.mean(), rest)
+
+
+def concealed(effect: NDArray[np.float64], rest: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return the rms of an effect and of the rest that fitted parameters leave, and the share of squares that they take."""
+    whole, left = rms(effect), rms(rest)
+    return whole, left, float(np.clip(1.0 - (left / whole) ** 2 if whole > 0.0 else 0.0, 0.0, 1.0))
 
 
 def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:

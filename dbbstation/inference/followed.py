@@ -332,15 +332,16 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
     return ClassGain(DensityGains(tuple(brought), counts), float(np.sqrt(before / mean)), float(np.sqrt(after / mean)))
 
 
-def left_without(one: Settled, names: Collection[str]) -> NDArray[np.float64]:
-    """Return the residual without some members, others refitted, shape (n,)."""
-    if not names:
-        return np.asarray(one.channel.residual - one.predicted())
-    effect = np.zeros(len(one.channel.residual))
-    if rest := one.best.without(*names):
-        samples = np.hstack([one.bank.samples(member.columns) for member in rest])
-        effect = samples @ one.comparison.estimates(rest).values
-    return np.asarray(one.channel.residual - effect - one.channel.base.samples @ one.base_values(effect))
+def left_without(one: Settled, names: Collection[str], unseen: Collection[str] = ()) -> NDArray[np.float64]:
+    """Return the residual without some members, others refitted, shape (n,).
+
+    Args:
+        unseen: members that are fitted, and take no part in the prediction.
+    """
+    rest = one.best.without(*names)
+    effect = one.effect(members=rest)
+    shown = one.effect({m.cause.name for m in rest} - set(unseen), rest) if unseen else effect
+    return np.asarray(one.channel.residual - shown - one.channel.base.samples @ one.base_values(effect))
 
 
 def log_density(one: Settled, rows: NDArray[np.bool_], left: NDArray[np.float64]) -> float:

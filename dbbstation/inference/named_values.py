@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.channel import Law
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
 
@@ -24,22 +25,10 @@ def named_values(
     settled: Settled, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
 ) -> dict[str, Value]:
     """Return amplitudes and nonlinear parameters, slack included in uncertainty."""
-    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    width = len(member.variant.columns)
     law = settled.bank.laws.get(member.cause.name)
     if law is not None:
-        found = {
-            law.parameters[j]: Value(
-                float(values[k]), float(np.hypot(sigma[k], law.form_uncertainty * values[k])), law.units[j]
-            )
-            for k, j in enumerate(amplitudes_of(member.variant).tolist())
-        }
-        per, every = growth(member, values), len(law.plausible)
-        shaped = moved(law, member, values, per)
-        for k, name in enumerate(law.parameters[every:]):
-            known = len(member.variant.slack) > k
-            found[name] = Value(shaped[k], float(sigma[width + k] / per) if known else np.nan, law.units[every + k])
-        return found
+        return values_of_law(law, member, values, covariance, law.form_uncertainty)
+    sigma, width = np.sqrt(np.maximum(np.diag(covariance), 0.0)), len(member.variant.columns)
     pattern = settled.bank.patterns[member.cause.name]
     unit = settled.channel.unit
     if len(pattern.per) < width:
@@ -50,6 +39,23 @@ def named_values(
         name: Value(float(values[k] / pattern.per[k]), float(sigma[k] / pattern.per[k]), _unit(unit, pattern.units[k]))
         for k, name in enumerate(names)
     }
+
+
+def values_of_law(
+    law: Law, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64], share: float
+) -> dict[str, Value]:
+    """Return amplitudes, uncertain by at least a share of themselves, and nonlinear numbers, NaN if not laid out."""
+    sigma, width, every = np.sqrt(np.diag(covariance).clip(0.0)), len(member.variant.columns), len(law.plausible)
+    found = {
+        law.parameters[j]: Value(float(values[k]), float(np.hypot(sigma[k], share * values[k])), law.units[j])
+        for k, j in enumerate(amplitudes_of(member.variant).tolist())
+    }
+    per = growth(member, values)
+    shaped = moved(law, member, values, per)
+    for k, name in enumerate(law.parameters[every:]):
+        known = len(member.variant.slack) > k
+        found[name] = Value(shaped[k], float(sigma[width + k] / per) if known else np.nan, law.units[every + k])
+    return found
 
 
 def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
-    from dbbstation.inference.model_comparison import Cause, ModelComparison
+    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
 
 
 class Beginning(Enum):
@@ -59,11 +59,17 @@ class Settled:
         """Return the most probable hypothesis."""
         return self.posterior.best
 
-    def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
-        """Return best members' effect over all rows, in the residual's unit, shape (n,)."""
-        total = np.zeros(len(self.channel.residual))
-        values = self.comparison.estimates(self.best.members).values if self.best.members else np.zeros(0)
-        for member in self.best.members:
+    def effect(
+        self, names: Collection[str] | None = None, members: Sequence[Member] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the effect of some members over all rows, in the residual's unit, shape (n,).
+
+        Args:
+            members: that are fitted together; None: the best ones.
+        """
+        total, members = np.zeros(len(self.channel.residual)), self.best.members if members is None else members
+        values = self.comparison.estimates(members).values if members else np.zeros(0)
+        for member in members:
             own, values = values[: len(member.columns)], values[len(member.columns) :]
             if names is None or member.cause.name in names:
                 total += self.bank.samples(member.columns) @ own

@@ -13,7 +13,7 @@ from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.impossible import NEGATIVE_SIGMA
-from dbbstation.inference.settle import growth, moved
+from dbbstation.inference.named_values import values_of_law
 from dbbstation.inference.triangle import RANK, triangle_of
 from dbbstation.inference.verdict import OUT
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.channel import DriveChannel
+    from dbbstation.inference.channel import Law
     from dbbstation.inference.hypotheses import Hypothesis
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
@@ -67,34 +68,22 @@ class DriveFit:
         """Return a member by cause."""
         return next(member for member in self.members if member.cause.name == name)
 
+    def _law(self, name: str) -> Law:
+        return next(law for law in self.drive.channel.laws if law.name == name)
+
     def parameters(self, name: str) -> dict[str, Value]:
-        """Return a law's amplitudes and further numbers."""
-        member, own = self.member(name), self.columns_of(name)
-        _, form = self.drive.of_law[name]
-        law = next(law for law in self.drive.channel.laws if law.name == name)
-        every = slice(own.start, own.start + len(member.columns))
-        sigma = np.sqrt(np.diag(self.covariance))[every]
-        values = self.values[every]
-        width = len(form.amplitudes)
-        found = {
-            p.name: Value(float(values[k]), float(np.hypot(sigma[k], METHOD_U_SHARE * values[k])), p.unit)
-            for k, p in enumerate(form.amplitudes)
-        }
-        per = growth(member, values)
-        shaped = moved(law, member, values, per)
-        for k, p in enumerate(form.shapes):
-            laid_out = len(member.variant.slack) > k
-            u = float(sigma[width + k] / per) if laid_out else float(law.grids[k][-1])
-            found[p.name] = Value(shaped[k], u, p.unit)
-        return found
+        """Return a law's amplitudes and further numbers; one that is not laid out is as uncertain as its grid is long."""
+        member, law, start = self.member(name), self._law(name), self.columns_of(name).start
+        own = slice(start, start + len(member.columns))
+        found = values_of_law(law, member, self.values[own], self.covariance[own, own], METHOD_U_SHARE)
+        ends = dict(zip(law.parameters[len(law.plausible) :], (grid[-1] for grid in law.grids), strict=True))
+        return {n: v if np.isfinite(v.uncertainty) else replace(v, uncertainty=ends[n]) for n, v in found.items()}
 
     def at_end(self, name: str) -> dict[str, tuple[float, float]]:
         """Return a law's numbers at grid ends, with these ends."""
-        law = next(law for law in self.drive.channel.laws if law.name == name)
-        _, form = self.drive.of_law[name]
-        found = self.parameters(name)
-        grids = {p.name: law.grids[k] for k, p in enumerate(form.shapes)}
-        ends = {shape: (grid[0], grid[-1]) for shape, grid in grids.items() if len(grid) > 1}
+        law, found = self._law(name), self.parameters(name)
+        grids = zip(law.parameters[len(law.plausible) :], law.grids, strict=True)
+        ends = {shape: (grid[0], grid[-1]) for shape, grid in grids if len(grid) > 1}
         return {k: (low, high) for k, (low, high) in ends.items() if not low < found[k].value < high}
 
     def all_values(self) -> dict[str, float]:
@@ -137,28 +126,6 @@ def fit(
     white = bank.whitened(np.column_stack([samples, channel.residual]))[rows]
     values, covariance = _solved(white, _prior_sd(drive, members), settled.noise.innovation)
     return DriveFit(drive, tuple(members), samples, values, covariance)
-
-
-class RowsKept:
-    """Base and members over kept rows, some fitted at a time."""
-
-    def __init__(self, drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> None:
-        channel, bank = drive.channel, settled.bank
-        self._drive, self._members, self._noise = drive, tuple(members), settled.noise.innovation
-        self._samples = np.hstack([channel.base.samples, *(bank.samples(member.columns) for member in members)])
-        self._triangle = triangle_of(bank.whitened(np.column_stack([self._samples, channel.residual])))
-
-    def solved(self, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values of base and some members, shape (k,), and columns over all rows, shape (m, k)."""
-        width = len(self._drive.channel.base.names)
-        own, names = [np.arange(width)], {member.cause.name for member in members}
-        for member in self._members:
-            if member.cause.name in names:
-                own.append(width + np.arange(len(member.columns)))
-            width += len(member.columns)
-        used = np.concatenate(own)
-        values, _ = _solved(self._triangle[:, [*used, -1]], _prior_sd(self._drive, members), self._noise)
-        return values, self._samples[:, used]
 
 
 def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.float64]:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.drive.findings import HeldOutForce
-from dbbstation.diagnosis.drive.fit import RowsKept
 from dbbstation.diagnosis.drive.moving import within
 from dbbstation.diagnosis.drive.naming import COULOMB, source_of
 from dbbstation.inference.folds import parts_of
-from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart
+from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_without
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection
 
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.channel import DriveChannel
-    from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
 
 
@@ -38,23 +37,16 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> tuple[Held
         kept = channel.without(within(rows, gap))
         settled = settle(kept, most_expanded=0, most_looks=1, thorough=False, rivals=False)
         without.append(WithoutPart(rows, settled))
-        chosen = settled.best.members
-        of_chosen = RowsKept(drive, settled, chosen)
+        patterns = settled.bank.patterns
+        own = {name: source_of(drive, patterns, name) for name in settled.best.names}
+        in_time = {name for name in own if name in patterns and "time" in [v.name for v in patterns[name].variables]}
 
-        def error(
-            members: Sequence[Member],
-            settled: Settled = settled,
-            of_chosen: RowsKept = of_chosen,
-            rows: NDArray[np.bool_] = rows,
-        ) -> float:
-            return float(np.sum(_left(drive, settled, of_chosen, members)[rows] ** 2))
-
-        whole = error(chosen)
+        error = partial(_error, settled, rows, in_time)
+        whole = error(())
         corrected += whole
-        reference += error([m for m in chosen if source_of(drive, settled.bank.patterns, m.cause.name) == COULOMB])
-        for source in {source_of(drive, settled.bank.patterns, m.cause.name) for m in chosen} - {""}:
-            others = [m for m in chosen if source_of(drive, settled.bank.patterns, m.cause.name) != source]
-            brought[source][number] = error(others) - whole
+        reference += error([name for name, source in own.items() if source != COULOMB])
+        for source in {*own.values()} - {""}:
+            brought[source][number] = error([name for name, of in own.items() if of == source]) - whole
     count = len(channel.residual)
     lengths = tuple(int(rows.sum()) for _, rows in parts)
     gains = {source: Gains(tuple(each), lengths) for source, each in brought.items() if any(each)}
@@ -67,14 +59,5 @@ GAP_PERIODS = 0.5
 """Periods of the cut-off about a part that are left out beside it: the impulse response of the low-pass is a tenth beyond."""
 
 
-def _left(drive: DriveChannel, settled: Settled, of_chosen: RowsKept, members: Sequence[Member]) -> NDArray[np.float64]:
-    values, columns = of_chosen.solved(members)
-    first = drive.channel.base.samples.shape[1]
-    used = np.ones(len(values), dtype=bool)
-    for member in members:
-        width = len(member.columns)
-        pattern = settled.bank.patterns.get(member.cause.name)
-        if pattern is not None and any(variable.name == "time" for variable in pattern.variables):
-            used[first : first + width] = False
-        first += width
-    return np.asarray(drive.channel.residual - columns[:, used] @ values[used], dtype=np.float64)
+def _error(settled: Settled, rows: NDArray[np.bool_], in_time: Collection[str], without: Collection[str]) -> float:
+    return float(np.sum(np.square(left_without(settled, without, in_time)[rows])))

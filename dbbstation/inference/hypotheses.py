@@ -46,26 +46,33 @@ class SearchWork:
 
     Attributes:
         most: work that may be done.
+        whole: that this is a part of, where it counts too.
     """
 
     most: float = np.inf
     spent: float = 0.0
+    whole: SearchWork | None = None
 
     def examine(self, members: Sequence[Member]) -> None:
         """Count one set: causes times columns."""
-        self.spent += len(members) * sum(len(member.columns) for member in members)
+        self._spend(len(members) * sum(len(member.columns) for member in members))
 
     def scan(self, causes: Iterable[Cause], times: int = 1) -> None:
         """Count scans of all causes."""
-        self.spent += times * SCAN * sum(len(one.columns) for cause in causes for one in cause.variants)
+        self._spend(times * SCAN * sum(len(one.columns) for cause in causes for one in cause.variants))
 
     def fit(self, rows: int, columns: int) -> None:
         """Count one fit of all columns, as noise is measured and features are looked for: rows times columns squared."""
-        self.spent += rows * float(columns) ** 2 / FIT
+        self._spend(rows * float(columns) ** 2 / FIT)
+
+    def _spend(self, work: float) -> None:
+        self.spent += work
+        if self.whole is not None:
+            self.whole._spend(work)  # noqa: SLF001 - of the same class
 
     def part(self, stages: int) -> SearchWork:
         """Return the work for one of so many stages; the stages share evenly what may still be done."""
-        return SearchWork(max(self.most - self.spent, 0.0) / stages)
+        return SearchWork(max(self.most - self.spent, 0.0) / stages, whole=self)
 
     @property
     def is_spent(self) -> bool:

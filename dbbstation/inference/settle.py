@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,19 +32,31 @@ BETTER = 3.0
 """Log probability that another look must add, noise included, to be followed by one more: odds of twenty."""
 
 
+@dataclass(frozen=True)
+class _How:
+    """How a comparison is made; the fields before `progress` are options of `settle`."""
+
+    look: bool = True
+    static: bool = True
+    most_expanded: int = BOUNDS.expanded_of_table
+    most_looks: int = BOUNDS.looks
+    in_time: bool = True
+    thorough: bool = True
+    progress: Callable[[str], None] = lambda _: None
+    work: SearchWork = field(default_factory=SearchWork)
+
+    def part(self, stages: int) -> _How:
+        """Return the same for one of so many stages, with its share of the work."""
+        return replace(self, work=self.work.part(stages))
+
+
 def settle(
     channel: Channel,
     *,
-    look: bool = True,
-    static: bool = True,
-    most_expanded: int = BOUNDS.expanded_of_table,
-    most_looks: int = BOUNDS.looks,
-    in_time: bool = True,
-    thorough: bool = True,
     beginnings: Sequence[Beginning] = tuple(Beginning),
     rivals: bool = True,
     most_work: float = np.inf,
-    progress: Callable[[str], None] = lambda _: None,
+    **options: Any,  # noqa: ANN401 - fields of `_How`
 ) -> Settled:
     """Compare sets of laws and patterns.
 
@@ -52,46 +64,32 @@ def settle(
     All outcomes are returned, the most probable first.
 
     Args:
-        look: search waves, bumps, steps and pulses.
-        static: include patterns that need no search.
-        most_looks: successive searches of the residual.
-        in_time: search steps and pulses in time; False if blocks have own curves.
-        thorough: several starts and a final look; False: one fast search.
         rivals: noise of any colour competes; False: first order beside everything.
         most_work: limit of all searches together [`SearchWork`].
+        options: `look`: search waves, bumps, steps and pulses. `static`: include patterns that need no search.
+            `most_expanded`: of one search. `most_looks`: successive searches of the residual. `in_time`: search steps and
+            pulses in time; False if blocks have own curves. `thorough`: several starts and a final look; False: one fast
+            search. `progress`: told each stage.
     """
-    options = _Options(
-        look=look,
-        static=static,
-        most_expanded=most_expanded,
-        most_looks=most_looks,
-        in_time=in_time,
-        thorough=thorough,
-    )
-    work, stages = SearchWork(most_work), len(beginnings) + 1
+    how, stages = _How(**options, work=SearchWork(most_work)), len(beginnings) + 1
     if not rivals:
-        return _settled(_begun(channel, options), options, progress, work)
+        return _settled(_begun(channel, how), how)
     found: list[Settled] = []
-    laid_out = _begun(channel, options)
+    laid_out = _begun(channel, how)
     begun: tuple[Bank, Settled] | None = None
     # Long tails come last: where nothing has any, they are no rival.
     for number, one in enumerate(sorted(beginnings, key=lambda one: one in LONG_TAILS)):
-        part = work.part(stages - number)
         if one in LONG_TAILS and found and not _may_have_long_tails(laid_out, found):
             continue
+        share = stages - number
         if one in BESIDE_NOTHING:
-            found.append(_from(laid_out.copy(), (), {}, one, options, progress, part, found))
-            work.spent += part.spent
+            found.append(_from(laid_out.copy(), (), {}, one, how.part(share), found))
             continue
         if begun is None:
             # What stands beside everything is worked out once, and gone on with under each kind of noise.
             bank = laid_out.copy()
-            begun = bank, _settled(bank, options, progress, part)
-            work.spent += part.spent
-            part = work.part(stages - number - 1)
-        beside_all = begun[1].best.members
-        found.append(_from(begun[0].copy(), beside_all, begun[1].refused, one, options, progress, part, found))
-        work.spent += part.spent
+            begun, share = (bank, _settled(bank, how.part(share))), share - 1
+        found.append(_from(begun[0].copy(), begun[1].best.members, begun[1].refused, one, how.part(share), found))
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
 
@@ -115,13 +113,11 @@ def _from(
     members: tuple[Member, ...],
     refused: Mapping[str, str],
     beginning: Beginning,
-    options: _Options,
-    progress: Callable[[str], None],
-    work: SearchWork,
+    how: _How,
     known: Sequence[Settled],
 ) -> Settled:
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
-    settled = _settled(bank, options, progress, work, members, refused, known)
+    settled = _settled(bank, how, members, refused, known)
     if settled.bank is not bank:
         return replace(settled, beginning=beginning)
     return replace(settled, beginning=beginning, log_probability=log_probability(bank, settled.best.members))
@@ -139,24 +135,14 @@ def _meets(one: Settled, other: Settled) -> bool:
     return float(np.sqrt(np.mean(np.square(apart)))) < SETTLED * other.noise.sigma
 
 
-@dataclass(frozen=True)
-class _Options:
-    look: bool
-    static: bool
-    most_expanded: int
-    most_looks: int
-    in_time: bool
-    thorough: bool
-
-
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
     """Return patterns that need no search, independent of held-back rows."""
     return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
 
 
-def _begun(channel: Channel, options: _Options) -> Bank:
+def _begun(channel: Channel, how: _How) -> Bank:
     bank = Bank(channel)
-    if options.static:
+    if how.static:
         ready = channel.static
         bank.add(static_patterns(channel) if ready is None else ready)
     return bank
@@ -164,14 +150,12 @@ def _begun(channel: Channel, options: _Options) -> Bank:
 
 def _settled(
     bank: Bank,
-    options: _Options,
-    progress: Callable[[str], None],
-    work: SearchWork,
+    how: _How,
     best: tuple[Member, ...] = (),
     impossible: Mapping[str, str] | None = None,
     known: Sequence[Settled] = (),
 ) -> Settled:
-    channel, look = bank.channel, options.look
+    channel, look, work = bank.channel, how.look, how.work
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
     refused: dict[str, str] = dict(impossible or {})
@@ -186,15 +170,15 @@ def _settled(
         _measured(bank, best, work)
         starts: list[tuple[Member, ...]] = []
         if looking:
-            best, starts = _looked_about(bank, best, refused, progress, options, work, first=blank and compared is None)
+            best, starts = _looked_about(bank, best, refused, how, first=blank and compared is None)
             if compared is not None and _would_be_the_same(compared, bank, best, refused):
                 return compared
-        progress(f"sets of causes, round {number + 1}")
+        how.progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
         causes = bank.but_for(refused)
         starts = [grown(comparison, causes, members, work) for members in (*starts, best)]
-        posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded, work=work)
+        posterior = search(comparison, causes, [*starts, *seeds.values()], how.most_expanded, work=work)
         seeds |= {h.names: h.members for h in posterior.hypotheses[: BOUNDS.seeds]}
         settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
@@ -211,7 +195,7 @@ def _settled(
             best = moved
             continue
         met = _known_as(settled, known)
-        seen_before = looking and (not options.thorough or posterior.best.names in looked)
+        seen_before = looking and (not how.thorough or posterior.best.names in looked)
         if not look or met is not settled or work.is_spent or seen_before:
             break
         if looking:
@@ -252,21 +236,19 @@ def _looked(
     bank: Bank,
     members: tuple[Member, ...],
     refused: Mapping[str, str],
-    progress: Callable[[str], None],
-    options: _Options,
-    work: SearchWork,
+    how: _How,
     *,
     in_time: bool = True,
 ) -> tuple[Member, ...]:
-    before = log_probability(bank, members)
-    for number in range(options.most_looks):
+    before, work = log_probability(bank, members), how.work
+    for number in range(how.most_looks):
         if work.is_spent:
             break
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
         work.fit(len(bank.channel.target), bank.count)
         noise = _measured(bank, members, work)
-        progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
+        how.progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
         more = places_anew(bank, grown(comparison, bank.but_for(refused), members, work), set(new))
         fresh = set(bank.patterns) - known
@@ -288,22 +270,20 @@ def _looked_about(
     bank: Bank,
     best: tuple[Member, ...],
     refused: Mapping[str, str],
-    progress: Callable[[str], None],
-    options: _Options,
-    work: SearchWork,
+    how: _How,
     *,
     first: bool,
 ) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
     """Return members with outstanding features, first with further starts."""
     starts: list[tuple[Member, ...]] = []
-    if first and options.in_time and options.thorough:
+    if first and how.in_time and how.thorough:
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
         # follow variables have a start of their own, and what comes at once has one beside the laws alone.
         begun = _grown_in(bank)
-        starts.append(_looked(bank, begun, refused, progress, options, work, in_time=False))
+        starts.append(_looked(bank, begun, refused, how, in_time=False))
         laws = tuple(member for member in begun if member.cause.name in bank.laws)
-        starts.append(_looked(bank, laws, refused, progress, options, work) if laws else ())
-    best = _looked(bank, best, refused, progress, options, work, in_time=options.in_time)
+        starts.append(_looked(bank, laws, refused, how) if laws else ())
+    best = _looked(bank, best, refused, how, in_time=how.in_time)
     return best, starts
 
 

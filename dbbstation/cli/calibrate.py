@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import echo
-from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, visibility_sentences
+from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, use_sentence, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def show(result: CalibrationResult) -> None:
     for text in residual_lines(result):
         echo(text)
     print_currents(result.motor_currents)
+    echo(use_sentence(result))
 
 
 def _print_parameters(result: CalibrationResult) -> None:

@@ -252,14 +252,14 @@ def _dry_run(
 def _print_schema(name: str) -> None:
     from dbbstation.cli.output import print_plain_json
     from dbbstation.files.formats.every_format import SCHEMAS, json_schema
+    from dbbstation.instrument.profiles import ProtocolFile
     from dbbstation.results.schemas import RESULTS, result_schema
 
+    formats = {**SCHEMAS, "dbb-instrument/1": ProtocolFile}
     if name in RESULTS:
         print_plain_json(result_schema(name))
-        return
-    try:
-        schema = json_schema(name)
-    except KeyError:
-        what = f"{name!r} is no format; there are {', '.join(SCHEMAS)}, and of `--json` {', '.join(RESULTS)}"
-        raise click.BadParameter(what, param_hint="--schema") from None
-    print_plain_json(schema)
+    elif name in formats:
+        print_plain_json(json_schema(name, formats[name]))
+    else:
+        what = f"{name!r} is no format; there are {', '.join(sorted(formats))}, and of `--json` {', '.join(RESULTS)}"
+        raise click.BadParameter(what, param_hint="--schema")

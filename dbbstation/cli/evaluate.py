@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from dbbstation.cli.declared import command
 from dbbstation.cli.output import echo
 from dbbstation.cli.shop import shop_settings
+from dbbstation.results.words import evaluated_sentence
 from dbbstation.tasks.evaluate import evaluate as task
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def show(result: EvaluationResult) -> None:
     if result.plane_uncertainty_not_known_because:
         echo(f"  ({result.plane_uncertainty_not_known_because})")
     print_tolerances(result.tolerances or (), shop_settings().tolerances_from)
+    echo(evaluated_sentence(result))
 
 
 def _print_predicted(runs: Sequence[EvaluatedRun]) -> None:

@@ -55,6 +55,9 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
             echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
 
 
+EXAMPLE_MM = 150.00031
+"""Length of the example frame [mm]; the greatest length if a display is shorter."""
+
 NO_CHECKSUM = (
     "none: damage shows only by parity, by how numbers are written, and where the feed does not allow a length"
 )
@@ -62,7 +65,10 @@ NO_CHECKSUM = (
 
 
 def _details(protocol: Protocol, profiles: list[str]) -> list[str]:
+    from dbbstation.instrument.codec import decode, encode
+
     low_mm, high_mm = protocol.length.range_mm
+    frame = encode(protocol, min(EXAMPLE_MM, high_mm))
     asked = f"asked with {protocol.ask.request.hex(' ')}" if protocol.ask.request else "streams"
     counter = protocol.counter_modulus
     lines = [
@@ -71,6 +77,7 @@ def _details(protocol: Protocol, profiles: list[str]) -> list[str]:
         f"  line      {protocol.line.text}",
         f"  can be    {', '.join(str(rate) for rate in protocol.line.baud_choices) or protocol.line.baud} baud",
         f"  reading   {asked}, about {protocol.fastest_hz():.1f} per second",
+        f'  example   "{repr(frame)[2:-1]}" is {decode(protocol, frame).length_mm:.5f} mm',
         f"  range     {low_mm:g} to {high_mm:g} mm",
         f"  checksum  {'yes' if protocol.has_checksum else NO_CHECKSUM}",
         f"  counter   {f'modulo {counter}: lost samples are seen' if counter else 'none'}",

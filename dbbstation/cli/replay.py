@@ -40,7 +40,9 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
     of_log, profile_of_log = logged_instrument(file)
     name = instrument or of_log
     if not name:
-        raise click.UsageError("the log does not name its instrument: give --instrument")
+        raise click.UsageError(
+            "the log does not name its instrument: give --instrument with a name or a file, as in --instrument ./my-gauge.yaml"
+        )
     # The profile of the log is one of the log's instrument.
     protocol = load_instrument(name, profile or (profile_of_log if instrument in {None, of_log} else None))
     if zero_mm is not None:

@@ -46,6 +46,15 @@ FEWEST_SAMPLES = 8
 """Centre, radius, ellipse and triangle of a circle are seven numbers; with fewer samples than this nothing is known of it."""
 
 
+NC_PROGRAM = "an NC program", "dbbstation compensate PROGRAM --model MODEL.yaml --out FILE"
+OTHERS = {
+    **dict.fromkeys((".ngc", ".nc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf"), NC_PROGRAM),
+    ".dmo": ("a CMM sheet", "dbbstation jig sheet SHEET --before OLD.yaml --out NEW.yaml"),
+    ".parquet": ("a table", "dbbstation mismatch TABLE --measured COLUMN --simulated COLUMN"),
+}
+"""Kinds of files that other commands read, and the command, by suffix."""
+
+
 @dataclass
 class Checked:
     """Result for one file or session.
@@ -91,6 +100,11 @@ def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
 
 
 def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
+    kind, reader = OTHERS.get(checked.path.suffix.lower(), ("", ""))
+    if kind:
+        what = f"this is {kind}, which `check` does not read"
+        checked.problems.append(Problem(str(checked.path), 0, 0, what, f"use `{reader}`"))
+        return
     document = load_yaml(checked.path, checked.problems)
     if document is None:
         return
@@ -113,7 +127,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         by_name[name]()
         return
     what = "the file does not say what format it has" if given is None else f"`{given}` is no format"
-    formats = ", ".join(SCHEMAS)
+    formats = ", ".join((*SCHEMAS, "dbb-instrument/1"))
     checked.problems.append(document.problem(("format",), what, f"begin it with `format: `, one of {formats}"))
 
 

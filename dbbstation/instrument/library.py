@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 GROUP = "dbbstation.instruments"
 """Entry points of this group name packages; every `.yaml` file in the folder of one is an instrument."""
 
-HOW_TO_ADD = "or give a .yaml file of your own, or install its package"
+HOW_TO_ADD = "or give the path of your own file, as in `--instrument ./my-gauge.yaml`, or install its package"
 """What an unknown name may lack."""
 
 

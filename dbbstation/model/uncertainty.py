@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,6 +129,13 @@ def predicted_poses(
         known[some] = position_uncertainty_mm(identified, motion)
     progress(len(commanded), len(commanded))
     return actual, known
+
+
+def greatest_u_um(identified: IdentifiedModel, poses: ArrayLike) -> tuple[float | None, float | None, float | None]:
+    """Return the greatest standard uncertainties of X, Y and Z at poses [µm], by sources of the pose; None if one is unknown."""
+    anywhere = replace(identified, model=identified.model.anywhere())
+    x, y, z = (None if np.isnan(u) else 1e3 * float(u) for u in predicted_poses(anywhere, poses)[1].max(axis=0))
+    return x, y, z
 
 
 @dataclass(frozen=True)

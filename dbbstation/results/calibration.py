@@ -21,11 +21,13 @@ class CalibrationResult(Framed, CalibrationFigures):
     """What a calibration found.
 
     Attributes:
+        centre_u_um: greatest u of the tool's X, Y and Z at the circles' centres; None if unknown.
         method: of ball positions: `jig`, `conv-a` or `conv-b`.
         model: for prediction or compensation; `save` writes it.
     """
 
     method: str
+    centre_u_um: tuple[float | None, float | None, float | None]
     covariance: Covariance
     model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
     recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)

@@ -19,6 +19,7 @@ class EvaluationResult(Framed):
         nominal_rms_um: measured less nominally predicted length over all runs.
         flatness_um: of X, Y = ±190 mm without compensation, by the model.
         parallelism_um: of a move along X without compensation.
+        held_out: no session made the model, by name and hash.
         plane_without: sources left out, since they need more than a pose.
         tolerances: None if another result holds them.
     """
@@ -26,6 +27,7 @@ class EvaluationResult(Framed):
     runs: tuple[EvaluatedRun, ...]
     nominal_rms_um: float
     residual_rms_um: float
+    held_out: bool
     flatness_um: float
     flatness_u_um: float | None
     parallelism_um: float

@@ -8,6 +8,7 @@ from dbbstation.facts.held import ReportVerdict
 from dbbstation.quality.conformity import Conformity
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.ranked import told_causes
+from dbbstation.results.words import evaluated_sentence
 from dbbstation.text.digits import with_uncertainty
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.facts.held import HeldTolerance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.circles import Circled, MeasuredCircle
+    from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.ranked import Ranked
 
 MOST_TOLD = 5
@@ -28,10 +30,11 @@ def verdict_of(
     coverage_factor: float,
     identified: IdentifiedModel | None = None,
     ranked: Ranked | None = None,
+    evaluation: EvaluationResult | None = None,
 ) -> ReportVerdict:
     """Return the verdict of tolerances held against measured circles."""
     said = {one.conformity for one in held}
-    repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified))
+    repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified, evaluation))
     if not said - {None}:
         nothing = "The shop's settings have no tolerance for these circles: there is no verdict."
         write = "Write tolerances into the shop's settings (`dbbstation settings --template` shows how) and make the report anew."
@@ -86,9 +89,9 @@ def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
     return [*told[:MOST_TOLD], *([f"{more} more runs have findings: see Findings."] if more > 0 else [])]
 
 
-def _of_the_model(found: Circled, identified: IdentifiedModel | None) -> list[str]:
+def _of_the_model(found: Circled, identified: IdentifiedModel | None, evaluation: EvaluationResult | None) -> list[str]:
     if identified is None or not lacks_physics(identified.report):
-        return []
+        return [] if evaluation is None else [f"{evaluated_sentence(evaluation)}."]
     return [
         (
             f"Do not compensate with this model. Look for what it lacks: `dbbstation diagnose {_names(found)} --out joint.yaml`, and make "

@@ -78,6 +78,35 @@ def residual_lines(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or 
     yield f"noise of one reading     {found.noise_um:8.2f} µm"
 
 
+def use_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
+    """Return whether to use the model of a calibration, by its own figures."""
+    check = found.plan_check
+    if found.misfit.missing_physics:
+        return (
+            f"Use this model: no. {found.misfit.rms_um:.2f} µm rms have no explanation; run `dbbstation diagnose` first"
+        )
+    if not check.enough:
+        return f"Use this model: cannot tell. {check.left} degrees of freedom test it; measure further circles"
+    if any(one.finding == "more" for one in found.scatter):
+        return "Use this model: cannot tell. The balls scatter by more than stated; find out why first"
+    known = zip("XYZ", found.centre_u_um, strict=True)
+    u = ", ".join(f"{axis} {'unknown' if value is None else f'{value:.1f} µm'}" for axis, value in known)
+    return (
+        f"Use this model: yes, at these places. Its residual is noise; u of the tool there is at most {u}. Elsewhere cannot tell: its "
+        "joints may conceal other causes, so try it on another session with `dbbstation evaluate`"
+    )
+
+
+def evaluated_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
+    """Return whether to use an evaluated model, by what it leaves of recordings that it was not made of."""
+    left, nominal = f"{found.residual_rms_um:.2f} µm rms", f"the nominal machine {found.nominal_rms_um:.2f}"
+    if not found.held_out:
+        return f"Use this model: cannot tell. It was made of these circles, of which it leaves {left}; evaluate another session"
+    if found.residual_rms_um >= found.nominal_rms_um:
+        return f"Use this model: no. It leaves {left} of these circles, {nominal}"
+    return f"Use this model: yes, near these circles, if {left} are good enough. It was not made of them; {nominal}"
+
+
 def mismatch_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
     """Return whether recordings contradict the kinematic model."""
     if not found.mismatch:

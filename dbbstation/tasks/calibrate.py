@@ -89,6 +89,7 @@ def calibrate(
     from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, report_of
     from dbbstation.calibration.reporting.identified import identified_model
     from dbbstation.files.own_sources import every_source, sources_of
+    from dbbstation.model.uncertainty import greatest_u_um
     from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.registry import sources_named
     from dbbstation.tasks.load import loaded, paths_of
@@ -125,6 +126,7 @@ def calibrate(
     return CalibrationResult(
         **{one.name: getattr(figures, one.name) for one in fields(figures)},
         method=str(way),
+        centre_u_um=greatest_u_um(model, [one.standing_pose for one in runs]),
         covariance=covariance_of(model),
         model=model,
         recorded=recorded,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from dbbstation.tasks import options as o
@@ -95,6 +96,7 @@ def evaluate(
         runs=runs,
         nominal_rms_um=found.nominal_rms_um,
         residual_rms_um=found.residual_rms_um,
+        held_out=set(chain(*recorded.sessions.items())).isdisjoint(chain(*identified.sessions.items())),
         flatness_um=plane.flatness_um,
         flatness_u_um=flatness_u_um,
         parallelism_um=plane.parallelism_um,

@@ -12,6 +12,7 @@ from dbbstation.results.words import (
     mismatch_sentence,
     outlier_sentence,
     residual_lines,
+    use_sentence,
     visibility_sentences,
 )
 from dbbstation.service.job import SessionTask
@@ -31,6 +32,7 @@ def result_lines(step: SessionTask, answer: Mapping[str, object]) -> list[str]:
 
 
 def _calibrated(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
+    yield use_sentence(answer)
     yield from residual_lines(answer)
     yield from fit_sentences(answer)
     yield from (outlier_sentence(one) for one in answer.outliers[:_MOST])

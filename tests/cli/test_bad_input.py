@@ -185,10 +185,14 @@ def test_sessions_of_two_machines(run, spoilt, tmp_path):
 
 def test_a_session_and_its_copy(run, spoilt, tmp_path):
     copy = shutil.copytree(spoilt.folder, tmp_path / "copy")
+    for file in ("session.yaml", "machine.yaml", "plan.yaml"):  # annotated: other bytes, the same recordings
+        (copy / file).write_text("# a copy\n" + (copy / file).read_text("utf-8"), "utf-8")
     for twice in (spoilt.folder, copy):
         outcome = run("calibrate", spoilt.folder, twice, "--out", tmp_path / "model.yaml")
         assert outcome.code == FAILED
-        assert outcome.err == f"{twice}: this is the same session as {spoilt.folder}; give every session once\n"
+        assert outcome.err.endswith(
+            f"{twice}: 6 runs repeat recordings of {spoilt.folder}; give every recording once\n"
+        )
     assert not (tmp_path / "model.yaml").exists()
 
 

@@ -116,10 +116,20 @@ def test_evaluate_predicts_other_places(run, elsewhere, model):
     assert {"runs", "residual_rms_um", "nominal_rms_um", "flatness_um", "parallelism_um"} <= data.keys()
     assert data["nominal_rms_um"] > 20
     assert data["residual_rms_um"] < 5
+    assert data["held_out"] is True
+    assert (
+        f"Use this model: yes, near these circles, if {data['residual_rms_um']:.2f} µm rms are good enough"
+        in printed.out
+    )
     agree(printed.out, data)
     assert printed_number(printed.out, "model leaves") == pytest.approx(data["residual_rms_um"], abs=0.00501)
     assert printed_number(printed.out, "flatness") == pytest.approx(data["flatness_um"], abs=0.0501)
     assert printed_number(printed.out, "parallelism along X") == pytest.approx(data["parallelism_um"], abs=0.0501)
+
+
+def test_circles_of_the_fit_do_not_tell_whether_to_use_a_model(run, fifteen, model):
+    printed = run("evaluate", fifteen, "--model", model, "--tests", "a", "--tests", "b")
+    assert "Use this model: cannot tell. It was made of these circles" in printed.out
 
 
 def test_simulated_recordings_are_those_of_the_model(run, tmp_path, fifteen, model):

@@ -29,6 +29,10 @@ def said(run, tmp_path):
     return of
 
 
+def use(printed):
+    return next(line for line in printed.splitlines() if line.startswith("Use this model: "))
+
+
 def scatter(printed):
     return [line for line in printed.splitlines() if line.startswith("balls stated")]
 
@@ -44,6 +48,7 @@ def test_beside_gravity_missing_physics_is_the_likelier_reason(said):
         assert "NOT as stated" not in line
     assert data["misfit"]["missing_physics"] is True
     assert data["misfit"]["rms_um"] > 0.5
+    assert use(printed).startswith(f"Use this model: no. {data['misfit']['rms_um']:.2f} µm rms")
 
 
 def test_missing_physics_is_told_before_the_balls(said):
@@ -74,6 +79,7 @@ def test_balls_that_scatter_more_without_missing_physics_are_an_alarm(said):
     printed, data = said(setup=[MountingScatter(factor=5.0), CmmScatter(), RandomBarOffset()])
     assert any("NOT as stated" in line for line in scatter(printed))
     assert not any("physics" in line for line in scatter(printed))
+    assert "cannot tell. The balls scatter by more than stated" in use(printed)
     assert data["misfit"]["missing_physics"] is False
 
 
@@ -82,3 +88,9 @@ def test_where_all_is_as_stated_nothing_is_missing(said):
     assert all(line.endswith("as stated") for line in scatter(printed))
     assert data["misfit"]["missing_physics"] is False
     assert "diagnose" not in printed
+    x, y, z = data["centre_u_um"]
+    assert z is None  # level circles leave the common height open
+    assert (
+        f"yes, at these places. Its residual is noise; u of the tool there is at most X {x:.1f} µm, Y {y:.1f} µm, Z unknown"
+        in use(printed)
+    )

@@ -102,6 +102,14 @@ def test_files_of_no_format(capsys, tmp_path: Path, text: str, said: str) -> Non
     assert said in err
 
 
+def test_files_of_other_commands_are_led_to_them(capsys) -> None:
+    part, sheet = FIXTURES / "nc" / "part.ngc", FIXTURES / "cmm" / "plate.dmo"
+    code, _, err = run(capsys, part, sheet)
+    assert code == 1
+    assert "this is an NC program, which `check` does not read; use `dbbstation compensate" in err
+    assert "this is a CMM sheet, which `check` does not read; use `dbbstation jig sheet" in err
+
+
 def test_usage_errors_are_2(capsys) -> None:
     assert run(capsys)[0] == 2
     assert run(capsys, "--schema", "dbb-nothing/1")[0] == 2

@@ -84,6 +84,7 @@ def test_one_instrument() -> None:
     assert "fault: the display shows a fault" in text
     shown = json.loads(run(instruments, "heidenhain-nd281b", "--json")[0])
     assert shown["protocol"]["ask"]["request"] == "\x02"
+    assert 'example   "+  150.0003    \\r\\n" is 150.00030 mm' in text
 
 
 def test_monitor_counts_and_logs_and_replay_reads_the_log(tmp_path: Path) -> None:

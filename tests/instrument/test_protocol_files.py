@@ -57,7 +57,7 @@ def test_a_name_that_is_not_known_brings_the_nearest() -> None:
     ):
         load_instrument("heidenhain-nd281")
     with pytest.raises(
-        InstrumentError, match=r"known are heidenhain-nd281b, heidenhain-nd287.*; or give a \.yaml file of your own"
+        InstrumentError, match=r"known are heidenhain-nd281b, heidenhain-nd287.*; or give the path of your own file"
     ):
         load_instrument("zzz")
 

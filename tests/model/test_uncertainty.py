@@ -11,6 +11,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import (
+    greatest_u_um,
     pose_errors,
     position_uncertainty_mm,
     predicted_poses,
@@ -48,6 +49,13 @@ def test_what_moves_with_the_null_space_has_no_stated_uncertainty(known, poses):
     assert np.isnan(u_mm[:, 2]).all()
     assert (u_mm[:, :2] < 0.02).all()
     assert known.why_unknown == "the recordings do not determine: all six base joints together along Z"
+
+
+def test_the_greatest_uncertainty_of_each_axis_is_that_of_its_worst_pose(known, poses):
+    each_mm = [position_uncertainty_mm(known, Motion(pose[None]))[0] for pose in poses]
+    x_um, y_um, z_um = greatest_u_um(known, poses)
+    assert [x_um, y_um] == pytest.approx([1e3 * max(one[axis] for one in each_mm) for axis in (0, 1)])
+    assert z_um is None
 
 
 def test_a_common_shift_is_no_part_of_positions_about_their_mean(known, poses):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit.calibrate import check_raw
+from dbbstation.calibration.fit.calibrate import FEWEST_TESTS, check_raw
 from dbbstation.errors import CalibrationError
 from dbbstation.machine.rotation import Frames
 from dbbstation.trace.analysis import figures
@@ -94,10 +94,12 @@ def _under_spindle(observation: Observation, machine: Machine) -> Observation:
 def _check_places(observations: Sequence[Observation]) -> None:
     unknown = [observation.test for observation in observations if not observation.setup.place_known]
     if unknown:
+        tests = len({(o.setup.session, o.test) for o in observations})
+        more = "" if tests >= FEWEST_TESTS else f" and {FEWEST_TESTS} tests at least (here are {tests})"
         raise CalibrationError(
             f"the ball was put up under the spindle in test {', '.join(dict.fromkeys(unknown))}: its place in the "
             "machine's coordinates is unknown, and the jig method needs it",
-            remedy="calibrate with --method conv-a, or conv-b where set-up errors were measured; or measure on a jig plate",
+            remedy=f"calibrate with --method conv-a, or conv-b if set-up errors were measured{more}; or measure on a jig plate",
         )
 
 

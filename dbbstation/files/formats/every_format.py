@@ -36,14 +36,7 @@ SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _SCH
 """Schema of each format by its name with its version."""
 
 
-def json_schema(name: str) -> dict[str, object]:
-    """Return the JSON Schema of a format, with units and plausible ranges.
-
-    Args:
-        name: such as `dbb-plan/1`.
-
-    Raises:
-        KeyError: no format has this name.
-    """
-    schema = SCHEMAS[name].model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": name}
+def json_schema(name: str, schema: type[Schema]) -> dict[str, object]:
+    """Return the JSON Schema of a format such as `dbb-plan/1`, with units and plausible ranges."""
+    described = schema.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described, "title": name}

@@ -65,7 +65,7 @@ def test_every_field_says_what_it_is_and_in_which_unit(name: str) -> None:
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_the_json_schema_is_plain_json_and_closed(name: str) -> None:
-    schema = json.loads(json.dumps(json_schema(name)))
+    schema = json.loads(json.dumps(json_schema(name, SCHEMAS[name])))
     assert schema["title"] == name
     assert schema["additionalProperties"] is False
     for part in schema["$defs"].values():

@@ -209,8 +209,10 @@ def test_work_is_counted_by_what_it_costs():
     before = work.spent
     work.examine([Member(cause, cause.variants[0], 1.0) for cause in causes])
     assert work.spent - before == 4 * 12
-    part = work.part(3)
-    assert part.most == pytest.approx((1000.0 - work.spent) / 3.0)
-    part.fit(10_000, 300)
+    part, before = work.part(3), work.spent
+    assert part.most == pytest.approx((1000.0 - before) / 3.0)
+    part.fit(1_000, 300)
     assert part.is_spent
+    # What a stage spends is spent of the whole.
+    assert work.spent == pytest.approx(before + part.spent)
     assert not work.is_spent

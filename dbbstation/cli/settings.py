@@ -97,7 +97,7 @@ def built_in() -> dict[str, str | int | float | None]:
         "limits.largest_bar_age_h": USUAL_AGE_H,
         "numbers.decimal": PLAIN.decimal,
         "numbers.separator": PLAIN.separator,
-        **dict.fromkeys(("simulators", "report.customer", "report.logo")),
+        **dict.fromkeys(("simulators", "report.laboratory", "report.customer", "report.logo")),
     }
 
 

@@ -151,10 +151,16 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
         notes=[*found.warnings, *_notes_before(reported)],
         files=list(_files(reported, provenance)),
         provenance=provenance,
-        customer="" if (one := reported.settings.values.get("report.customer")) is None else str(one.value),
+        laboratory=_said(reported, "report.laboratory"),
+        customer=_said(reported, "report.customer"),
         logo=reported.logo,
         budget=_budget(numbers.circles),
     )
+
+
+def _said(reported: Reported, key: str) -> str:
+    setting = reported.settings.values.get(key)
+    return "" if setting is None else str(setting.value)
 
 
 def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,7 +108,10 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
         )
         for one, analysis, former, thin in analysed
     ]
-    return polar_of(test, analysed[-1][1].raw.circle, paths, len(now) + len(before) - len(drawn))
+    made = polar_of(test, analysed[-1][1].raw.circle, paths, len(now) + len(before) - len(drawn))
+    points = sorted(len(one.theta_deg) for one in paths)
+    count = f"{points[0]} points" if points[0] == points[-1] else f"{points[0]} to {points[-1]} points"
+    return replace(made, what=f"{made.what}, {count}")
 
 
 def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int = 0) -> Polar:
@@ -127,10 +130,12 @@ def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int =
         for one in paths
     )
     tilt = ", ".join(f"{axis} {angle:g}°" for axis, angle in zip("ABC", circle.tilt_deg, strict=True) if angle)
+    centre = ", ".join(f"{axis} {place:.10g}" for axis, place in zip("XYZ", circle.centre_mm, strict=True))
     step_um = step_of(most_um)
     return Polar(
         test=test,
-        what=f"bar {circle.bar_mm:g} mm, {tilt or 'not tilted'}, {circle.feed_mm_min:g} mm/min",
+        what=f"bar {circle.bar_mm:g} mm, {tilt or 'not tilted'}, {circle.feed_mm_min:g} mm/min, about {centre} mm, "
+        f"from {circle.start_deg:g}°, {circle.overshoot_deg:g}° more at either end",
         traces=traces,
         rings=tuple(Ring(CIRCLE + scale * um, um) for um in (-step_um, 0.0, step_um)),
         step_um=step_um,

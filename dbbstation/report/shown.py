@@ -103,6 +103,7 @@ class ReportContent:
     notes: Sequence[str]
     files: Sequence[tuple[str, str]]
     provenance: Provenance
+    laboratory: str
     customer: str
     logo: str
     budget: ShownBudget | None

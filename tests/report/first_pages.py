@@ -33,7 +33,7 @@ KNOWN = """operator: A. Mori
 job: spindle exchanged, order 4711
 serial_number: HX-0017
 ambient_temp_c: 20.0
-bar: {serial_number: DBB-0042, calibrator_serial_number: B-7, calibrator_certificate: D-K-15018-01, calibrator_certified: 2026-03-02, calibrated_length_mm: 150.0, calibrator_uncertainty_mm: 0.0005, calibrated: 2026-11-20T07:30:00Z,
+bar: {serial_number: DBB-0042, calibrator_serial_number: B-7, calibrator_certificate: D-K-15018-01, calibrator_certified: 2026-03-02, calibrator_valid_until: 2027-03-02, calibrated_length_mm: 150.0, calibrator_uncertainty_mm: 0.0005, calibrated: 2026-11-20T07:30:00Z,
   temp_c: 20.0, expansion_um_m_k: 1.2}
 """
 

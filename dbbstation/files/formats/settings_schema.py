@@ -109,8 +109,10 @@ class ToleranceSettings(Schema):
 class ReportSettings(Schema):
     """What stands at the head of reports."""
 
+    laboratory: _Word | None = None
+    """Who measures: name and address."""
     customer: _Word | None = None
-    """Who has the machine."""
+    """Who has the machine: name and address."""
     logo: _Word | None = None
     """Picture of the shop, PNG or JPEG; a path from this file's folder."""
 

@@ -1,8 +1,4 @@
-"""Find error sources, NC dialects and instruments by name.
-
-Classes of the package are found in a folder, those of installed packages by entry points. `dbbstation.files.own_classes`
-finds those of a user's files.
-"""
+"""Find error sources, NC dialects and instruments by name."""
 
 from __future__ import annotations
 

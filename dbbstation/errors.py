@@ -1,17 +1,4 @@
-"""The one exception family: every error that a user can cause, and what the program says about it.
-
-StationError                what is wrong, where, what to do; exit code 1
-├── ArgumentError           a script or command gives a value that a task does not take; a ValueError too
-├── InputError              a file's content is wrong; carries every `Problem` found in it
-├── OutputError             a result cannot be written (exists already, no room, no permission)
-├── MachineError            a pose or path the machine cannot take
-│   ├── KinematicsError     the forward kinematics found no pose for these strut lengths
-│   └── TravelError         a pose or strut length outside the travel
-├── TraceError              a recording that does not show the circle it should
-├── ModelError              a source needs what it was not given, or is not known
-├── CalibrationError        the recordings do not carry the fit that was asked for
-└── InstrumentError         the port, the wire or the instrument
-"""
+"""Every error that a user can cause: what is wrong, where, and what to do."""
 
 from __future__ import annotations
 

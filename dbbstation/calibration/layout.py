@@ -97,10 +97,7 @@ class Layout:
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 
     def formula_variance(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return every column's variance by its formula's inaccuracy, shape (k,).
-
-        It applies to amplitudes, not to random effects and nominal geometry.
-        """
+        """Return every column's variance by its formula's inaccuracy, shape (k,)."""
         share = [
             0.0 if parameter.grid or term.source.name in GEOMETRY else term.source.form_uncertainty
             for term in self.terms

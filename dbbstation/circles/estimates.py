@@ -109,7 +109,6 @@ class _Drawn:
 
 
 def _drawn(one: CircleAnalysis) -> _Drawn:
-    """Draw noise of a circle, independently for each direction of a pair."""
     if one not in _DRAWN:
         apart = _apart(one)
         form_um = _filtered(apart.form_um, one.chosen)

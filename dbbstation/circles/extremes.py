@@ -192,7 +192,6 @@ def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArra
 
 
 def _least_share(power_um2: NDArray[np.float64], passed: NDArray[np.float64]) -> float:
-    """Return noise's share with no line above the spectrum's upper third."""
     end = float(np.mean(power_um2[-max(len(power_um2) // 3, 1) :]))
     whole = float(np.sum(power_um2 * passed**2))
     return float(np.sqrt(np.sum(np.minimum(power_um2, end) * passed**2) / whole)) if whole > 0.0 else 1.0

@@ -102,7 +102,6 @@ MEDIAN_OF_NORMAL = 0.6745
 
 
 def _floor(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return line powers with outstanding ones replaced by neighbours, and which ones."""
     standing = np.zeros(len(power), dtype=bool)
     limit = np.log(max(len(power), 1) / CHANCE)  # the power of a line of noise is exponentially distributed
     floor = power

@@ -98,8 +98,6 @@ class QuickLook:
 
 @dataclass(frozen=True, eq=False)
 class _Turn:
-    """A fitted turn."""
-
     one: CircleAnalysis
     theta_deg: NDArray[np.float64]
     deviation_um: NDArray[np.float64]
@@ -107,8 +105,6 @@ class _Turn:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Joint fit of shapes, centre, radius and form."""
-
     shapes: tuple[SignatureColumn, ...]
     value: NDArray[np.float64]
     unit_covariance: NDArray[np.float64]

@@ -49,14 +49,7 @@ class SignatureColumn:
 def shapes_of(
     theta_deg: NDArray[np.float64], circle: Circle, spike_deg: float
 ) -> dict[SignatureColumn, NDArray[np.float64]]:
-    """Return the deviations that unit sizes cause [µm], shape (n,) each.
-
-    - Squareness β, positive where the axes include more than 90 degrees: e_x = -β y, hence -β R/2 sin 2θ.
-    - Scale mismatch s, X less Y: e_x = s x / 2, e_y = -s y / 2, hence s R/2 cos 2θ.
-    - Servo mismatch τ, by which X lags behind more than Y: e_x = -τ dx/dt, hence d τ v/2 sin 2θ at the feed v.
-    - Backlash step b at an end: the path rises by b there, whatever the sense of travel. An axis with play b stands
-      b/2 behind its command, e_x = -b/2 sgn(dx/dt). Play may differ at both ends and changes evenly between them.
-    - Reversal spike h at an end: half a sine of the height h over the first degrees behind it, as the axis holds on.
+    """Return the deviations that unit sizes cause [µm], shape (n,) each; docs/circles.md has the formulas.
 
     Args:
         theta_deg: shape (n,).

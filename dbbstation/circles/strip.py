@@ -71,7 +71,6 @@ def _exchange(
 
 @inlined
 def _solve(rows: NDArray[np.float64]) -> None:
-    """Solve four linear equations; the solution replaces the right side, the last column."""
     for column in range(4):
         best = column
         for row in range(column + 1, 4):
@@ -90,7 +89,6 @@ def _solve(rows: NDArray[np.float64]) -> None:
 
 @inlined
 def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
-    """Put a new point in place of the adjacent one of its kind, 0 outside, 1 inside."""
     first, second = four[1 - kind], four[3 - kind]
     most = new
     for k in range(4):

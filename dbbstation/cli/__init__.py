@@ -150,7 +150,6 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
 
 
 def _with_new_name(problem: click.ClickException) -> click.ClickException:
-    """Answer an unknown flag with its present name."""
     if not isinstance(problem, click.NoSuchOption) or problem.ctx is None:
         return problem
     now = RENAMED_FLAGS.get(f"{problem.ctx.info_name} {problem.option_name}")
@@ -158,7 +157,6 @@ def _with_new_name(problem: click.ClickException) -> click.ClickException:
 
 
 def _invoked(group: click.Group, context: click.Context) -> object:
-    """Return what a command returns."""
     try:
         return group.invoke(context)
     except SystemExit as left:
@@ -170,7 +168,6 @@ _SHOWN_BY_PYTHON = warnings.showwarning
 
 
 def _noted(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:  # noqa: ANN401 - passed on
-    """Print the program's own warnings as sentences, others with file and line."""
     from dbbstation.machine.compiled import NotKeptWarning
 
     if issubclass(category, NotKeptWarning):

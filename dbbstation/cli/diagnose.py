@@ -72,7 +72,6 @@ def _print(result: DiagnosisFigures) -> None:
 
 
 def _print_mismatch(result: DiagnosisFigures) -> None:
-    """Print whether recordings contradict the kinematic model, and first whether findings predict worse."""
     if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the kinematic calibration alone.\n")
     echo("\n".join((*result.sentences(), "")))
@@ -81,7 +80,6 @@ def _print_mismatch(result: DiagnosisFigures) -> None:
 
 
 def _print_workspace(elsewhere: WorkspaceError) -> None:
-    """Print the distance of two models' tools, with and without common shift, and its uncertainty."""
     shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere.common_shift_um, strict=True))
     for which, error, u, more in (
         ("as a whole", elsewhere.error_with_shift_rms_um, elsewhere.uncertainty_with_shift_rms_um, ""),

@@ -142,7 +142,6 @@ def emulate(
 
 
 def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], seed: int) -> MachineModel:
-    """Return the actual machine, from a model file or random."""
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.machine import machine_data, machine_parts
     from dbbstation.files.formats.model import read_model

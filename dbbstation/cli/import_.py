@@ -141,8 +141,6 @@ class _Told:
 
 @dataclass(frozen=True)
 class _Import:
-    """Everything to be written."""
-
     mapping: MappingFile
     plan: InlinePlan
     machine: Machine
@@ -202,7 +200,6 @@ def _read(
 
 
 def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
-    """Ask for confirmation."""
     if not yes and not asker.terminal:
         raise click.UsageError("nothing was written: give --yes to write what is shown, or --dry-run to look only")
     if not yes:
@@ -304,7 +301,6 @@ def _started(files: Sequence[Path], said: Sequence[str], zone: str | None) -> di
 
 
 def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -> MappingFile:
-    """Ask whether turning angles mean several runs; in a pipe `--split` answers."""
     import numpy as np
 
     from dbbstation.files.formats.mapping import ANGLE, OF_RUNS
@@ -326,7 +322,6 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
 
 
 def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> list[str]:
-    """Refuse centred circles unless somebody confirms that they are raw."""
     from dbbstation.errors import InputError, Problem
     from dbbstation.tasks.importing.plausible import CHANCE
     from dbbstation.tasks.importing.runs import chance_of_runs
@@ -350,7 +345,6 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
 
 
 def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> Reader:
-    """Ask to confirm an unplanned span of angles; in a pipe `--angle-span-deg` answers."""
     from dataclasses import replace
 
     angle = reader.mapping.angle
@@ -370,7 +364,6 @@ def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> 
 
 
 def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequence[str]) -> list[str]:
-    """Return what a later reader of the session must know."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION
 
     files = ", ".join(dict.fromkeys(Path(one.file).name for one in runs))

@@ -275,7 +275,6 @@ _WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz", "axis",
 
 
 def _pairs(texts: Sequence[str], option: str, known: Sequence[str] = ()) -> dict[str, str]:
-    """Return pairs `A=B` of an option."""
     found = {}
     for text in texts:
         first, has, second = text.partition("=")

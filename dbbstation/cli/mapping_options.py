@@ -248,7 +248,6 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
 
 
 def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, object]:
-    """Return zero, sense and span of angles; own exports have machine angles."""
     grows = "ccw" if own else options.angle_grows
     grows = grows or asker.text(
         "sense in which the files' angles grow, seen from +Z", "--angle-grows", ["ccw", "cw", "travel"]

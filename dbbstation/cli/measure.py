@@ -193,7 +193,6 @@ def _measured(asked: MeasureOptions) -> None:
 
 
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
-    """Run the sequence with messages and summary; return whether Ctrl-C ended it."""
     from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
     from dbbstation.cli.output import print_result
     from dbbstation.station.autopilot import Autopilot

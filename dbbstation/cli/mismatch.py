@@ -117,7 +117,6 @@ def _print(result: MismatchResult) -> None:
 
 
 def _print_first(result: MismatchResult) -> None:
-    """Print faults of the answer as a whole."""
     unit, held_out = result.unit, result.held_out_rms
     if held_out and held_out.worse and result.levels.follows:
         echo(

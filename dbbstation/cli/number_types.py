@@ -34,5 +34,4 @@ class Finite(click.FloatRange):
         return number
 
     def _describe_range(self) -> str:
-        """Return the range for help, or an empty text."""
         return "" if self.min is None and self.max is None else super()._describe_range()

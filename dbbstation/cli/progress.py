@@ -192,8 +192,6 @@ def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
 
 
 class _Stages:
-    """One bar over several stages."""
-
     def __init__(self, bar: ProgressBar, stages: Mapping[str, int]) -> None:
         self.bar = bar
         self._stages = stages
@@ -228,7 +226,6 @@ def _shown() -> bool:
 
 
 def _stage_of(text: str, stages: Mapping[str, int]) -> tuple[float, float] | None:
-    """Return begin and end of a stage [%]; None for other texts."""
     names = list(stages)
     here = next((k for k, name in enumerate(names) if text.startswith(name)), None)
     if here is None:
@@ -237,7 +234,6 @@ def _stage_of(text: str, stages: Mapping[str, int]) -> tuple[float, float] | Non
 
 
 def _reached_within(text: str, stages: Mapping[str, int], share: float) -> float:
-    """Return the progress within a stage [%]; None for other texts."""
     begins, following = _stage_of(text, stages) or (0.0, 0.0)
     return begins + share * (following - begins)
 

@@ -212,7 +212,6 @@ def _check_terminal() -> None:
 
 
 def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
-    """Show the screen until closed; return the exit code."""
     from dbbstation.service.runner import Runner
     from dbbstation.tui.app import StationApp
     from dbbstation.tui.shown import Shown
@@ -223,7 +222,6 @@ def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
 
 
 def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
-    """Show the start screen; arguments as of `Front`, errors as of `_run`."""
     from dbbstation.cli.measure_talk import Log
     from dbbstation.service.front import Front
     from dbbstation.service.memory import Memory
@@ -237,7 +235,6 @@ def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
 
 
 def _operate(path: Path, model: IdentifiedModel | None) -> int:
-    """Show the screens of a job; arguments as of `Front`, errors as of `_run`."""
     from dbbstation.cli.measure_talk import Log
     from dbbstation.service.front import Front
     from dbbstation.service.memory import Memory
@@ -258,7 +255,6 @@ def _line(
 
 
 def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: SessionOptions) -> Choice:
-    """Return what options and settings state for a chosen session."""
     from dbbstation.service.choice import Choice
     from dbbstation.service.order import Gate, Order
 
@@ -289,7 +285,6 @@ def _limits(largest_loss_percent: float | None, largest_bar_age_h: float | None)
 
 
 def _shown(app: StationApp) -> int:
-    """Show the screen until closed; return the exit code."""
     with _stopped_politely(app) as stopped, ended_when_hung_up(app.give_up):
         app.run()
     if app.crash is not None:

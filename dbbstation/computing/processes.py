@@ -23,8 +23,6 @@ Result = TypeVar("Result")
 def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> Generator[tuple[int, Result]]:
     """Yield the place and result of items as they are done.
 
-    If processes cannot start or are killed, this one does the rest.
-
     Raises:
         Exception: whatever `work` raises.
     """
@@ -63,7 +61,6 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _end_with_parent() -> None:
-    """End a process when its parent ends, even if killed."""
     started()
     parent = multiprocessing.parent_process()
     if parent is not None:

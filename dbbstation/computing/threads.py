@@ -21,10 +21,7 @@ Result = TypeVar("Result")
 
 
 def with_one_thread(work: Callable[Asked, Result]) -> Callable[Asked, Result]:
-    """Run a function with one thread of linear algebra.
-
-    The limit holds for the whole process.
-    """
+    """Run a function with one thread of linear algebra."""
 
     @wraps(work)
     def limited(*args: Asked.args, **kwargs: Asked.kwargs) -> Result:

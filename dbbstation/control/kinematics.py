@@ -265,7 +265,6 @@ EXPORT_SYMBOL(kinematicsInverse);
 
 
 def _pins(parts: Sequence[_Part], columns: Sequence[str], digest: str) -> str:
-    """Return what reads the pins before each call."""
     switches = "".join(f"        use[{k}] = use_{part.name};\n" for k, part in enumerate(parts))
     watched = "".join(
         f"    if (thermometer({k}, {column}_temp_c, {column}_zero_c, patience_s)) return THERMOMETER;\n"
@@ -300,10 +299,7 @@ static int thermometer(int k, double degc, double zero, double patience)
 
 
 def settings(made: Component, model: MachineModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return lines of the INI and HAL files for a component.
-
-    Joint limits are the machine's; an omitted play goes into `BACKLASH`.
-    """
+    """Return lines of the INI and HAL files for a component."""
     travel, name = model.machine.travel, made.name
     play = next(
         (f for f in model.sources if f.source.name == HELD_BY_BACKLASH and f.source.name in made.left_out), None

@@ -180,7 +180,6 @@ def _left(errors: NDArray[np.float64]) -> LeftOfModel:
 
 
 def _typed(own: MachineModel, points: NDArray[np.float64]) -> Values:
-    """Return the model's own joints and lengths."""
     of = {f.source.name: f.values for f in own.sources}
     return Values(
         of.get(BaseJoints.name, np.zeros(JOINTS)).reshape(STRUTS, 3),
@@ -267,7 +266,6 @@ def _by_source(
     driven: NDArray[np.float64],
     values: Values,
 ) -> tuple[SourceLeft, ...]:
-    """Return the tool's errors by each source alone, without and with the correction, to first order."""
     machine = own.as_found
     frames = Frames.from_poses(poses, machine.hexapod.rotation)
     by_values, tool = _effects(machine, values, frames)
@@ -288,7 +286,6 @@ def _by_source(
 
 
 def _rms_um(errors: NDArray[np.float64]) -> float:
-    """Return the rms of positions [µm] of errors in rows of six [mm]."""
     return float(1e3 * np.sqrt(np.mean(np.sum(np.square(errors.reshape(-1, 6)[:, :3]), axis=1))))
 
 

@@ -1,8 +1,4 @@
-"""Four ways to correct one machine that LinuxCNC drives: what `dbbstation demo --control linuxcnc` does.
-
-LinuxCNC runs the programs on a kinematics; the virtual machine follows the joints that LinuxCNC drives, and a bar measures it through
-serial line and station. A step whose result exists in the folder is not done again.
-"""
+"""Four ways to correct one machine that LinuxCNC drives: what `dbbstation demo --control linuxcnc` does."""
 
 from __future__ import annotations
 
@@ -142,7 +138,6 @@ def _write_files(folder: Path, seed: int, tests: Collection[str] | None) -> Mach
 
 
 def _driven(job: DemoJob, machine: Machine, way: str, kins: ControlKins, programs: str) -> Path:
-    """Run programs in LinuxCNC; return the folder with what it drives."""
     driven = job.folder / "driven" / way
     driven.mkdir(parents=True, exist_ok=True)
     given = sorted((job.folder / programs).glob("*.ngc"))

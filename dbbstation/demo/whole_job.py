@@ -1,8 +1,4 @@
-"""The whole job on a virtual machine over a serial line, by the user's commands.
-
-The machine has random errors of joints and struts, and gravity stretches its struts. It is measured, calibrated,
-diagnosed, compensated and measured again.
-"""
+"""The whole job on a virtual machine over a serial line, by the user's commands."""
 
 from __future__ import annotations
 

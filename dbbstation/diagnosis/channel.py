@@ -1,8 +1,4 @@
-"""Bar readings as a channel: base columns, causes' columns, target.
-
-Columns are laid out about the base fit. Fitted causes and their rivals are laid out anew: exact columns, tangents,
-formula slack.
-"""
+"""Bar readings as a channel: base columns, causes' columns, target."""
 
 from __future__ import annotations
 
@@ -286,7 +282,6 @@ class CircleChannel:
         return samples
 
     def _scattering(self, times: float) -> Columns:
-        """Return base priors with scaled ball scatter."""
         if times == 1.0:
             return self.base
         prior = self.base.prior.copy()
@@ -347,7 +342,6 @@ class CircleChannel:
         shared: Sequence[str],
         nonlinear: tuple[float, ...],
     ) -> list[Variant]:
-        """Return a source's forms at one point, by parts."""
         amplitudes = [p for p in source.parameters(self.machine) if not p.grid]
         sets = list(dict.fromkeys(shared))
         count = len(amplitudes)

@@ -191,7 +191,6 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
 
 
 def _quick(settled: SettledCircles) -> Unexplained:
-    """Return the residual above modelled harmonics: none, or after reversals."""
     found = after_reversals(settled.unmodelled.runs, settled.after.residual_mm)
     if found is None or found.probability >= SIGNIFICANT:
         return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")

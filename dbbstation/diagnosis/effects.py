@@ -162,7 +162,6 @@ ROUNDING_MM = 1e-9
 
 
 def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
-    """Return causes with sources: geometry as one, each source with all its sets, no random effects."""
     geometry = tuple(f for f in model.sources if f.source.name in KINEMATIC_SOURCES)
     if geometry:
         yield GEOMETRY, geometry
@@ -180,7 +179,6 @@ def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
 
 
 def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -> list[int] | None:
-    """Return a cause's covariance rows; None if one is missing."""
     place = {row: k for k, row in enumerate(rows)}
     names = [
         (f.source.name, f.shared, parameter.name) for f in group for parameter in f.source.parameters(model.machine)

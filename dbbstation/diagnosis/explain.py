@@ -54,11 +54,7 @@ def explain(
     *,
     until_interrupted: bool = False,
 ) -> Explained:
-    """Compare sets of causes, freeing balls and bars that are certainly off.
-
-    Foreign runs are omitted first and reinstated if explained. With `until_interrupted`, an interruption ends the
-    comparison and returns the findings so far.
-    """
+    """Compare sets of causes, freeing balls and bars that are certainly off."""
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
     before, outliers = calibrate_robust(fit, runs, balls=False)
@@ -107,11 +103,7 @@ def _with_set_up(
 
 
 class _Settling:
-    """Compare, refine likely causes, fit jointly, until stable.
-
-    The best hypothesis and its rivals get tangents and slack before anything is added, because grid errors would call
-    for false causes.
-    """
+    """Compare, refine likely causes, fit jointly, until stable."""
 
     def __init__(self, channel: CircleChannel, progress: Callable[[str], None]) -> None:
         self._channel, self._progress = channel, progress
@@ -172,7 +164,6 @@ class _Settling:
         )
 
     def _is_done(self, settled: SettledCircles) -> bool:
-        """Refine, widen or fit as needed; True if nothing is needed."""
         if self._is_laid_out_better(settled):
             return False
         named = frozenset((m.cause.name, m.variant.law) for m in settled.members)
@@ -296,7 +287,6 @@ AS_PROBABLE = 1.0
 
 
 def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis) -> Calibration | None:
-    """Fit base and named causes exactly; None on failure."""
     members = [member for member in best.members if member.cause.named]
     if not members:
         return channel.calibration
@@ -382,7 +372,6 @@ def _lay_out(
 
 
 def _usual_scatter(fit: Calibration) -> float:
-    """Return the ball scatter in stated sizes by the median, at least 1."""
     seats = [seat for seat in seats_of(fit) if seat.freedom > 0]
     if not seats:
         return 1.0

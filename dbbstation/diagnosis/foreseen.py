@@ -208,7 +208,6 @@ def _ends_s(channel: CircleChannel) -> float:
 
 
 def _motion(proposal: Proposal, direction: Direction, ends_s: float) -> Motion:
-    """Return one of two successive directions, newly mounted, after the last run [s]."""
     first_s = ends_s + proposal.wait_s + SPACING_S
     before: Setup = proposal.observation.setup
     moving_s = (*before.moving_s, (first_s, first_s + SPACING_S * len(Direction)))

@@ -138,7 +138,6 @@ def _happened(outlier: Outlier) -> Followed:
 
 
 def _left(explained: Explained) -> LeftOver:
-    """Return the residual of joint model and unmodelled effects [mm]."""
     settled = explained.settled
     if any(settled.unmodelled.of(member) for member in settled.best.members):
         return LeftOver(True, 1.0, ())  # noqa: FBT003 - its first field

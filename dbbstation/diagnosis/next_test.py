@@ -141,7 +141,6 @@ def _size(covariance: NDArray[np.float64], variant: Variant) -> float:
 
 
 def _sigmas(covariance: NDArray[np.float64], variant: Variant) -> NDArray[np.float64]:
-    """Return uncorrelated standard deviations in plausible sizes, least first, (p,)."""
     variances = np.linalg.eigvalsh(covariance / np.outer(variant.plausible, variant.plausible))
     return np.sqrt(np.maximum(variances, np.finfo(np.float64).tiny))
 

@@ -38,10 +38,7 @@ class Part:
 
 
 def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
-    """Return forms with log weights: kinds equally likely, members within.
-
-    Wear is often one strut, or alike on all.
-    """
+    """Return forms with log weights: kinds equally likely, members within."""
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets
     kinds = [[("", every)]]

@@ -1,8 +1,4 @@
-"""Search for waves, bumps and steps beside a refitted base.
-
-Sums of residual and base over narrow bins make curves cheap and exact within a bin. The best of each kind compete as
-unmodelled effects.
-"""
+"""Search for waves, bumps and steps beside a refitted base."""
 
 from __future__ import annotations
 
@@ -233,7 +229,6 @@ def _piece(values: NDArray[np.float64], low: float, width: float) -> NDArray[np.
 
 
 def _since(values: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return time since reversal in pieces, fine at first."""
     return np.round(np.clip(values, -RINGING_S, RINGING_S) / RINGING_PIECE_S).astype(np.int64)
 
 

@@ -1,7 +1,4 @@
-"""Unmodelled effects of struts, readings or balls over variables.
-
-They compete with named sources. A winner has an unknown cause, but a known strut and variable.
-"""
+"""Unmodelled effects of struts, readings or balls over variables."""
 
 from __future__ import annotations
 
@@ -313,7 +310,6 @@ def samples_of(
 
 
 def _pulled(struts: Struts) -> NDArray[np.float64]:
-    """Return struts' stretch per unit force and moment, (n, 6, 6)."""
     count = len(struts.length_mm)
     stretch = np.empty((count, STRUTS, 6))
     for k, load in enumerate(np.diag([1.0] * 3 + [LEVER_MM] * 3)):

@@ -1,8 +1,4 @@
-"""Found sources over their variable, beside readings.
-
-Readings are partial residuals: the model's strut error plus the residual on that strut alone [Larsen and McCleary,
-Technometrics 14 (1972) 781]. A wrong form departs from its curve.
-"""
+"""Found sources over their variable, beside readings."""
 
 from __future__ import annotations
 

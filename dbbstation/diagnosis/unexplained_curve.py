@@ -1,8 +1,4 @@
-"""An unmodelled effect's curve with uncertainty.
-
-Amplitudes are of the best set with kinematics and set-up refitted. By convention, parts that kinematics can make are
-removed: a constant, and over length a slope. Motions in several directions are printed along the strongest.
-"""
+"""An unmodelled effect's curve with uncertainty."""
 
 from __future__ import annotations
 
@@ -107,7 +103,6 @@ def _parts(shapes: Sequence[Shape], values: NDArray[Number]) -> list[NDArray[Num
 
 
 def _adds(one: Shape, other: Shape) -> bool:
-    """Return whether two effects move the same part over one variable."""
     if one.variable not in OF_STRUTS or one.strut is None:
         return False
     return (one.variable, one.strut, one.moves) == (other.variable, other.strut, other.moves)
@@ -116,7 +111,6 @@ def _adds(one: Shape, other: Shape) -> bool:
 def _summed(
     runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_Piece]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a sum's points, and the matrix from all amplitudes."""
     if len(pieces) == 1:
         return pieces[0].at, pieces[0].to_points
     at = max((piece.at for piece in pieces), key=len)
@@ -221,7 +215,6 @@ def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
 
 
 def _extent(runs: Sequence[Samples], shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:
-    """Return the variable's extent, of a place along one direction."""
     values = [_values(shape, run) for run in runs]
     along = values if flat is None else [value @ flat for value in values]
     return float(min(one.min() for one in along)), float(max(one.max() for one in along))

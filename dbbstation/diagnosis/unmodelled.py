@@ -33,8 +33,6 @@ struts, and the frequencies or places that a kind was picked from."""
 class Unmodelled:
     """A channel's unmodelled effects, extensible.
 
-    One cause per effect: for all struts, one, or each.
-
     Attributes:
         shapes: by cause and form; per strut if each has its own.
     """
@@ -104,7 +102,6 @@ class Unmodelled:
             self.causes.append(Cause(name, tuple(self._variants(name, family, own)), odds, named=False))
 
     def _variants(self, name: str, family: Sequence[Shape], columns: Sequence[NDArray[np.int64]]) -> Iterator[Variant]:
-        """Return a cause's forms: kinds equally likely, struts within."""
         forms: list[tuple[tuple[Shape, ...], NDArray[np.int64]]] = [
             ((shape,), own) for shape, own in zip(family, columns, strict=True)
         ]

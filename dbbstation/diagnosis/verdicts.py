@@ -83,7 +83,6 @@ class _CircleJudge(CauseJudge):
         )
 
     def _in_words(self, names: Iterable[str]) -> tuple[str, ...]:
-        """Return names of causes; for an unmodelled effect, its variable."""
         follows = self._joint.unmodelled.follows
         return tuple(f"an unmodelled effect over {follows[n]}" if n in follows else n for n in names)
 
@@ -102,14 +101,12 @@ class _CircleJudge(CauseJudge):
         return Verdict.NOT_TESTABLE, (), "These tests leave it open: they neither show nor exclude it."
 
     def _group_of(self, name: str) -> tuple[str, ...]:
-        """Return the group of causes of which one is present."""
         groups = [(*one.form.names, *one.form.not_worse) for one in self._found.follows if one.form is not None]
         groups += [equal for equal in self._classes.values() if len(equal) > 1]
         groups += [(own, *others) for own, others in self._alternatives.ambiguities.items()]
         return next((tuple(n for n in group if JOINED not in n) for group in groups if name in group), ())
 
     def _instead_of(self, name: str) -> frozenset[str]:
-        """Return none, because the joint model has members alone."""
         del name
         return frozenset()
 
@@ -194,7 +191,6 @@ class _CircleJudge(CauseJudge):
         return values
 
     def _beside_nameless(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return the columns of a cause's amplitudes, their changes by unnamed effects, and their variances beside these."""
         amplitudes = self._joint.after.layout.columns_of(name)[0]
         if self._best.members == self._joint.members:
             return amplitudes[:0], np.zeros(0), np.zeros(0)

@@ -1,7 +1,4 @@
-"""The one way from results to JSON and its schemas.
-
-A result is a frozen dataclass. Its fields are the keys of the JSON.
-"""
+"""The one way from results to JSON and its schemas."""
 
 from __future__ import annotations
 

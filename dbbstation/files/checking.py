@@ -277,7 +277,6 @@ def _session(checked: Checked) -> None:
 
 
 def _amended(checked: Checked, session: SessionFolder) -> None:
-    """Add what amendments, log and seal say."""
     checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
     log = read_event_log(session.folder, [])
     if log is not None:

@@ -1,7 +1,4 @@
-"""The folder of a fleet's results, each whole under its key.
-
-A result is one file; its models and pages are written first. Two processes write the same content under the same name.
-"""
+"""The folder of a fleet's results, each whole under its key."""
 
 from __future__ import annotations
 

@@ -48,11 +48,7 @@ class InputBook:
         self._digests[path.absolute()] = digest
 
     def named(self) -> dict[str, str]:
-        """Return the SHA-256 of every input by name.
-
-        Names have no folders, so that texts are equal on every computer. A session's files carry its name; equal names
-        are numbered.
-        """
+        """Return the SHA-256 of every input by name."""
         sessions = {path.parent for path in self._digests if path.name == "session.yaml"}
         named: dict[str, str] = {}
         for path, digest in self._digests.items():

@@ -1,7 +1,6 @@
-"""An index of computed results in the user's cache folder.
+"""An index of computed results in the user's cache folder, never the only copy.
 
-It is never the only copy. A missing, damaged or outdated index is rebuilt. SQLite runs without a write-ahead log and
-never on a network share.
+SQLite runs without a write-ahead log and never on a network share.
 """
 
 from __future__ import annotations
@@ -218,7 +217,6 @@ def index_file(folder: Path) -> Path:
 
 
 def _unfit(file: Path, folder: Path) -> str:
-    """Return why an index must not be there; empty if allowed."""
     if real_path(file).is_relative_to(real_path(folder)):
         return "the cache folder lies in the folder of the sessions; set XDG_CACHE_HOME to another"
     return folder_problem(file)

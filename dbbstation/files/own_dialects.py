@@ -37,7 +37,6 @@ def dialect_given(name_or_file: str) -> Dialect:
 
 
 def _tried(found: FoundClass[Dialect]) -> Dialect:
-    """Return an instance after it has written and read all elements of a program."""
     kind, place = found.kind, found.place
     line = place.line
     said = [f"it needs `{name}`, a text" for name in DECLARED if not isinstance(getattr(kind, name, None), str)]

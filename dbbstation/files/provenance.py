@@ -88,8 +88,6 @@ def refuse_existing_table(path: Path, *, force: bool) -> None:
 def write_table(path: Path, text: str, provenance: Provenance, *, force: bool = False) -> None:
     """Write a CSV table and its provenance, both or neither.
 
-    A comment inside would be read as the table's header by most programs.
-
     Raises:
         OutputError: one exists without `force`, or cannot be written.
     """

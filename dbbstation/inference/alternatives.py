@@ -113,8 +113,6 @@ def named_already(
 ) -> list[bool]:
     """Return whether a named cause covers each form of an unmodelled effect, within its formula's inaccuracy.
 
-    Otherwise both would share probability. At most `MOST_ALIKE` amplitudes are compared, weighted by visibility.
-
     Args:
         named: forms of named causes, with their relative inaccuracy.
     """

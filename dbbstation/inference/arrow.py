@@ -93,8 +93,6 @@ def triangles_without(
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
     """Yield the information on fitted columns without each part's blocks.
 
-    Only the part's groups are renewed; others are pre-joined by the root of their number.
-
     Yields:
         Triangle over the fitted columns, shape (f, f), its target, shape (f,), and the sum of squares that no values take away.
     """

@@ -1,7 +1,4 @@
-"""Columns of all laws and patterns of a channel, and their causes.
-
-Laws start on their grids. A chosen one is refined: exact columns, tangents, formula slack.
-"""
+"""Columns of all laws and patterns of a channel, and their causes."""
 
 from __future__ import annotations
 
@@ -193,8 +190,6 @@ class Bank:
     def measure_noise(self, members: Sequence[Member] | None = None) -> Coloured:
         """Measure noise from the residual and whiten columns by it.
 
-        Power that columns absorb from such noise, seen by draws, is restored by frequency.
-
         Args:
             members: None: all laws and patterns; picked ones only if worth their odds, since chance peaks absorb noise.
         """
@@ -228,10 +223,7 @@ class Bank:
         return self.noise
 
     def log_likelihood(self) -> float:
-        """Return the kept rows' log likelihood under base and noise, up to a constant.
-
-        Noise parameters cost by [Akaike's criterion for few rows].
-        """
+        """Return the kept rows' log likelihood under base and noise, up to a constant."""
         target, innovation = self.target, self.noise.innovation
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
         seen = np.linalg.svd(self.base / innovation, compute_uv=False)
@@ -262,7 +254,6 @@ class Bank:
         return has_long_tails(left / self.trust)
 
     def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
-        """Return each kept row's most probable spread: constant, known and growing parts."""
         if self.channel.levels is not None:
             return spread_by_kind(np.square(left * self.spread), self.channel.levels[self.channel.kept]), ""
         grows, known, follows = self.channel.grows, self.channel.known_noise, self.channel.noise_follows
@@ -320,7 +311,6 @@ class Bank:
         return sd
 
     def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
-        """Return prior standard deviations of columns beside which noise is measured, else zero."""
         found = [self._of_patterns[name] for name in self._of_patterns if name in self.looked_for]
         idle: set[str] = set()
         if found:
@@ -446,7 +436,6 @@ class Bank:
         return (Variant(own, size, log_weight=half), *alone)
 
     def _odds(self, pattern: Pattern) -> float:
-        """Return log prior odds: a family's, shared over variables and tried forms."""
         every = (*self.patterns.values(), pattern)
         over = {tuple(v.name for v in p.variables) for p in every if p.family is pattern.family}
         names = [variable.name for variable in self.channel.variables]
@@ -470,7 +459,6 @@ def _forms(
     nonlinear: tuple[float, ...],
     log_weight: float,
 ) -> list[Variant]:
-    """Return a law's forms at one point: its choices, or all amplitudes."""
     if not law.choices:
         return [Variant(columns, plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
     return [

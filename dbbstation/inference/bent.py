@@ -1,8 +1,4 @@
-"""Effects shaped by a signal: saturation, dead zone, friction within a speed, scaled hysteresis, integral.
-
-Smooth curves and plain hysteresis fit these effects about as well. As laws they have few numbers, each with a name: a
-width, a speed, a rate.
-"""
+"""Effects shaped by a signal: saturation, dead zone, friction within a speed, scaled hysteresis, integral."""
 
 from __future__ import annotations
 

@@ -25,9 +25,6 @@ MAKES_UP = "Held-out parts are predicted worse than as simulated, and something 
 class VerdictsByLevel:
     """Verdicts on members of the best set and on their equivalents.
 
-    A law that level 3 names is identified. An effect over time alone happened. A class without held-out gain does not
-    predict. All others are ambiguous.
-
     Args:
         pushes: sizes of all stretches of time, by member.
     """
@@ -100,12 +97,10 @@ class VerdictsByLevel:
 
 
 def _named(one: Followed, name: str) -> bool:
-    """Return whether a law is named for a class."""
     return one.form is not None and name in one.form.names
 
 
 def _of_laws(classes: Sequence[Followed], name: str, rows: str) -> Said:
-    """Return the verdict on a member of followed classes: each must name it."""
     if all(_named(one, name) for one in classes):
         return Verdict.IDENTIFIED, (), ""
     forms = [one.form for one in classes if one.form is not None and not _named(one, name)]

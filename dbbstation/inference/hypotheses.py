@@ -237,7 +237,6 @@ class _Search:
             self._try_more(others, without, around.without([member.cause.name])[0])
 
     def _challenge(self, hypothesis: Hypothesis) -> None:
-        """Exchange one for two causes, and two for one that is flexible or nameless."""
         around = self._around(hypothesis)
         for pair in self._least_worth(hypothesis):
             others = hypothesis.without(*pair)
@@ -251,7 +250,6 @@ class _Search:
                 self._pairs(hypothesis.without(member.cause.name), around.without([member.cause.name])[0])
 
     def _least_worth(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        """Return the least valuable pairs of members, at most as many as may be replaced."""
         worth = dict(zip((m.cause.name for m in hypothesis.members), hypothesis.log_factors, strict=True))
         pairs = combinations(sorted(worth), 2)
         return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[: BOUNDS.replaced]
@@ -261,7 +259,6 @@ class _Search:
         return self._comparison.around(hypothesis.members, self._causes.values())
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
-        """Score every addition; examine improvements of likely sets."""
         worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
         for k in np.flatnonzero(log_posterior + worth > self._top - NEGLIGIBLE).tolist():
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
@@ -279,7 +276,6 @@ class _Search:
             self._look_at(members)
 
     def _drop_negligible(self) -> None:
-        """Forget negligible first scores."""
         self._scored = {key: score for key, score in self._scored.items() if score > self._top - NEGLIGIBLE}
         self._room = max(BOUNDS.scores, 2 * len(self._scored))
 
@@ -311,7 +307,6 @@ class _Search:
                     self._look_at([*members, named[a], named[b]])
 
     def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
-        """Return whether members plus a gain may become relevant when settled."""
         odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
         return evidence + odds + worth > self._top - NEGLIGIBLE
 
@@ -325,7 +320,6 @@ class _Search:
         return Member(cause, min(same, key=away), member.scale)
 
     def _look_at(self, members: Sequence[Member]) -> None:
-        """Settle and keep a set; examine it without unworthy members."""
         key = frozenset(member.cause.name for member in members)
         if key in self._seen or len(key) > self._most_members or (self._begun and self._work.is_spent):
             return
@@ -386,7 +380,6 @@ class _Search:
         return found
 
     def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:
-        """Return members with best slack shares, and the gain of averaging."""
         more, known = 0.0, beside.log_evidence(members)
         for k, member in enumerate(members):
             if not len(member.variant.slack):

@@ -62,7 +62,6 @@ def _place(
     parts: Sequence[NDArray[np.bool_]] | None,
     barred: Collection[str],
 ) -> LawForm:
-    """Place a law in some members' place, the others kept."""
     others = _sure(settled, names)
     candidates, worth = _candidates(settled, names, wanted, others)
     scores = (
@@ -98,7 +97,6 @@ def _place(
 
 
 def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
-    """Return members without uncertain ones, which must not replace the cause under test."""
     best = settled.best
     return tuple(m for m in best.without(*names) if best.log_factor(m.cause.name) + m.cause.log_prior_odds >= SURELY)
 
@@ -106,7 +104,6 @@ def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
 def _candidates(
     settled: Settled, names: Collection[str], wanted: Collection[str], others: Sequence[Member]
 ) -> tuple[dict[str, tuple[Member, ...]], dict[str, float]]:
-    """Return candidates for the place of some members, with their log evidence and prior odds."""
     comparison, taken = settled.comparison, {m.cause.name for m in others}
     rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & set(wanted) and c.name not in taken]
     scan = comparison.scan(others, rivals)
@@ -156,7 +153,6 @@ def _scores(
 
 
 def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> bool:
-    """Return whether some members can make the effect of others in the same place."""
     bank = settled.bank
     own = np.concatenate([m.columns for m in other])
     effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]

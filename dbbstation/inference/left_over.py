@@ -87,7 +87,6 @@ def left_over(settled: Settled) -> LeftOver:
 
 
 def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[ResidualTest]:
-    """Return the tests of waves in time and runs of sign."""
     longest = left[max(stretches, key=lambda rows: rows.stop - rows.start)]
     found = []
     if len(longest) >= FEWEST:

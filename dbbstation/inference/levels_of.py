@@ -82,7 +82,6 @@ def levels_of(
 
 
 def _doubts(settled: Settled, left: LeftOver, sizes: tuple[Detectable, ...], matters: float) -> tuple[str, ...]:
-    """Return why an effect of interest may be hidden."""
     channel, found = settled.channel, list[str]()
     per, unit = (1e3, "µm") if channel.unit == "mm" and channel.rows_are == "tests" else (1.0, channel.unit)
     if settled.stopped:
@@ -167,7 +166,6 @@ def _followed(
 
 
 def _refuted(settled: Settled, held_out: HeldOutError | ChosenAnew) -> set[str]:
-    """Return causes that held-out rows speak against, and picked ones that they do not confirm."""
     found, picked = set[str](), settled.bank.looked_for
     for name in (cause.name for cause in settled.causes):
         gains = held_out.gains_of({settled.bank.kind_of(name)})
@@ -181,7 +179,6 @@ def _in_time(one: VariableClass) -> bool:
 
 
 def _straight(settled: Settled, one: VariableClass) -> tuple[Value | None, float]:
-    """Return slope and share of squares of the line through a class's effect over its first variable."""
     channel = settled.channel
     variable = next((v for v in channel.variables if v.name == one.each[0][0]), None)
     if variable is None or variable.kind is Kind.TIME or variable.period is not None:

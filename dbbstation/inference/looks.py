@@ -1,8 +1,4 @@
-"""Search a residual for waves, bumps, steps and pulses.
-
-The number of independent tries counts against a find [look-elsewhere effect: Gross and Vitells, Eur. Phys. J. C 70
-(2010) 525].
-"""
+"""Search a residual for waves, bumps, steps and pulses."""
 
 from __future__ import annotations
 
@@ -105,7 +101,6 @@ def _sums(left: Left, values: NDArray[np.float64], pieces: int, size: float) -> 
 def _waves(
     variable: Variable, sums: Sums, extent: float, pieces: int, strongest: int, *, roughly: bool
 ) -> list[Pattern]:
-    """Return waves from twice the range to four pieces, refined."""
     length = 2 * (int(sums.place[-1]) + 1)
     last = min(int(2.0 * min(BOUNDS.cycles, pieces / PIECES_PER_WAVE)), length // 4)
     if last <= 1:

@@ -1,7 +1,4 @@
-"""Whether a residual is larger in some stretches.
-
-Fast oscillations above the modelled harmonics count as noise, but occur only after their event.
-"""
+"""Whether a residual is larger in some stretches."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Effects with memory: first-order lag or dead time.
-
-Curves over time, hysteresis and speed imitate them; prediction decides.
-"""
+"""Effects with memory: first-order lag or dead time."""
 
 from __future__ import annotations
 

@@ -430,7 +430,6 @@ class ModelComparison:
         return self._forms[name]
 
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
-        """Return the members' Cholesky factor, transformed target and log evidence."""
         if not members:
             return np.zeros((0, 0)), np.zeros(0), self._evidence
         # A search scans beside a set of members and asks for the evidence of the same set right after it.
@@ -509,7 +508,6 @@ class Around:
         return self._of_absent(scan, names), evidence
 
     def _of_absent(self, scan: Scan, names: Collection[str]) -> Scan:
-        """Return the scan without remaining members."""
         there = {m.cause.name for m in self.members} - set(names)
         return scan.of([k for k, cause in enumerate(scan.causes) if cause.name not in there])
 

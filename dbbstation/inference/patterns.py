@@ -1,8 +1,4 @@
-"""Patterns: effects without physics over variables, with prior odds.
-
-Some have names: linear, per turn, hysteresis, product, drift. Others are smooth curves, also by direction. `looks`
-finds waves, bumps, steps and pulses.
-"""
+"""Patterns: effects without physics over variables, with prior odds."""
 
 from __future__ import annotations
 
@@ -252,7 +248,6 @@ def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> 
 def _speed(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], unit: str, family: Family = Family.SPEED
 ) -> Pattern:
-    """Return the rate's pattern; delay times simulated speed is a lag."""
     rate = variable.rates(time, blocks)
     size = float(np.abs(rate).max(initial=0.0)) or 1.0
     if family is Family.LAG:

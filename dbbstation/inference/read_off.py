@@ -180,7 +180,6 @@ class CauseJudge:
         return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_bayes_factor)))
 
     def _refused(self, name: str, why: str) -> CauseFinding:
-        """Return the finding of an impossible law."""
         blocks = dict.fromkeys(self._settled.channel.names, 0.0)
         return CauseFinding(name=name, verdict=Verdict.RULED_OUT, blocks=blocks, text=why)
 
@@ -241,7 +240,6 @@ class CauseJudge:
         )
 
     def _pushes(self) -> dict[str, Sequence[Value]]:
-        """Return sizes of all stretches of time, by member."""
         unit, patterns = self._settled.channel.unit, self._settled.bank.patterns
         found: dict[str, Sequence[Value]] = {}
         for name in (n for n in self._values if n in patterns and patterns[n].family in IN_TIME):
@@ -265,7 +263,6 @@ class CauseJudge:
         return Acts.ONCE if once else Acts.ALWAYS
 
     def _is_a_step(self, rows: tuple[tuple[int, int], ...]) -> bool:
-        """Return whether stretches form one that begins or ends a block."""
         if len(rows) != 1:
             return False
         (first, last), blocks = rows[0], self._settled.channel.blocks
@@ -320,7 +317,6 @@ class CauseJudge:
         return self._levels.equivalent(name) or self._classes.get(name, (name,))
 
     def _impossible_in_place(self, cause: Cause) -> str:
-        """Return why a law cannot replace its equivalent; may be empty."""
         shown = replace(self._beside[cause.name][1], scale=float(SCALES[-1]))
         alike = [name for name, equal in self._classes.items() if cause.name in equal]
         if not alike and not any(shown.variant.positive):
@@ -348,7 +344,6 @@ class CauseJudge:
         return Verdict.RULED_OUT, (), "It would have been seen at its plausible size and was not needed."
 
     def _seen(self, cause: Cause, others: tuple[Member, ...], *, base: bool = True) -> float:
-        """Return the median standing of its plausible size, in standard deviations."""
         variant = max(cause.variants, key=lambda v: len(v.columns))
         if base:
             products = self._settled.comparison.beside(others, variant.columns)
@@ -363,7 +358,6 @@ class CauseJudge:
     def _concealed(
         self, _shown: Member, effect: NDArray[np.float64], _values: NDArray[np.float64]
     ) -> tuple[float, float, float]:
-        """Return an effect's rms, its rms beyond the base, and the absorbed share."""
         kept = effect[self._settled.channel.kept]
         fitted = self._settled.bank.base_values(-effect) - self._without
         rest = kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept]

@@ -60,9 +60,6 @@ def settle(
 ) -> Settled:
     """Compare sets of laws and patterns.
 
-    Noise is part of the comparison: measured from several initial models, then on the best hypothesis, until stable.
-    All outcomes are returned, the most probable first.
-
     Args:
         rivals: noise of any colour competes; False: first order beside everything.
         most_work: limit of all searches together [`SearchWork`].
@@ -95,7 +92,6 @@ def settle(
 
 
 def _may_have_long_tails(laid_out: Bank, found: Sequence[Settled]) -> bool:
-    """Return whether innovations have long tails beside the findings or nothing."""
     if any(one.bank.may_have_long_tails(one.best.members) for one in found):
         return True
     bank = laid_out.copy()
@@ -214,7 +210,6 @@ def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> lis
 
 
 def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
-    """Return members at better places in less noise, or none."""
     named = {member.cause.name for member in members} & bank.looked_for
     better = places_anew(bank, members, {name for name in named if bank.patterns[name].family in MOVED})
     return better if [one.cause.name for one in better] != [one.cause.name for one in members] else ()
@@ -274,7 +269,6 @@ def _looked_about(
     *,
     first: bool,
 ) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
-    """Return members with outstanding features, first with further starts."""
     starts: list[tuple[Member, ...]] = []
     if first and how.in_time and how.thorough:
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
@@ -374,7 +368,6 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
 
 
 def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], member: Member) -> tuple[float, ...]:
-    """Return a one-parameter law's best place between grid neighbours, beyond bends that limit tangents."""
     law, target = bank.laws[member.cause.name], bank.target
     if others:
         columns = np.concatenate([one.columns for one in others])

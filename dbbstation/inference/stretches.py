@@ -1,8 +1,4 @@
-"""Steps and pulses in time: stretches with a shifted residual.
-
-All lengths and places are tried; the best is added, and the search repeats. A stretch that reaches a block's end is a
-step.
-"""
+"""Steps and pulses in time: stretches with a shifted residual."""
 
 from __future__ import annotations
 
@@ -241,7 +237,6 @@ class _Look:
         return 0, len(self._rows)
 
     def _worth_between(self, edge: int, others: slice) -> NDArray[np.float64]:
-        """Return log Bayes factors of windows from one edge to consecutive others."""
         way, along = 1.0 if others.start > edge else -1.0, self._along_axes.columns
         own = way * (self._whole[others] - self._whole[edge])
         own += self._edges[np.abs(np.arange(others.start, others.stop) - edge)]

@@ -1,17 +1,4 @@
-"""Verdicts: what can be said of a cause, by which test, in which word. The same for tables, drives, circles and two sessions.
-
-| cause | test | verdict, as `--json` has it |
-| --- | --- | --- |
-| acts always: a law over a variable; a named cause at work in the whole session | sure, and a gain in held-out parts | `identified` |
-| the same | sure, held-out parts not asked for | `identified` |
-| the same | sure, no gain in held-out parts | `does-not-predict` |
-| acts once: a pulse, step, bump, drift, wave or curve over the time, an offset, a mounting | sure; no other rows can test it | `happened` |
-| any that is rather there | not sure, or others would do as well | `ambiguous` |
-| any that is rather not there | these rows would not have shown it, or leave it open | `not-testable` |
-| any that is rather not there | it would have been seen, and its probability is at most `ABSENT` | `ruled-out` |
-
-Sure: a probability of `SURE` or more, and an effect of `OUT` standard deviations or more.
-"""
+"""Verdicts of causes, alike for tables, drives, circles and two sessions; docs/verdicts.md has the table of tests and words."""
 
 from __future__ import annotations
 
@@ -127,8 +114,5 @@ class DensityGains(Gains):
 
 
 def is_worse(corrected: float, reference: float) -> bool:
-    """Return whether a correction predicts worse than the reference, by rms on held-out rows.
-
-    References: simulated values, kinematic calibration, mass and friction, or the first session.
-    """
+    """Return whether a correction predicts worse than the reference, by rms on held-out rows."""
     return corrected > (1.0 + SEEN_WORSE) * reference

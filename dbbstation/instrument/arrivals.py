@@ -6,10 +6,7 @@ from collections import deque
 
 
 class Arrivals:
-    """Remembers when bytes were received, as far back as a frame reaches.
-
-    Bytes received together arrived one after another.
-    """
+    """Remembers when bytes were received, as far back as a frame reaches."""
 
     def __init__(self, character_s: float, reach: int) -> None:
         self._character_s = character_s

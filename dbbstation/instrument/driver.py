@@ -1,7 +1,4 @@
-"""The driver: a protocol and a port become readings.
-
-A reader thread owns the line from `start` to `stop`, so that no byte is lost while the program is busy.
-"""
+"""The driver: a protocol and a port become readings."""
 
 from __future__ import annotations
 

@@ -1,17 +1,4 @@
-"""The parts of a frame on the wire.
-
-Every part has both directions: `pattern` and `read` take it from bytes, `write` makes the bytes, so driver and virtual
-instrument always agree.
-
-    literal    fixed bytes: head, separator, line end
-    sign       the sign of the length, apart from its digits
-    choice     one of several codes, each with a unit or a status
-    flags      one byte of status bits
-    skip       ignored bytes
-
-Further kinds are in `numbers.py` (decimal, integer, float), `checksum_part.py`, `telling.py` (text, errors) and
-`frame.py` (optional).
-"""
+"""The parts of a frame on the wire."""
 
 from __future__ import annotations
 

@@ -65,7 +65,6 @@ class Listener:
         self._unread, self._why = (self._unread + heard.raw)[:LONGEST_LINE], heard.why
 
     def _take(self, heard: Piece, seen_s: float) -> None:
-        """Stamp a reading and deliver those in order."""
         size = heard.after + len(heard.raw)
         left_s = seen_s - size * self._to.character_s - self._to.protocol.timing.latch_delay_s
         judged = self._doubts.judged(heard)

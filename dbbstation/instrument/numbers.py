@@ -1,8 +1,4 @@
-"""Numeric parts of a frame: text, integers, IEEE floats.
-
-A number is the length in device units or the sample counter. `specials` are contents with the meaning of a status, such
-as `+FFFFFFF`.
-"""
+"""Numeric parts of a frame: text, integers, IEEE floats."""
 
 from __future__ import annotations
 

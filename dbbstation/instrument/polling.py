@@ -100,7 +100,6 @@ class Poller:
         return asked_s + characters * self._to.character_s + self._protocol.timing.reply_latency_s
 
     def _take(self, heard: Piece, first_s: float, asked_s: float) -> None:
-        """Stamp a reading, ask for a fault's text, and deliver those in order."""
         latch = latch_of(self._protocol, asked_s=asked_s, first_byte_s=first_s, baud=self._to.baud)
         self._last_s = max(latch.t_s, self._last_s + 1e-6)
         reading = replace(heard.reading, t_s=self._last_s, t_uncertainty_s=latch.uncertainty_s, first_byte_s=first_s)
@@ -119,7 +118,6 @@ class Poller:
         self._failed.clear()
 
     def _fail(self, heard: Garbage) -> None:
-        """Note a missing or unreadable reply; fail after some in a row."""
         self._failed.append(heard)
         self._to.tally.reject(heard.raw, heard.reason)
         self._until_quiet()
@@ -137,7 +135,6 @@ class Poller:
             raise self._to.symptom(raw, f"{len(noisy)} of {len(self._recent)} replies have bytes that belong to none")
 
     def _explanation(self) -> str:
-        """Return the text of a fault, or an empty text."""
         follow_up, protocol = self._protocol.ask.follow_up, self._protocol.explaining
         if follow_up is None or protocol is None:
             return ""

@@ -1,14 +1,4 @@
-"""The wire protocol of a length instrument, `dbb-instrument/1`: the content of a YAML file in `protocols/instruments`.
-
-Protocol
-├── line       baud rate, bits, parity, stop bits, flow control
-├── ask        request, latch or stream; start and stop commands; the request after an error
-├── reply      prefix and end of all replies
-├── length     unit, sense, range
-├── frames     one with the length, others are messages
-├── timing     latency, rate, patience
-└── profiles   variants of the device, each with its own keys
-"""
+"""The wire protocol of a length instrument, `dbb-instrument/1`: the content of a YAML file in `protocols/instruments`."""
 
 from __future__ import annotations
 

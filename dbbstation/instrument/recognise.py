@@ -17,10 +17,7 @@ understand different bytes."""
 
 
 def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
-    """Return known instruments and profiles that decode some bytes best, the likeliest first.
-
-    At equal bytes, instruments with a fitting checksum come first.
-    """
+    """Return known instruments and profiles that decode some bytes best, the likeliest first."""
     found = []
     for name in known_instruments():
         for protocol in load_variants(name):

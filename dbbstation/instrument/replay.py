@@ -34,11 +34,7 @@ class Replayed:
 
 
 def replayed(protocol: Protocol, chunks: Iterable[Chunk], *, where: str) -> Iterator[Replayed]:
-    """Yield readings and rejected bytes in wire order.
-
-    Answers to start, stop and follow-up commands are omitted. A restart of the device is reported, and the replay
-    continues.
-    """
+    """Yield readings and rejected bytes in wire order."""
     decoding = _Decoding(protocol, where)
     for chunk in chunks:
         yield from decoding.sent(chunk.raw) if chunk.direction == ">" else decoding.came(chunk)

@@ -63,8 +63,6 @@ def in_words(found: Sequence[Difference], most: int = 4) -> str:
 def check_model_is_of(machine: Machine, calibrated: Machine) -> None:
     """Refuse a model of another machine.
 
-    Travel, tolerances, name and data of only one file may differ.
-
     Raises:
         ModelError: names differences with both values.
     """

@@ -73,7 +73,6 @@ def _gather_machine(
     q: NDArray[np.float64],
     p: NDArray[np.float64],
 ) -> None:
-    """Gather poses and joints of a group; constant joints only at `start`."""
     _gather(first, stop, position, t)
     _gather_matrices(first, stop, rotation, r)
     if first == start or base.shape[0] > 1:

@@ -152,8 +152,6 @@ class _Slope:
 
 
 class _Stretch:
-    """The inversion of one stretch."""
-
     def __init__(self, passed: Passed, wanted: Motion) -> None:
         self._own, self._held_back = passed.model, passed.held_back_mm
         self._machine = self._own.as_found

@@ -181,7 +181,6 @@ def _of_model(
 
 
 def _reversals_deg(observation: Observation, model: MachineModel) -> tuple[float, ...]:
-    """Return angles at which a strut reverses [deg]."""
     theta_deg = np.arange(0.0, 360.0, 0.5)
     frames = Frames.from_poses(observation.raw.circle.poses(theta_deg), model.machine.hexapod.rotation)
     length = model.driven_mm(frames)

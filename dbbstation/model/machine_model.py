@@ -297,7 +297,6 @@ def _rows(array: NDArray[np.float64], axes: int, kept: slice) -> NDArray[np.floa
 
 
 def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
-    """Sum gain times array over struts and coordinates; constant or per sample."""
     count, parameters = len(gain), array.shape[-1]
     flat = gain.reshape(count, -1)
     if array.ndim == axes + 1:

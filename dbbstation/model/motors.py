@@ -32,11 +32,7 @@ class MotorCurrents:
     current_a: NDArray[np.float64]
 
     def by_parameters(self, fitted: Fitted) -> NDArray[np.float64] | None:
-        """Return currents' derivative by a source's parameters, shape (n, 6, p), kept rows.
-
-        None for sources without load or current. Load changes by moved joints, parts in a thousand, are only in the
-        prediction.
-        """
+        """Return currents' derivative by a source's parameters, shape (n, 6, p), kept rows."""
         kept = self.driven.kept
         if fitted.source.of_currents:
             own = fitted.source.derivative(self.driven, self.model.as_found, fitted.values).current_a

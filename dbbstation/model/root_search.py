@@ -23,9 +23,6 @@ ANEW = 3
 class RootSearch:
     """Finds x_i with f_i(x) = 0, f_i decreasing in x_i and nearly independent of others.
 
-    Doubling steps find bounds, which are narrowed, and found anew if others move them. At a jump the side with the
-    smaller value counts.
-
     Args:
         guess: start, shape (k,).
         met: |f| that counts as zero.

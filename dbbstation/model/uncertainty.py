@@ -159,10 +159,7 @@ class PoseErrors:
 def pose_errors(
     commanded: NDArray[np.float64], actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
 ) -> PoseErrors:
-    """Return position errors of predicted poses.
-
-    A part-set zero removes the common shift, so both are given.
-    """
+    """Return position errors of predicted poses."""
     off_um = 1e3 * (actual[:, :3] - commanded[:, :3])
     shift_um = off_um.mean(axis=0)
     greatest_um = 1e3 * uncertainty_mm.max(axis=0)

@@ -58,8 +58,6 @@ def circle_toolpath(
 ) -> Toolpath:
     """Return the nominal path of a run as straight moves every `step_deg`.
 
-    A nominal and a compensated program then differ only in their numbers.
-
     Args:
         approach: where rapids end and the program waits for the bar; None: the bar stays on, and the program has only
             feed moves.

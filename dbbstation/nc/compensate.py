@@ -91,9 +91,6 @@ def compensate_toolpath(
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
-    The path is inverted from beginning to end, rapids included, because sources with a history depend on the machine's
-    actual path.
-
     Args:
         model: calibrated; only sources of the machine are inverted.
         chord_mm: tolerance of the longest pieces; None: one move for each.
@@ -217,10 +214,6 @@ def _assembled(
     machine: Machine,
     corner_mm: float,
 ) -> Toolpath:
-    """Return the toolpath with one row for each piece, rapids in one.
-
-    Corners between the pieces of a move may be rounded by the pieces' tolerance.
-    """
     row = pieces.row
     of = runs[row]
     begin_mm, begin_s = _until(toolpath, pieces.begin)

@@ -45,8 +45,6 @@ class SpanBehind:
 class CommandCurve:
     """The commands along a toolpath.
 
-    A place is a number: row plus the completed share of it. A row ends at the next row's number.
-
     Args:
         model: calibrated; only sources of the machine are inverted.
         started_s: start of the program on the time scale of the model's sessions; None if unknown.
@@ -79,9 +77,6 @@ class CommandCurve:
     def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return poses to command at places in program order, shape (k, 6) [mm, deg].
 
-        Rows without motion repeat the pose before them. If the model has a history, the end of long stops is inverted
-        as well and commanded for the move before.
-
         Raises:
             KinematicsError: a pose that the machine cannot take.
             ModelError: a source needs what a program does not give.
@@ -111,7 +106,6 @@ class CommandCurve:
         return inverse[at_rest]
 
     def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
-        """Invert stretch by stretch, handing the sources' memory on."""
         passed = None if self._before is None else self._before.passed
         parts = [] if self._before is None else [self._before.command[None]]
         for start in range(0, len(wanted), PLACES_AT_ONCE):

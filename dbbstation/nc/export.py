@@ -317,7 +317,6 @@ def _said(names: Mapping[str, str]) -> list[str]:
 
 
 def _holds_for(path: Toolpath) -> list[str]:
-    """Return the conditions under which a program is valid, besides the model."""
     if path.holds is None:
         return []
     diameters = {name: values[0] for name, values in path.holds.items() if name[0] == "D"}

@@ -116,10 +116,7 @@ def is_marked(toolpath: Toolpath) -> bool:
 
 
 def decimals_of(poses: NDArray[np.float64]) -> Iterator[tuple[int, ...]]:
-    """Yield the decimals in which a dialect may have written poses, shape (n, 6), this program's first.
-
-    Fewer are possible only if no pose has more.
-    """
+    """Yield the decimals in which a dialect may have written poses, shape (n, 6), this program's first."""
     yield DECIMALS
     enough = [[n for n in COARSER if n <= most and _off(poses[:, axes], n) < _SAME] for axes, most in _GROUPS]
     yield from (found for mm in enough[0] for deg in enough[1] if (found := (mm,) * 3 + (deg,) * 3) != DECIMALS)
@@ -166,7 +163,6 @@ def _sums(numbers: NDArray[np.int64], axes: slice = slice(None)) -> NDArray[np.u
 
 
 def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
-    """Return whether a sum, spread over 64 bits, begins with zeros."""
     return _begin_with_zeros(sums, _MIXING, np.append(_SHIFTS, np.uint64(64 - bits)))
 
 

@@ -20,8 +20,6 @@ def longest(
 ) -> NDArray[np.int64]:
     """Return the ends of pieces, each as far as the tolerance allows: the fewest if parts of a good piece are good.
 
-    A piece to the next allowed end is always possible, even across a step.
-
     Args:
         may_end: where pieces may end, besides first and last place, shape (n,).
         tolerance_mm: from a place to the point of its piece at the same share of the way.

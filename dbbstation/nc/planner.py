@@ -81,10 +81,7 @@ class Planner:
 
 
 def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Return the rows at feed that move the tool tip, shape (n,).
-
-    Turns about a stationary tip depend on the angles' acceleration, which is unknown.
-    """
+    """Return the rows at feed that move the tool tip, shape (n,)."""
     return (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 
 

@@ -103,10 +103,7 @@ def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
 
 
 def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
-    """Return rows to compensate part by part, so that long programs take little memory.
-
-    A part begins with a move at feed, with a new run if one is near, else within an arc.
-    """
+    """Return rows to compensate part by part, so that long programs take little memory."""
     leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
     # The first move shows where the machine comes from.
     may = np.flatnonzero(leads_on)[1:]

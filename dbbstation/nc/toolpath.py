@@ -138,10 +138,7 @@ class Toolpath:
         return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
 
     def divided(self, row: NDArray[np.int64], poses: NDArray[np.float64]) -> Toolpath:
-        """Return the toolpath with some rows in several pieces.
-
-        Texts and exact stops go with a row's last piece. Pieces are not merged.
-        """
+        """Return the toolpath with some rows in several pieces."""
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
         place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
         corners = self.corners_mm[row]

@@ -1,8 +1,4 @@
-"""The trial of a dialect: whether it reads its own programs.
-
-Every kind of row is written and read back, singly and together. Dropped, changed or moved rows are faults. An error for
-missing words is not.
-"""
+"""The trial of a dialect: whether it reads its own programs."""
 
 from __future__ import annotations
 
@@ -78,7 +74,6 @@ def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:
 
 
 def _faults_of_mark(dialect: Dialect) -> list[str]:
-    """Return whether a compensated program is not recognised without its header."""
     path = _built([_curve])
     if is_marked(_read(dialect, marked(path, dialect.decimals))):
         return []

@@ -1,8 +1,4 @@
-"""Write a toolpath as lines of words, with one method for each kind of row.
-
-A dialect derives from `WordDialect` and omits what its control lacks. A row without a method is refused by name and
-line.
-"""
+"""Write a toolpath as lines of words, with one method for each kind of row."""
 
 from __future__ import annotations
 
@@ -59,11 +55,7 @@ class CannotSayError(StationError):
 
 
 class WordDialect(Dialect):
-    """A dialect of lines of words; axes and F are written when they change.
-
-    `words` is the table of what is written. A row without an entry is refused by name. A method is overridden where a table
-    is not enough.
-    """
+    """A dialect of lines of words; axes and F are written when they change."""
 
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Text of `begin`, `rapid` and `feed` ({words}), `in machine` ({move}), `exact`, `exact stop`, `continuous`, `within` ({mm}),
@@ -260,7 +252,6 @@ class WordDialect(Dialect):
         return said[kind](text)
 
     def _words(self, toolpath: Toolpath, changed: NDArray[np.bool_], rows: slice) -> list[str]:
-        """Return words of the axes that each row moves; empty for other rows."""
         poses, changed = toolpath.numbers_written[rows], changed[rows]
         texts = [""] * len(poses)
         which = changed @ (1 << np.arange(6))
@@ -292,11 +283,7 @@ SAME = 1e-9
 
 
 def changed_axes(toolpath: Toolpath) -> NDArray[np.bool_]:
-    """Return axes that each row must name, shape (n, 6); none in rows that are no moves.
-
-    A row names axes that change or become known, and never unknown ones. The first move names all known axes, except those
-    at the program's start.
-    """
+    """Return axes that each row must name, shape (n, 6); none in rows that are no moves."""
     moves = np.flatnonzero(toolpath.is_move)
     poses = toolpath.poses[moves]
     known = (toolpath.unknown[moves][:, None] >> np.arange(6)) & 1 == 0

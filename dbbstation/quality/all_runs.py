@@ -141,10 +141,7 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
 
 
 def bar_of_all(runs: Sequence[Seen], forms: AllForms | None = None, *, by_model: bool) -> Finding:
-    """Return whether all runs together fit a bar of another length better.
-
-    Without a model this is undecided, because an oversized machine explains the same readings.
-    """
+    """Return whether all runs together fit a bar of another length better."""
     known = [one for one in runs if one.run.expected is not None and one.run.bar_stated]
     if not known:
         return undecided(Name.BAR, "no calibrated length of the bar is stated")

@@ -46,10 +46,7 @@ class _Peak:
 
 
 def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
-    """Judge the most outstanding stretch of the path.
-
-    The limit follows from noise and the scatter of stretches, and at reversals from the turn's other reversals.
-    """
+    """Judge the most outstanding stretch of the path."""
     rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
     near = near_reversals(one.raw.theta_deg, reversals_deg)
     peaks = [peak for width in WIDTHS_DEG for peak in _peaks(one, rest, near, width)]

@@ -131,8 +131,6 @@ class Forms:
     def part(self, runs: Sequence[Held], beside: Held | None = None) -> FormsBesides:
         """Return the forms of some held runs, and their prediction of the others.
 
-        A drift in overlaps may continue through the session: its usual size is that of all these runs.
-
         Args:
             beside: run compared with them, whose overlap counts too.
         """
@@ -209,8 +207,6 @@ class FormsBesides:
 
 
 class _Columns:
-    """Columns of effects on forms, extensible."""
-
     def __init__(self) -> None:
         self._of: dict[tuple[str, str], slice] = {}
         self._effects = np.zeros((0, 0))

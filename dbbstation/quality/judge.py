@@ -61,8 +61,6 @@ def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _do
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """Two runs of one test."""
-
     one: Seen
     other: Seen
 
@@ -118,10 +116,7 @@ class SessionRuns:
 
     @with_one_thread
     def judge(self, one: Seen) -> Judgement:
-        """Judge one run of the same session.
-
-        With a model, a run must agree with it and with other runs of a usual machine.
-        """
+        """Judge one run of the same session."""
         others = self._others(one)
         findings = list(by_itself(one, others))
         if one.analysis is not None:
@@ -141,7 +136,6 @@ class SessionRuns:
         return self._without
 
     def _beside(self, one: Seen, analysis: CircleAnalysis, others: Others | None = None) -> list[Finding]:
-        """Return findings of a run by its expected circle and other runs."""
         others = others or self._others(one)
         both = together(one, self._runs if one in self._runs else [*self._runs, one], self._forms.planned)
         by_others = expected_beside(both)

@@ -84,10 +84,7 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
 
 
 def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
-    """Judge mean, centre, ellipse and triangle together.
-
-    A wrong tilt, plane or radius in both directions changes each a little, within its limit.
-    """
+    """Judge mean, centre, ellipse and triangle together."""
     if expected is None:
         return undecided(Name.FORM, "no expected form is known", "µm")
     covariance = expected.known_um2

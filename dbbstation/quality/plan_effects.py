@@ -134,10 +134,7 @@ class RunEffects:
         return np.where(labels >= 0, labels, own)
 
     def product(self, label: int) -> NDArray[np.float64]:
-        """Return products of whitened effects and readings, shape (p + 1, p + 1).
-
-        The readings are the last row and column; their own product has the log determinant of the scatter added.
-        """
+        """Return products of whitened effects and readings, shape (p + 1, p + 1)."""
         if label not in self._products:
             root = np.linalg.cholesky(self.scatter[label])
             read = np.column_stack([self._plan.shared[self.shows(label)], self.off[label]])

@@ -1,7 +1,4 @@
-"""Repeated readings: a gauge asked too often, or rows written twice.
-
-They change no figure, but their times are stale and U comes out too small.
-"""
+"""Repeated readings: a gauge asked too often, or rows written twice."""
 
 from __future__ import annotations
 

@@ -127,7 +127,6 @@ def _leverage(axes: Axes, leverage: Mapping[str, float]) -> None:
 
 
 def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> None:
-    """Draw magnified arrows from balls to circle centres, from above."""
     where = np.array([test.ball_mm for test in tests])
     shift = np.array([test.centre_um[k] for test in tests])
     longest = float(np.hypot(*shift.T).max()) or 1.0

@@ -72,7 +72,6 @@ def _lacking(session: SessionFolder, job: str) -> list[str]:
 
 
 def _early(session: SessionFolder) -> list[str]:
-    """Return the first run that was sealed before it was measured."""
     early = [run for run, after in sealed_after(session) if after < -timedelta(seconds=CLOCK_S)]
     return [f"run {early[0].label} sealed before it was measured"] if early else []
 
@@ -86,7 +85,6 @@ def sealed_after(session: SessionFolder) -> list[tuple[RunEntry, timedelta]]:
 
 
 def _dates(session: SessionFolder) -> Iterator[str]:
-    """Yield dates that cannot be right, or are too far apart."""
     moments = [run.started for run in session.in_state(RunState.ACCEPTED) if run.started is not None]
     if not moments:
         return

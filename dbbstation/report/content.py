@@ -164,7 +164,6 @@ def _said(reported: Reported, key: str) -> str:
 
 
 def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:
-    """Yield sessions with circles; `bad` names tests that need attention."""
     for session in reported.found.sessions:
         circles = [one for one in reported.found.circles if one.session == session.name]
         tests = list(dict.fromkeys(one.entry.test for one in circles))
@@ -238,7 +237,6 @@ def _budgets(circles: CirclesResult) -> Iterable[tuple[str, Budget]]:
 
 
 def _budget(circles: CirclesResult) -> ShownBudget | None:
-    """Return the budget of the circle whose figures have the largest standard uncertainty."""
     runs = [one for one in circles.runs if not isinstance(one, RunWithoutCircle)]
     if not runs:
         return None
@@ -266,7 +264,6 @@ def _why_not(circles: CirclesResult) -> list[str]:
 
 
 def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:
-    """Yield name and SHA-256 of every underlying file."""
     yield from provenance.inputs.items()
     for found in (reported.found, *(() if reported.before is None else (reported.before,))):
         for one in found.circles:

@@ -83,7 +83,6 @@ def _tested(diagnosis: Diagnosis) -> list[Followed]:
 
 
 def _levels(axes: Axes, classes: Sequence[Followed]) -> None:
-    """Draw each class's error in held-out tests before and after, by what it follows and where."""
     place = np.arange(len(classes))
     for off, colour, label in ((-0.2, BEFORE, "before"), (0.2, AFTER, "after")):
         axes.barh(place + off, [getattr(one, label) for one in classes], 0.4, color=colour, label=label)

@@ -148,7 +148,6 @@ def _turn(axes: Axes) -> None:
 
 
 def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
-    """Write lines at a box's top; return their end [inch]."""
     y = box.bottom + box.height
     for k, line in enumerate(lines):
         size = SMALL_PT if k else TEXT_PT

@@ -25,9 +25,6 @@ _NUMBER = re.compile(rb"-?\d+\.\d+")
 def as_svg(figure: Figure, metadata: Mapping[str, Any] | None = None) -> bytes:
     """Return reproducible bytes.
 
-    Straight paths are rounded to a tenth of a point, round ones to a hundredth. Clipping frames, named by hashes of all
-    digits, are renumbered, since the layout's rounding varies.
-
     Args:
         metadata: Dublin Core names for Matplotlib.
     """
@@ -45,17 +42,12 @@ def _rounded(number: re.Match[bytes]) -> bytes:
 
 
 def _shorter(path: bytes) -> bytes:
-    """Rewrite straight paths as steps."""
     if not _POLYGON.fullmatch(path):
         return _FURTHER_DIGITS.sub(rb"\1", path)
     return "".join(_steps(path.decode().split())).replace(" -", "-").encode()
 
 
 def _steps(words: list[str]) -> Iterator[str]:
-    """Return steps between rounded points, without repeated points.
-
-    A step's letter holds for the next ones; a single point keeps a step as a dot.
-    """
     at, before, k = (0, 0), "", 0
     while k < len(words):
         command = words[k]

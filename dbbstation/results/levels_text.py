@@ -100,7 +100,6 @@ def _difference(one: DifferenceFound, unit: str, what: str, rows: str) -> Iterat
 
 
 def _hidden(one: DifferenceFound, unit: str) -> Iterator[str]:
-    """Return the hidden part of causes and measurements that would show it."""
     named = [d for d in one.detectable if d.size is not None and d.confirm is not None]
     for d in [d for d in named if d.concealed > LIKELY][:MOST_LISTED]:
         share = f"{100.0 * d.concealed:.0f} %"
@@ -154,7 +153,6 @@ def _law(form: LawForm, values: Mapping[str, Mapping[str, Value]], rows: str) ->
 
 
 def _numbers(values: Mapping[str, Value]) -> str:
-    """Return numbers of a law, with unit and u; curves are omitted."""
     if not values or len(values) > MOST_LISTED:
         return ""
     return f", {', '.join(f'{name} {value.in_words}' for name, value in values.items())}"

@@ -1,7 +1,4 @@
-"""Sentences of answers, the same on terminal and screen.
-
-They take a result, or its JSON as objects, so that a screen need not load the classes of results.
-"""
+"""Sentences of answers, the same on terminal and screen."""
 
 from __future__ import annotations
 

@@ -88,8 +88,6 @@ def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
 def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
     """Copy a former session's models into a folder and return the copies.
 
-    A copy is named by its content and never overwritten.
-
     Raises:
         OutputError: one cannot be written.
         OSError: one cannot be read.

@@ -243,8 +243,6 @@ class Front:
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Start virtual parts, remember the choice and return the sequence's runner.
 
-        A continued session gets the temperature as a note.
-
         Raises:
             StationError: the virtual machine refuses, or another process writes into the session.
         """

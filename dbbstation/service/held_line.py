@@ -37,8 +37,6 @@ _JOIN_S = 10.0
 class HeldLine:
     """Owns an instrument until it is closed.
 
-    Readings are shown only while it is not lent, and not passed to a borrower. A failed instrument is reopened.
-
     Attributes:
         latest: None before a reading and during failure.
     """

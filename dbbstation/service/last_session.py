@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
     """Return a test's last accepted circles in the session before, by direction; may be empty.
 
-    Unreadable circles are left out.
-
     Raises:
         InputError: the present session cannot be read.
     """

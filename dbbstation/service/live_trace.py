@@ -38,10 +38,7 @@ class View(StrEnum):
 
 
 class LiveTrace:
-    """Live angles and deviations of one run.
-
-    Only the full turn is kept; samples off the circle break the line. Of close samples the extremes are kept.
-    """
+    """Live angles and deviations of one run."""
 
     def __init__(self, run: RunId, circle: Circle) -> None:
         self.run = run
@@ -170,11 +167,7 @@ class Derived:
 
 
 def difference(ccw: Derived, cw: Derived) -> Derived | None:
-    """Return counter-clockwise minus clockwise at equal angles, or None without common ones.
-
-    Both are centred: live angles err by a degree or two, opposite in both directions, and a centre off by 200 µm would
-    give 7 µm per degree. The clockwise trace is interpolated linearly.
-    """
+    """Return counter-clockwise minus clockwise at equal angles, or None without common ones."""
     placed = np.isfinite(cw.theta_deg)
     if not placed.any():
         return None

@@ -170,10 +170,7 @@ def answer_of(
     report: Path | None,
     trouble: str = "",
 ) -> Answered:
-    """Return the answer of a report, which is complete only with every planned run.
-
-    A limit is exceeded even if runs are missing. Commands, which the operator cannot run, are left to the report.
-    """
+    """Return the answer of a report, which is complete only with every planned run."""
     verdict = answer.verdict
     kinds = {str(one): one for one in Conformity}
     word = kinds.get(verdict.kind, Conformity.UNDECIDED)

@@ -14,10 +14,7 @@ if TYPE_CHECKING:
 
 
 def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
-    """Return instrument and port for an existing session.
-
-    A virtual session continues on a virtual machine; a real one never does.
-    """
+    """Return instrument and port for an existing session."""
     try:
         session = read_session(folder)
     except InputError:  # what is wrong with it is said where it is opened

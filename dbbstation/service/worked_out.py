@@ -68,10 +68,7 @@ def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
 
 
 def steps_before(session: Path) -> StepsBefore | None:
-    """Return the last results of an unchanged session, or None.
-
-    Steps with missing files are left out.
-    """
+    """Return the last results of an unchanged session, or None."""
     session = session.absolute()
     kept = sorted(
         session.parent.glob(f"{glob.escape(session.name)}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime
@@ -90,7 +87,6 @@ def steps_before(session: Path) -> StepsBefore | None:
 
 
 def _kept(file: Path) -> _File | None:
-    """Return a file's steps; None if missing or invalid."""
     try:
         return _File.model_validate_json(content_of(file, LARGEST_BYTES))
     except (OSError, ValidationError):

@@ -70,7 +70,6 @@ def main() -> None:
 
 
 def _interrupted_at_the_end() -> None:
-    """Interrupt the work when the input ends."""
     # Not by `sys.stdin`: its lock would be held when the interpreter ends.
     while os.read(sys.stdin.fileno(), 1):
         pass

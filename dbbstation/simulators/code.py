@@ -128,7 +128,6 @@ POINTS = 41
 
 
 def _body(term: Term, a: str, shape: str) -> str:
-    """Return the body of a term with memory; else empty."""
     if term.form is TermForm.MEMORY:
         return _BEHIND.format(tau=shape, out=f"{a} * (x + behind)")
     if term.form is TermForm.LAG:

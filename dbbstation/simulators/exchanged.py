@@ -1,8 +1,4 @@
-"""Simulators that take port inputs and return port signals.
-
-Terms of the simulated state are found by iteration [waveform relaxation; Lelarasmee, Ruehli and
-Sangiovanni-Vincentelli, IEEE Trans. CAD 1 (1982) 131].
-"""
+"""Simulators that take port inputs and return port signals."""
 
 from __future__ import annotations
 

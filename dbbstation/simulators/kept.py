@@ -1,8 +1,4 @@
-"""Earlier simulations kept by content in the user's cache folder.
-
-Content: the simulator's files, command and variable names, the program, inputs, parameters and terms; not other files
-that it reads.
-"""
+"""Earlier simulations kept by content in the user's cache folder."""
 
 from __future__ import annotations
 

@@ -105,7 +105,6 @@ def load_simulator(
 
 
 def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
-    """Return a simulator's executed Python file, or its program or FMU."""
     ports = {name: tuple(port.signals) for name, port in file.ports.items()}
     if file.program is not None:
         command = whole_command(file.program, path.parent)
@@ -148,8 +147,6 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
 
 
 def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
-    """Return own physics."""
-
     def fault_of(one: PortSource) -> tuple[str, str] | None:
         if one.port not in file.ports:
             there = ", ".join(file.ports)
@@ -168,7 +165,6 @@ def know(files: Sequence[Path]) -> None:
 
 
 def _try_once(one: PortSource, signals: Iterable[str]) -> None:
-    """Try own physics once before any simulation."""
     values = {p.name: p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in one.parameters()}
     float(one.value(0.0, dict.fromkeys(signals, 1.0), values))
 

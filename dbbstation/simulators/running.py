@@ -186,7 +186,6 @@ def _several(
 
 
 def _one(source: Path | ExchangedSimulator, model: Model, ask: SimulationRequest) -> SimulationOutcome:
-    """Run one simulation."""
     simulator = simulator_of(source) if isinstance(source, Path) else source
     place = str(source) if isinstance(source, Path) else source.said
     try:

@@ -59,10 +59,7 @@ class Sisters:
 def held_against_sisters(
     values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
 ) -> Sisters:
-    """Compare machines with their sisters: values and standard uncertainties, shape (q, n), NaN if unknown.
-
-    `false_alarms` is the probability of any unlike value over all like machines.
-    """
+    """Compare machines with their sisters: values and standard uncertainties, shape (q, n), NaN if unknown."""
     unlike = unlike_machines(values, u, false_alarms)
     return _scored(values, u, unlike, _share(values, false_alarms))
 

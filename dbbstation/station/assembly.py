@@ -85,7 +85,6 @@ class Job:
             check_range(plan, self.range_mm, file=plan_file)
 
     def _check_room(self, plan: Plan) -> None:
-        """Refuse a disk on which the circles have no room."""
         circles = [test.run(direction) for test in plan.tests.values() for direction in test.directions]
         needed = LEAST_FREE + BYTES_PER_READING * (self.rate_hz or 0.0) * circles_s(circles)
         free = free_bytes(self.folder)

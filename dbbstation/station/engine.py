@@ -33,11 +33,7 @@ class ReadingSource(Protocol):
 
 
 class Station:
-    """Runs a sequence to its end.
-
-    `send` works from any thread. Observers run in the thread of `run`, in subscription order; storage is first, so that
-    others see only what is kept.
-    """
+    """Runs a sequence to its end."""
 
     def __init__(self, sequencer: Sequencer, source: ReadingSource) -> None:
         self._sequencer = sequencer

@@ -152,7 +152,6 @@ class RunJudge:
 
     @cached_property
     def _reference(self) -> FormerSitting | None:
-        """Return the session before, if it has every circle of the plan."""
         former, read = self._former, {}
         if former is None:
             return None
@@ -178,7 +177,6 @@ class RunJudge:
 def _decided(
     findings: tuple[Finding, ...], one: Seen, assigned: Assigned, suspect: Finding | None
 ) -> tuple[Finding, ...]:
-    """Return findings with decisions by all runs together."""
     decided = []
     for finding in findings:
         if suspect is not None and finding.name is suspect.name:

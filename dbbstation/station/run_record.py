@@ -1,7 +1,4 @@
-"""The current run: sample count, edges, and its circle in the end.
-
-Samples are not kept here, so that memory does not grow; their recorder returns them.
-"""
+"""The current run: sample count, edges, and its circle in the end."""
 
 from __future__ import annotations
 

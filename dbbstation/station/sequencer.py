@@ -75,9 +75,6 @@ LOOK_AFTER_LINE = "look after bar, balls and cable"
 class Sequencer:
     """Walks through a plan by the table of `states.py`.
 
-    Time is that of the readings, so that playback, virtual machines and tests are alike. Each method returns events in
-    order.
-
     Args:
         waiting: recorded runs without verdict, oldest first; judged before measuring.
         doubted: accepted runs that the run just judged puts in doubt.
@@ -258,7 +255,6 @@ class Sequencer:
         self._to_next(COMMAND_CAUSES[type(command)])
 
     def _take_back(self, command: Accept | Repeat) -> None:
-        """Withdraw the doubted runs; the first of them comes next."""
         doubted = self._doubted if command.back else {}
         for run, finding in doubted.items():
             self.schedule.judge(run.test, run.direction, run.repeat, accepted=False)
@@ -374,7 +370,6 @@ class Sequencer:
             self._out.append(events.RunProgress(self._record.run, swept, self._record.circle.swept_deg))
 
     def _look_for_missed(self, reading: Reading) -> None:
-        """Report an unrecorded circle."""
         if self._watch is None or reading.length_mm is None or reading.status != OK:
             return
         if not self._watch.seen(reading.t_s, reading.length_mm):
@@ -475,7 +470,6 @@ class Sequencer:
 
 
 def _length_gone(reading: Reading, phi_deg: float) -> str:
-    """Report a gap within the turn, which no fit restores."""
     said = f" ({reading.said})" if reading.said else ""
     what = f"the instrument reports {reading.status}{said} at {phi_deg:.0f}° of the turn"
     return f"{what}; {reading.remedy or 'check bar and instrument'}, then repeat the run"

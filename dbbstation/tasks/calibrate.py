@@ -154,7 +154,6 @@ def _prescribed(names: Sequence[str] | None, method: Method) -> list[Name] | Non
 def _following_thermometers(
     fitted: tuple[ErrorSource, ...], recorded: Recorded, telling: Telling
 ) -> tuple[ErrorSource, ...]:
-    """Return sources that grow with logged temperatures instead of time, with a note."""
     from dbbstation.model.observation import Motions
     from dbbstation.sources.laws.by_temperature import following_thermometers
 

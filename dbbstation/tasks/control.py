@@ -239,7 +239,6 @@ def _rotation_note(machine: Machine) -> list[str]:
 
 
 def _active(ini: Path) -> list[str]:
-    """Return an INI file's existing corrections of joints, a note each."""
     section, found = "", []
     for line in program_text(ini).splitlines():
         section = line.strip() if line.strip().startswith("[") else section

@@ -1,7 +1,4 @@
-"""What a task takes, stated once in its signature: command line, checks in Python, documentation and messages are made of it.
-
-    @task("calibrate", stages=STAGES)
-    def calibrate(sessions: o.Sessions, *, step_deg: Annotated[float, Option("Angle between points [deg].", least=0.01)] = 0.1): ...
+"""What a task takes, stated once in its signature: command line, checks, documentation and messages are made of it.
 
 A parameter without an `Option` is for Python only. This module loads fast, since help texts need it.
 """

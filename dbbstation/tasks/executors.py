@@ -64,9 +64,6 @@ class WorkPool(Generic[Item, Result]):
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[tuple[int, Result | Ended]]:
         """Yield the place and result of items, each once, as they are done.
 
-        If a process ends, only its item is done anew. A local pool restarts and tries suspects singly; an item that ends
-        its process again is `Ended`.
-
         Raises:
             SchedulerError: as `executor`; or the scheduler disappeared.
             Exception: whatever `work` raises.

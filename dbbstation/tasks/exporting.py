@@ -170,8 +170,6 @@ def write_csv(
 ) -> int:
     """Write the table as CSV with its provenance file; return the number of rows.
 
-    Numbers read back the same bits; gaps are empty cells.
-
     Raises:
         InputError: a run cannot be read.
         OutputError: a file exists without `force`, or the disk refuses; nothing is replaced.

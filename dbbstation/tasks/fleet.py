@@ -102,9 +102,6 @@ def fleet(
 ) -> FleetResult:
     """Do one task on every session of some folders and compare the machines.
 
-    Results are written at once and reused while inputs, options and program are equal. A failing session is named, and
-    the others are done.
-
     Args:
         folders: of sessions, at most four levels deep, or sessions.
         task: `calibrate`, `circles`, `diagnose` or `report`.

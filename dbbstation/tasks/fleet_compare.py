@@ -40,10 +40,7 @@ _Key = tuple[str, ...]
 
 
 def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
-    """Compare machines.
-
-    Figures compare between machines with the same circle. Parameters and causes compare only within one nominal geometry.
-    """
+    """Compare machines."""
     kinds, notes = _geometries(sisters)
     rows: dict[_Key, dict[int, FleetValue]] = defaultdict(dict)
     for place, sister in enumerate(sisters):
@@ -104,7 +101,6 @@ _LARGEST_LOG = 300.0
 
 
 def _geometries(sisters: Sequence[Sister]) -> tuple[list[int], list[str]]:
-    """Return each machine's kind by nominal geometry, and differences in words."""
     first: list[int] = []
     kinds: list[int] = []
     for place, sister in enumerate(sisters):

@@ -201,7 +201,6 @@ TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, 
 
 
 def _provenance(piece: FleetPiece) -> Provenance:
-    """Return the provenance as of a single session's command."""
     command = shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()])
     return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
 

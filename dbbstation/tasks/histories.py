@@ -50,9 +50,6 @@ def histories_in(
 ) -> HistoryResult:
     """Return the histories of all machines with sessions in a folder, at most four levels deep.
 
-    A session is read again only if its files' stamps and contents are unknown to the index. Unreadable sessions are named
-    and left out.
-
     Args:
         folder: with sessions, and models of `calibrate` or `diagnose`.
         rebuild: ignore the index.
@@ -136,8 +133,6 @@ class _Unreadable:
 
 
 class _Reading:
-    """Reads sessions and models through the index."""
-
     def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
         self.of = of
         self.left_out: list[tuple[str, str]] = []
@@ -206,7 +201,6 @@ def _beside(session_file: Path) -> list[Path]:
 
 
 def _contents(path: Path, others: Sequence[Path]) -> list[tuple[str, str]]:
-    """Return names and SHA-256 of files; of an unreadable one only the name."""
     found = [("", digest_of(path))]
     for other in others:
         name = os.path.relpath(other, path.parent)

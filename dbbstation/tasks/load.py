@@ -236,7 +236,6 @@ def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[S
 def _with_thermometers(
     observations: Sequence[Observation], logs: Mapping[str, Sequence[tuple[float, Recording]]]
 ) -> list[Observation]:
-    """Give every run the thermometers of its session that all used runs have."""
     of = {}
     for session, runs in logs.items():
         known = (set(o.raw.temperature_degc) for o in observations if o.setup.session == session)
@@ -280,7 +279,6 @@ def _readings(recording: Recording) -> bytes:
 
 
 def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
-    """Refuse sessions with different machine files; a different name is only noted."""
     first = sessions[0]
     told, faults = [], []
     for other in sessions[1:]:

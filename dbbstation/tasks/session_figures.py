@@ -104,7 +104,6 @@ def _as_printed(parameter: ModelParameter) -> ModelParameter:
 
 
 def _in_words(circle: Circle) -> str:
-    """Return the common facts of comparable circles: place, bar, tilt, elevation, feed."""
     place = " ".join(f"{axis}{round(value)}" for axis, value in zip("XYZ", circle.ball_mm, strict=True))
     tilt = " ".join(f"{axis}{value:g}" for axis, value in zip("ABC", circle.tilt_deg, strict=True) if value)
     raised = f", bar raised {circle.elevation_deg:g}°" if circle.elevation_deg else ""

@@ -84,8 +84,6 @@ def stated_variables(
 ) -> dict[str, Meaning | None] | None:
     """Return variables of an option, `q1=deg,temperature,torque=N m:result`, of a mapping or of names; None to guess.
 
-    `:result` marks a variable that results from the simulation.
-
     Raises:
         ArgumentError: an unknown unit or kind.
     """
@@ -226,8 +224,6 @@ def load_sources(
 
 
 class _Reader:
-    """Joins files column by column."""
-
     def __init__(self, files: Sequence[TableFile], asked: TableOptions, unit: str) -> None:
         self._files, self._asked, self._unit = files, asked, unit
         self._notes: list[str] = []
@@ -278,7 +274,6 @@ class _Reader:
         return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
 
     def _note_order(self, clock: str | None, at: Variable | None, blocks: Sequence[slice]) -> None:
-        """Note the limits of the rows: a constant clock, or a single run."""
         if clock is not None and at is None:
             self._notes.append(
                 f"`{clock}` is the same in all rows: their order is unknown; give --time rows if they are in order"
@@ -428,7 +423,6 @@ class _Reader:
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
-        """Return whether a column derives from measured and simulated value."""
         asked = self._asked
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.measured], kept[asked.simulated]])
         values, *_ = np.linalg.lstsq(both, variable.values, rcond=None)

@@ -45,8 +45,6 @@ def best_circle(
 ) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
     """Return centre, shape (2,) [mm], radius [mm] and deviations, shape (n,) [mm], of the least-squares circle [CAL eq 6].
 
-    Polar points are fitted by Gauss-Newton.
-
     Args:
         near_mm: approximate centre, shape (2,), to save steps.
 

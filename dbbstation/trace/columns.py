@@ -1,7 +1,4 @@
-"""Columns of a recorded run, each declared once.
-
-A line in `COLUMNS` makes a column read, checked, written, cut, averaged and visible in `Motion.logged`.
-"""
+"""Columns of a recorded run, each declared once."""
 
 from __future__ import annotations
 

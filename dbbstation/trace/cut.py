@@ -260,10 +260,7 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
 
 
 def feed_off(found: tuple[float, float], recording: Recording, circle: Circle, edges: tuple[float, float]) -> float:
-    """Return how far a feed that the overlap shows is off, in units of its limit.
-
-    A larger circle at the programmed feed takes longer: the angle rises with bar length over mean length.
-    """
+    """Return how far a feed that the overlap shows is off, in units of its limit."""
     t, length = recording.good.t_s, recording.good.length_mm
     larger = circle.bar_mm / float(np.median(length[(t > edges[0]) & (t < edges[1])]))
     limit = max(FEED_TOLERANCE * circle.feed_mm_min, FEED_SIGMAS * found[1])

@@ -58,7 +58,6 @@ def feeding_ways(
 def _way(
     recording: Recording, circle: Circle, behind_s: NDArray[np.float64], along_deg: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """Return way and standard uncertainty at one corner [µm]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     outside = recording.length_mm[(behind_s > -OUTSIDE_FEEDINGS * feeding_s) & (behind_s < -feeding_s)]
     chosen = (along_deg > LEFT_OUT_DEG) & (along_deg < LEFT_OUT_DEG + READ_DEG)

@@ -28,8 +28,6 @@ def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArra
 def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
     """Return a closed profile without short undulations, at the same angles.
 
-    Each sample counts by its arc.
-
     Args:
         cut_off_upr: half of whose amplitude passes.
     """

@@ -11,9 +11,6 @@ from dbbstation.text.printable import TEXT
 
 
 def show_controls() -> None:
-    """Let Textual and Rich show control characters.
-
-    Both remove only five of them, without escape. Textual is pinned, and a test guards its table.
-    """
+    """Let Textual and Rich show control characters."""
     for table in (content._CONTROL_STRIP_TRANSLATE, control._CONTROL_STRIP_TRANSLATE):  # noqa: SLF001 (no other way in)
         cast("dict[int, str]", table).update(TEXT)

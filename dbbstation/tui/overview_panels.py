@@ -90,10 +90,7 @@ class LeftLine(Panel):
 
 
 class PlateMap(Panel):
-    """Bores in place, with their tests: a row per direction with sign, word and circularity.
-
-    A narrow map has a row per test with signs and the greater circularity.
-    """
+    """Bores in place, with their tests: a row per direction with sign, word and circularity."""
 
     def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -141,7 +138,6 @@ class PlateMap(Panel):
     def _directions(
         self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int
     ) -> list[Content]:
-        """Return rows of a test, one per direction, without repeats at the plan's end."""
         rows: list[Content] = []
         for task, mark in signs.get(name, []):
             if task.occurrence > 1:
@@ -168,7 +164,6 @@ class PlateMap(Panel):
 
 
 def _filled(text: Content, figure_um: float | None, width: int) -> Content:
-    """Return a cell with as much of figure and unit as fits."""
     told = () if figure_um is None else (f"{figure_um:5.1f} µm", f"{figure_um:5.1f}", f" {figure_um:.0f}")
     fitting = [figure for figure in told if len(text.plain) + len(figure) < width]
     text += Content(fitting[0] if fitting else "")
@@ -243,7 +238,6 @@ def _figures(completed: RunCompleted) -> str:
 
 
 def _decided(board: Board, completed: RunCompleted) -> Content:
-    """Return verdict and reason, then each wrong finding with number and limit."""
     label = completed.run.label
     verdict = board.verdicts.get(label, RunDecision.NONE).value or texts.NO_VERDICT
     reason = board.reasons.get(label, "")
@@ -281,7 +275,6 @@ def _run(board: Board, task: Task, mark: Mark, *, marked: bool, wide: bool) -> C
 
 
 def _rows_needed(shown: Shown, per_test: int) -> int:
-    """Return the rows of the map without gaps."""
     ys = {y for _, y in shown.bores.values()}
     deepest = 0
     for y in ys:

@@ -159,7 +159,6 @@ class PrepareScreen(RowScreen):
         yield from self._shop()
 
     def _reading(self, line: HeldLine) -> tuple[str, str]:
-        """Return the reading, and the bar's place for the first circle."""
         latest, first = line.latest, self._prepared.first
         if line.failure is not None:
             return _OPEN, texts.CHECK_SILENT.format(why=line.failure, again_s=AGAIN_S)

@@ -102,7 +102,6 @@ def _later(found: RunAssessment) -> str:
 
 
 def _looked_back(board: Board) -> str:
-    """Return the wrong earlier circles, and that Enter leads back to them."""
     first = next(iter(board.doubted.values()))
     completed = board.completed
     mine = f"{completed.answer.word}  {completed.run.label}. " if completed is not None else ""

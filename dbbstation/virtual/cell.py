@@ -24,10 +24,7 @@ class _Running:
 
 
 class VirtualCell:
-    """The bar's reading at any virtual time.
-
-    The bar is off the balls before a run and during set-up; after a run it stays.
-    """
+    """The bar's reading at any virtual time."""
 
     def __init__(self, machine: VirtualMachine, clock: ScaledClock) -> None:
         self.machine = machine

@@ -1,15 +1,4 @@
-"""The control address of the virtual machine: one line of text in, one line of JSON out, on the loopback address only.
-
-    mount TEST                       put up the ball of a test, in any case a new mounting
-    start TEST DIRECTION [PROGRAM]   run a circle; its ball is put up first where another one stands
-    calibrator LENGTH_MM             put the bar on a calibrator of this length
-    status                           what the machine does
-    truth                            everything that is wrong with it
-    stop                             stop the machine, lay the bar aside
-    quit                             end the program
-
-Every answer has `ok`; where that is false, `error` says why.
-"""
+"""The control address of the virtual machine: one line of text in, one line of JSON out, on the loopback address only."""
 
 from __future__ import annotations
 

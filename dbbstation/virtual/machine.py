@@ -98,8 +98,6 @@ class VirtualMachine:
     ) -> VirtualRun:
         """Compute a run, with its ball put up if needed.
 
-        A ball under the spindle stands at the tip of its mounting's first run.
-
         Args:
             path: None: the plan's circle.
             begin_s: in the session, for errors over time.

@@ -1,7 +1,4 @@
-"""The virtual instrument: answers on a pseudo-terminal by a protocol file, at the line's speed.
-
-It uses the driver's grammar and measures a function of virtual time.
-"""
+"""The virtual instrument: answers on a pseudo-terminal by a protocol file, at the line's speed."""
 
 from __future__ import annotations
 

@@ -73,10 +73,7 @@ class ScaledClock:
 
 
 class WaitingClock(ScaledClock):
-    """Machine time that passes only during runs, as fast as samples are read or asked for.
-
-    A busy computer changes nothing in machine time.
-    """
+    """Machine time that passes only during runs, as fast as samples are read or asked for."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -12,10 +12,7 @@ TOLERANCE = 0.04
 
 
 def heard_at(raw: bytes, line: LineSettings, *, sent_baud: int, heard_baud: int) -> bytes:
-    """Return what a receiver at `heard_baud` makes of `raw` sent at `sent_baud`.
-
-    Both use `line`'s data bits, parity and stop bits, unchecked.
-    """
+    """Return what a receiver at `heard_baud` makes of `raw` sent at `sent_baud`."""
     if abs(heard_baud / sent_baud - 1.0) <= TOLERANCE:
         return raw
     bits = [bit for byte in raw for bit in _sent_bits(byte, line)]

@@ -20,10 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PlanCheck:
-    """Redundancy of the tests.
-
-    Directions determined by single circles, minus those used by the fit, can contradict the plan.
-    """
+    """Redundancy of the tests."""
 
     tests: int
     determined: int
@@ -39,11 +36,7 @@ class PlanCheck:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def enough(self) -> bool:
-        """Return whether the tests can show a wrong plan.
-
-        The remainder must be at least one whole circle's. Three circles leave 3 to 5, four leave 12; one circle
-        determines 9.
-        """
+        """Return whether the tests can show a wrong plan."""
         return self.left >= self.of_one_test
 
 

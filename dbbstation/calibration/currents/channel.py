@@ -1,7 +1,4 @@
-"""Motor currents as a second channel: load profiles of struts beside circles [GRAV 3.2].
-
-Each motor is an instrument with own noise. Compressed blocks of both channels enter one solution.
-"""
+"""Motor currents as a second channel: load profiles of struts beside circles [GRAV 3.2]."""
 
 from __future__ import annotations
 

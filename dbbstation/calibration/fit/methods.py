@@ -1,8 +1,4 @@
-"""The paper's three methods [CAL IV]: one solver with different knowledge of ball positions.
-
-`jig`: a CMM knows every ball. `conv-a`: standard circular test, ball position and centre unknown. `conv-b`: a micrometer
-read the ball's offset from the tool tip.
-"""
+"""The paper's three methods [CAL IV]: one solver with different knowledge of ball positions."""
 
 from __future__ import annotations
 

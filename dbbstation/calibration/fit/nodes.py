@@ -73,10 +73,7 @@ class RunNodes:
     unseen: float
 
     def samples_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values at all samples, shape (n,), from those at the nodes, shape (m,).
-
-        Powers of the place in a sector save memory: weights would take 48 bytes a sample.
-        """
+        """Return values at all samples, shape (n,), from those at the nodes, shape (m,)."""
         sector, place = _in_sectors(self.run.raw.phi_deg)
         powers = values.reshape(SECTORS, PER_SECTOR) @ _TO_POWERS.T
         found = powers[sector, -1]

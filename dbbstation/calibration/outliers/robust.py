@@ -1,8 +1,4 @@
-"""Find outlying runs and balls one at a time and free them.
-
-A displaced ball gets a free position, a foreign run is left out. The same solver fits the rest, whose intervals are those
-of sound data.
-"""
+"""Find outlying runs and balls one at a time and free them."""
 
 from __future__ import annotations
 

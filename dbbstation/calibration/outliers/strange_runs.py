@@ -68,7 +68,6 @@ def _strange_test(calibration: Calibration) -> list[int]:
 
 
 def _strange_run(calibration: Calibration) -> list[int]:
-    """Return the run with far more than the usual residual beside a shift of its ball."""
     rest = _rests_um(calibration)
     worst = int(np.argmax(rest))
     return [worst] if rest[worst] > _strange_from_um(rest) else []
@@ -147,7 +146,6 @@ def _looks_like(
 
 
 def _step(residual: NDArray[np.float64]) -> tuple[float, int]:
-    """Return the largest step of means and its sample, without twentieths at the ends."""
     count = len(residual)
     at = np.arange(count // 20 + 1, count - count // 20)
     total = np.cumsum(residual)

@@ -56,7 +56,6 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
 
 
 def _moved_in(calibration: Calibration) -> int | None:
-    """Return the run whose ball is displaced from its mounting's others."""
     shifts = np.array([shift_of(o, r) for o, r in left_of(calibration)])
     away = np.hypot(*shifts.T)
     worst = int(np.argmax(away))

@@ -59,8 +59,6 @@ class ParameterName:
 class Covariance:
     """Covariance of the machine's identified parameters.
 
-    It vanishes along `directions_lost`, where values stay nominal.
-
     Attributes:
         matrix: in products of units, shape (k, k).
     """

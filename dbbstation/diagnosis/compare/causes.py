@@ -113,7 +113,6 @@ class Change:
         return np.hstack(found)
 
     def _at(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the same about amplitudes, for nonproportional effects."""
         found = self.columns(point)
         width = len(amplitudes) // len(self._whens)
         for k in np.flatnonzero(amplitudes).tolist():

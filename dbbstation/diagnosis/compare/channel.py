@@ -1,8 +1,4 @@
-"""Two sessions as a channel: readings of A simulate B, circle by circle.
-
-Base: stated balls, bars and turn begins. Causes: changed sources, displaced balls and bars, a moved jig. Unmodelled:
-over angle and other variables, on struts, and separate curves of tests or runs.
-"""
+"""Two sessions as a channel: readings of A simulate B, circle by circle."""
 
 from __future__ import annotations
 

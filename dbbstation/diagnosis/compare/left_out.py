@@ -36,8 +36,6 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
 
 
 def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> KnownGains:
-    """Return each cause's gain, and each class's; the reference is an unchanged machine."""
-
     def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
         return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
 

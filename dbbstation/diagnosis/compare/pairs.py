@@ -111,8 +111,6 @@ class Matching:
 def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
     """Match runs of a test and direction.
 
-    Equal numbers of repeats pair in order; otherwise means are compared.
-
     Raises:
         TraceError: nothing belongs together.
     """

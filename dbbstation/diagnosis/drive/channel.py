@@ -268,7 +268,6 @@ def _curve(
 
 
 def _starts(recordings: Recordings) -> list[float]:
-    """Return time offsets that concatenate recordings [s]."""
     return [
         float(recordings.time_s[rows.start] - one.t_s[one.kept[0]])
         for rows, one in zip(recordings.blocks, recordings.signals, strict=True)

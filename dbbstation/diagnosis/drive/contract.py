@@ -1,8 +1,4 @@
-"""The contract of a cause of force.
-
-Force is linear in amplitudes: mass times acceleration, viscous friction times speed, and causes' columns. A form may have
-nonlinear numbers (Stribeck speed, period), refined from a grid.
-"""
+"""The contract of a cause of force."""
 
 from __future__ import annotations
 

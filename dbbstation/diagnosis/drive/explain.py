@@ -77,7 +77,6 @@ POINTS_TO = {
 
 
 def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
-    """Return the comparison weighted by possible mass and friction."""
     posterior = settled.posterior
     weights = dict(posterior.weights)
     hypotheses = list(posterior.hypotheses)

@@ -224,7 +224,6 @@ def _information(
 
 
 def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:
-    """Return the members fitted to pair means, of half the band."""
     even = len(fitted.samples) // 2 * 2
     rows = np.column_stack([fitted.samples, fitted.drive.channel.residual])[:even]
     halved = rows.reshape(-1, 2, rows.shape[1]).mean(axis=1)

@@ -248,7 +248,6 @@ def _numbers(
 
 
 def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict[str, Value]]:
-    """Return Coulomb and viscous friction by direction, with asymmetry if found."""
     sides = {}
     for side, sign in (("forwards", 1.0), ("backwards", -1.0)):
         dry, wet = np.zeros(len(fitted.values)), np.zeros(len(fitted.values))

@@ -76,10 +76,7 @@ def weights(unknown: NDArray[np.bool_], rise: int) -> NDArray[np.float64]:
 
 
 def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
-    """Return the rise that limits edge noise in the acceleration.
-
-    Sharp edges admit position noise that otherwise cancels.
-    """
+    """Return the rise that limits edge noise in the acceleration."""
     response = impulse_response(rate_hz, cutoff_hz)
     at = np.arange(len(response)) - len(response) // 2
     own, unit = _of_second_difference(response), noise_m * rate_hz**2

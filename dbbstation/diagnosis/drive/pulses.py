@@ -101,10 +101,7 @@ def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> 
 
 
 def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePart]:
-    """Return stretches whose force differs from their surroundings.
-
-    Overlapping stretches become levels; neighbours within `APART` standard uncertainties merge.
-    """
+    """Return stretches whose force differs from their surroundings."""
     # Neighbouring levels have most of their uncertainty in common, which factors for each of them would not know.
     settled, recordings = explained.settled, explained.drive.recordings
     after, apart, times = (

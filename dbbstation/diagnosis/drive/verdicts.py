@@ -115,7 +115,6 @@ class Verdicts(CauseJudge):
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
     def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
-        """Return the same with a law's uncertainties widened until stretches and bands agree."""
         name, after = member.cause.name, self._explained.after
         sigmas = super()._sigmas(member, values, covariance)
         if name not in self._members or name not in self._drive.of_law:
@@ -156,7 +155,6 @@ class Verdicts(CauseJudge):
         return dict.fromkeys(found, ()) | {next(iter(found)): [part.parameters["force_n"] for part in self._pulses]}
 
     def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
-        """Return the same; also where a cause of force cannot have such values."""
         if (why := super()._impossible(shown, values, covariance)) or shown.cause.name not in self._drive.of_law:
             return why
         source, form = self._drive.of_law[shown.cause.name]
@@ -204,7 +202,6 @@ class Verdicts(CauseJudge):
     def _said(
         self, source: DriveSource, own: Sequence[CauseFinding], there: Sequence[CauseFinding]
     ) -> tuple[Verdict, tuple[str, ...], str]:
-        """Return a source's verdict, other sources that would do as well, and why."""
         alike = self._others(source, there or own)
         if there and source.name == COULOMB and not self._several:
             alike = (*alike, "viscous friction")
@@ -311,7 +308,6 @@ class Verdicts(CauseJudge):
         return float(np.sqrt(np.mean((recordings.at(lambda s: s.force_n) - recordings.force_n) ** 2)))
 
     def _no_transient(self) -> tuple[Verdict, str]:
-        """Return that no stretch stands out, with the shortest visible."""
         settled, scale = self._settled, self._drive.scale
         apart = self._drive.recordings.samples_apart_s
         size = 0.3 * scale.force_n

@@ -234,7 +234,6 @@ def _judged(
 
 
 def _why_open(name: str, found: SearchOutcome, nonlinear: float, curve: Challenge | None) -> str:
-    """Return why a term stays open; may be empty."""
     farthest = max(moves(found.node, found.settled).items(), key=lambda pair: pair[1], default=("", 0.0))
     if farthest[1] > MOST_ASKED:
         it = "it" if farthest[0] == name else farthest[0]

@@ -1,7 +1,4 @@
-"""Value of refitted terms, and named laws against curves.
-
-A curve contains most terms of its signal, so it must refute each of them alone and in pairs.
-"""
+"""Value of refitted terms, and named laws against curves."""
 
 from __future__ import annotations
 
@@ -82,8 +79,6 @@ def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
 
 
 def _best_named(settled: Settled, others: list[Member], outside: dict[str, Candidate]) -> list[Member]:
-    """Return the best one or two outside terms beside others, linearly."""
-
     def scanned(beside: list[Member], causes: list[Cause]) -> list[tuple[float, Member]]:
         scan = settled.comparison.scan(beside, causes)
         worth = [float(f) + cause.log_prior_odds for f, cause in zip(scan.log_factor, scan.causes, strict=True)]

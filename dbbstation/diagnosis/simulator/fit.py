@@ -172,7 +172,6 @@ def _from(
 def _weighed(
     work: SimulationRuns, state: FittedState, residual: NDArray[np.float64], weigh: Weigh, sigma: float
 ) -> NDArray[np.float64]:
-    """Return weighted rows, and parameters in prior uncertainties."""
     if not np.isfinite(residual).all():
         return np.full(len(weigh(np.zeros(len(residual)))) + len(_known(work.model.parameters, 0)[1]), np.inf)
     rows, stated = _known(work.model.parameters, len(state.numbers))

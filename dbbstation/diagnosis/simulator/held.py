@@ -1,7 +1,4 @@
-"""Held-out error of a simulator: omit, choose anew, simulate.
-
-Simulations run through the omitted part. Linear answers use all rows; predicting values use the other rows.
-"""
+"""Held-out error of a simulator: omit, choose anew, simulate."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Candidates as laws whose columns are simulated answers to small doses.
-
-Grid values are interpolated and later refitted by simulation. Replaced signals (delay, lag, play) are simulated at
-several sizes; the law gives size and share.
-"""
+"""Candidates as laws whose columns are simulated answers to small doses."""
 
 from __future__ import annotations
 

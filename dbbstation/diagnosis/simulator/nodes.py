@@ -1,7 +1,4 @@
-"""Refitted simulators with terms, and channels about them.
-
-Columns are answers with present terms. The residual adds these back, so that sets without them compete.
-"""
+"""Refitted simulators with terms, and channels about them."""
 
 from __future__ import annotations
 
@@ -245,7 +242,6 @@ class Nodes:
         return self.known.get(names)
 
     def _beginnings(self, node: Node, one: Candidate, numbers: NDArray[np.float64]) -> list[FittedState]:
-        """Return starts with one more term, closest first, at reduced linear sizes too."""
         amplitudes, states = len(one.term.amplitudes), []
         for share in SHARES:
             term = one.term.with_numbers([*(share * numbers[:amplitudes]), *numbers[amplitudes:]])
@@ -277,10 +273,7 @@ class Nodes:
         return self._known_or_begun(node, state, tuple(one for one, _ in kept)) or node
 
     def _known_or_begun(self, node: Node, state: FittedState, inside: tuple[Candidate, ...]) -> Node | None:
-        """Return the better of a known node and a new start; None if it runs away.
-
-        Refits may end in wrong minima.
-        """
+        """Return the better of a known node and a new start; None if it runs away."""
         names = frozenset(one.name for one in inside)
         place = node.names, names
         known = self.known.get(names)

@@ -76,7 +76,6 @@ PortCall: TypeAlias = "Callable[[float, Mapping[str, float]], float | NDArray[np
 
 
 def _quickly(acting: Sequence[Evaluate], called: PortCall) -> PortCall:
-    """Return `called` by a fast path for scalar times."""
     if not acting:
         return lambda _t, _signals: 0.0
     if len(acting) == 1:

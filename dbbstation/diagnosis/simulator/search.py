@@ -122,7 +122,6 @@ WITHIN = "it is less than what the terms at its port may be off by"
 
 
 def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Mapping[str, str]]:
-    """Return the next wanted node, or None; with rejected terms."""
     outside = {one.name: one for one in node.outside}
     more = [member.cause.name for member in settled.best.members if member.cause.name in outside]
     if settled.averaged(settled.posterior.probability(outside), outside) < SURE:

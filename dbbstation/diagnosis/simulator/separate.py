@@ -58,10 +58,7 @@ def _text(one: SeparatingInput) -> str:
 
 
 def separations(nodes: Nodes, found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> tuple[SeparatingInput, ...]:
-    """Return proposals for indistinguishable pairs.
-
-    Their answers are compared beside parameters, by stretch and under trial inputs, up to `OUT` standard deviations.
-    """
+    """Return proposals for indistinguishable pairs."""
     settled = found.settled
     base = settled.bank.whitened(settled.channel.base.samples) / settled.noise.innovation
     every, proposals = parts(nodes.work), []
@@ -94,7 +91,6 @@ def _wanted(found: SearchOutcome, findings: tuple[CauseFinding, ...]) -> list[tu
 
 
 def _tried(nodes: Nodes, found: SearchOutcome, pair: tuple[str, str]) -> tuple[TrialInput | None, float, float]:
-    """Return the best trial input with its difference, and that as recorded."""
     trials = trial_inputs(nodes.work.model)
     if not trials:
         return None, 0.0, 0.0
@@ -123,7 +119,6 @@ def _repeated(repeats: int) -> str:
 
 
 def _column(found: SearchOutcome, name: str) -> NDArray[np.float64]:
-    """Return a term's effect over all rows, simulated or in a best replacement."""
     settled, best = found.settled, found.settled.best
     if name in best.names:
         return settled.effect([name])

@@ -119,7 +119,6 @@ def _momentary(term: Term) -> Evaluate:
 
 
 def _of_one_signal(form: TermForm, x: str, a: float, place: float) -> Evaluate:
-    """Return a times a function of one signal, as one fast call."""
     rounding = place * place
 
     def square(_t: float, signals: Mapping[str, float]) -> float:
@@ -197,7 +196,6 @@ def bends(knots: Sequence[float]) -> NDArray[np.float64]:
 
 
 def _remembering(term: Term) -> Evaluate:
-    """Return a term with memory, which drops later times first."""
     x, a = term.signals[0], term.amplitudes[0]
     if term.form is TermForm.DELAY:
         return _delayed(x, a)
@@ -234,8 +232,6 @@ def _lagging(constant: float) -> Step:
 
 
 def _playing(half: float) -> Step:
-    """Return a play's output less input, initially centred."""
-
     def step(past: tuple[float, float, float], _t: float, now: float) -> float:
         apart = past[2] + past[1] - now
         return half if apart > half else max(apart, -half)
@@ -244,7 +240,6 @@ def _playing(half: float) -> Step:
 
 
 def _delayed(x: str, dead: float) -> Evaluate:
-    """Return a delayed signal less the present."""
     times: list[float] = []
     past: list[float] = []
 

@@ -91,7 +91,6 @@ ONE_WAY = 0.02
 
 
 def _apart(found: Mismatch) -> Iterator[Next]:
-    """Return variables that move with a followed one."""
     variables = [v for v in found.settled.channel.variables if v.name != found.table.simulated_name]
     led = {name for finding in found.findings if finding.verdict in LIKELY for name in finding.variables}
     values = np.array([v.scaled for v in variables])

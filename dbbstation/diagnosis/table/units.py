@@ -112,7 +112,6 @@ def meaning_of(name: str) -> Meaning:
 
 
 def _unit_at_end(words: list[str]) -> Meaning | None:
-    """Return the unit at a name's end, or None."""
     for count in (2, 1):
         found = UNITS.get("_".join(words[-count:]))
         if len(words) <= count or found is None:

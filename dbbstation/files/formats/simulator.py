@@ -202,7 +202,6 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, pyth
 
 
 def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
-    """Return the argument names of the only `simulate`; none with a fault added."""
     classes = [
         n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and any(_last(base) == BASE for base in n.bases)
     ]
@@ -223,7 +222,6 @@ def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
 
 
 def _called(tree: ast.AST, ports: str) -> dict[str, int]:
-    """Return attributes of an argument with the lines of their first use."""
     found: dict[str, int] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == ports:

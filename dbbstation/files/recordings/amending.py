@@ -95,7 +95,6 @@ def amend(
 def _logged_otherwise(
     folder: Path, store: SessionStore, session: SessionFolder, reason: str, made: datetime
 ) -> list[Amendment]:
-    """Accept the session file against its event log; both former states are kept."""
     log = read_event_log(folder, [])
     stands = standing(store.data, log)
     if stands.stands is not Stands.UNLIKE:

@@ -1,11 +1,6 @@
 """The event log of a session: every verdict, reason, condition and amendment, one line each, chained.
 
-7c3f…  {"at": "2026-11-20T08:06:02Z", "what": "rejected", "runs": [{"test": "a", …}]}
-
-A line begins with its link of 64 hex digits: the SHA-256 of the previous link (empty for the first line), a line feed,
-the line's JSON text and a line feed, in UTF-8. Lines are only appended. The session file equals the sum of all lines,
-so that a damaged one can be rebuilt. An edited session file differs from the log, and an edited log has a broken chain.
-Each line reaches the disk before the session file changes.
+A line reaches the disk before the session file changes. docs/formats.md describes the lines.
 """
 
 from __future__ import annotations
@@ -132,7 +127,6 @@ def _parsed(path: Path, data: bytes) -> EventLog:
 
 
 def _event(line: bytes, before: str) -> LoggedEvent | None:
-    """Return the event of a line; None if the line was altered."""
     parts = _LINE.fullmatch(line.removesuffix(b"\n"))
     if parts is None or not line.endswith(b"\n") or link(before, parts[2]) != parts[1].decode():
         return None
@@ -255,7 +249,6 @@ def taken_back(log: EventLog) -> None:
 
 
 def _refuse_another(log: EventLog, handle: int) -> None:
-    """Refuse to write behind lines that were not read."""
     size = os.fstat(handle).st_size
     last = log.links[-1] if log.events else ""
     begin = max(log.end - _LONGEST_LAST, 0)

@@ -219,8 +219,6 @@ def _encoding(data: bytes) -> str:
 
 
 def _language(lines: list[str], file: str) -> NumberLanguage:
-    """Return the number format with most numbers, minus cells that were not split."""
-
     def fit(language: NumberLanguage) -> int:
         rows = [_cells(line, language, file, k) for k, line in enumerate(lines[:_LOOKED_AT], start=1)]
         return sum(_count(row, language) - _whole(row, language) for row in rows if len(row) > 1)

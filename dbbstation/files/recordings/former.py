@@ -27,11 +27,7 @@ MOST = 30
 def former_sessions(
     now: SessionFolder, under: Path, tests: set[str] | None = None
 ) -> list[tuple[datetime, SessionFolder]]:
-    """Return earlier sessions of the same machine, plan and jig, the last first.
-
-    Both are real or both virtual, with the same nominal machine and serial number. Every accepted test of this session,
-    else of its plan, was run there at the same place.
-    """
+    """Return earlier sessions of the same machine, plan and jig, the last first; real or virtual ones as this."""
     accepted = now.in_state(RunState.ACCEPTED)
     began = min((run.started for run in accepted if run.started is not None), default=None)
     tests = tests or {run.test for run in accepted} or set(now.plan.tests)

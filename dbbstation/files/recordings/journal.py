@@ -1,7 +1,6 @@
 """The journal of a run: samples are written as they arrive, and synced once a second.
 
-Each line has its CRC-32, because a power cut may mix pages. The file ends in `.csv.part` until it is sealed. Nothing is
-ever overwritten.
+Each line has its CRC-32, because a power cut may mix pages.
 """
 
 from __future__ import annotations

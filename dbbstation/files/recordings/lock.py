@@ -1,7 +1,6 @@
 """One writer per session folder, by a lock of the operating system.
 
-The lock ends with its process, so a power cut leaves none. The file names its last holder. On a file system without
-locks, the session is written without one and reports so.
+The lock ends with its process, so a power cut leaves none.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Numbers of a run file: columns, rising time, plausible sizes.
-
-NumPy parses whole pieces; lines are parsed one by one only to name faults.
-"""
+"""Numbers of a run file: columns, rising time, plausible sizes."""
 
 from __future__ import annotations
 

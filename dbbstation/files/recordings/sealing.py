@@ -93,7 +93,6 @@ def seal_session(folder: Path) -> Sealing:
 
 
 def _marked(seal: Seal, said: Mapping[str, Any]) -> Seal:
-    """Return the seal with the event log's end as the session file states it."""
     mark = mark_of(said)
     return seal if mark is None else replace(seal, events=mark[0], anchor=mark[1])
 

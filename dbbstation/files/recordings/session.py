@@ -212,7 +212,6 @@ class SessionFolder(SessionDetails):
         return ""
 
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
-        """Check units that only the planned circle reveals."""
         circle, file = self.circle(run), str(run.path)
         faults = []
         bar = circle.bar_mm
@@ -271,7 +270,6 @@ def no_session(folder: Path) -> Problem:
 
 
 def _other_than_session(path: Path) -> Problem | None:
-    """Return why a path evidently has no session."""
     if path.is_dir():
         return None if (path / SESSION_FILE).exists() else no_session(path)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:  # such as the log beside them, by `shop/*`
@@ -351,7 +349,6 @@ def parse_session(
 
 
 def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
-    """Return runs whose recording was interrupted before they were listed."""
     listed = {run.path.name for run in entries}
     found = []
     for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):

@@ -1,8 +1,4 @@
-"""Read and write a session file and its event log together, under the session's lock.
-
-An event reaches the disk before the session file. If a writer ended in between, the file is completed from its log. A
-file is replaced only if it is unchanged since it was read.
-"""
+"""Read and write a session file and its event log together, under the session's lock."""
 
 from __future__ import annotations
 
@@ -78,10 +74,7 @@ def _with_mark(data: Mapping[str, Any], state: Mapping[str, Any], events: int, s
 
 
 def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument | None, EventLog | None]:
-    """Read a session file and its log; no document, with faults added to `faults`, if unreadable.
-
-    A file behind its log is completed from it.
-    """
+    """Read a session file and its log; no document, with faults added to `faults`, if unreadable."""
     found: list[Problem] = []
     document = read_document(file, SessionFile, found)
     log = read_event_log(file.parent, found)
@@ -210,8 +203,6 @@ class SessionStore:
 
     def changed_meanwhile(self) -> dict[str, object] | None:
         """Return the content of a session file that somebody has changed since, or None.
-
-        An unreadable or missing file is put aside; the next writing restores it.
 
         Raises:
             InputError: it exists and cannot be read.

@@ -37,9 +37,7 @@ if TYPE_CHECKING:
 class SessionWriter:
     """Keeps one session folder while runs are recorded.
 
-    Every step survives a crash: the `.part` exists before the session file names it, and is sealed before it is marked
-    complete. Readings saved by a user meanwhile are accepted. If they are wrong, the next step raises InputError and
-    leaves the file.
+    Every step survives a crash: a run's `.part` exists before the session file names it, and is sealed before it is complete.
     """
 
     def __init__(self, folder: Path, lock: SessionLock, clock: Callable[[], datetime]) -> None:
@@ -96,8 +94,6 @@ class SessionWriter:
     def open(cls, folder: Path, patience_s: float = 0.0, clock: Callable[[], datetime] = now) -> Self:
         """Continue a session; interrupted runs are kept and listed as `recording`.
 
-        A damaged session file is written anew from the log.
-
         Raises:
             InputError: every fault of the session.
             OutputError: another process writes into it, or it cannot be written.
@@ -107,7 +103,6 @@ class SessionWriter:
         return cls._locked(folder, patience_s, clock)
 
     def _take_over(self) -> None:
-        """Repair what a dead process left."""
         folder = self._session.folder
         remove_leftovers(folder)
         # A run that was sealed when the station died only lacks its hash.
@@ -264,7 +259,6 @@ class SessionWriter:
         return CommandedProgram(path, digest, model_sha256)
 
     def _seal(self) -> None:
-        """Seal a session that was written by hand before recording more."""
         session = self._session
         found = hashes(session.folder, sealed_names(session.folder, session.names))
         keep_copies(session.folder, found)
@@ -295,7 +289,6 @@ class SessionWriter:
         self._session = self._kept = replace(session, sha256=self._store.sha256, seal=seal)
 
     def _take_readings(self) -> None:
-        """Take over micrometer readings that somebody wrote meanwhile."""
         other = self._store.changed_meanwhile()
         if other is not None:
             readings = readings_in(self._session.folder / SESSION_FILE, self._session.plan)

@@ -173,7 +173,6 @@ class Cutter:
         return self.beside(last, last.end), turned > TANGENT_RAD
 
     def _meeting(self, last: Element, element: Element) -> complex:
-        """Return where the ways beside two elements meet."""
         if last.turn and element.turn:
             return self._of_arcs(last, element)
         if last.turn or element.turn:

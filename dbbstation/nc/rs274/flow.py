@@ -284,7 +284,6 @@ class Flow:
     _return = _endsub
 
     def _if(self, word: OLine, place: Place) -> None:
-        """Handle `if`; else and elseif are reached after the branch that ran."""
         if word.keyword in {"else", "elseif"}:
             self._next = self._find(word, place, ("endif",)).line
             return

@@ -59,7 +59,6 @@ def length_lines(tool: str, length: Sequence[float], row: int) -> Iterator[str]:
 
 
 def _stops(checks: Sequence[tuple[Sequence[str], Sequence[float], str]], label: int) -> Iterator[str]:
-    """Yield conditions that parameters, in sum, differ from expected values."""
     for parameters, expected, message in checks:
         wanted = [*expected, *(0.0 for _ in parameters[len(expected) :])]
         off = [f"ABS[{one}{f'-[{value:.6f}]' if value else ''}]" for one, value in zip(parameters, wanted, strict=True)]

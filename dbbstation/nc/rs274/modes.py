@@ -142,7 +142,6 @@ class Modes:
             self.path.say(RowKind.MESSAGE, self._with_values(block.message), line=block.place.line)
 
     def _with_values(self, message: str) -> str:
-        """Return a message with the values of its parameters."""
         if not _SHOWS_VALUES.match(message):
             return message
 
@@ -217,7 +216,6 @@ class Modes:
             self.path.unknown |= ALL_AXES & ~self._fixed
 
     def _shared_words(self, block: ProgramBlock) -> None:
-        """Refuse codes in one line that share a word or cancel each other."""
         if not block.codes:
             return
         users = [self._in_line(block, ModalGroup.ONCE, {DWELL, 10.0}), self._in_line(block, ModalGroup.PATH, {64.0})]

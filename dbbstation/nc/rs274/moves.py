@@ -89,7 +89,6 @@ class Moves(Modes):
         return arc
 
     def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: NDArray[np.float64]) -> None:
-        """Move the tool's centre beside a contour (G41, G42)."""
         arc = self._arc(block, target) if self._motion in ARCS else None
         if self._motion != RAPID:
             self._check_feed(block, block.first_column)

@@ -71,7 +71,6 @@ def _read(
     decimals: NDArray[np.int64],
     names: NDArray[np.uint8],
 ) -> int:
-    """Fill rows with line number and motion, digits and decimals; return their number."""
     for row in range(len(head)):
         at = _after_number(letters, at, head[row])
         at = _after_motion(letters, at, head[row]) if at >= 0 else -1

@@ -82,8 +82,6 @@ def _unreadable(flow: Flow) -> list[Problem]:
 
 
 class _Interpreter(Moves):
-    """Runs a program block by block."""
-
     def run_all(self) -> None:
         """Run all blocks to the program's end.
 
@@ -112,7 +110,6 @@ class _Interpreter(Moves):
             raise unknown_place(block, unknown, "")
 
     def _end_stored(self, place: Place) -> None:
-        """Bring back what subprograms stored for their own time (M73)."""
         for level in [each for each in self._stored if each not in self.flow.runs]:
             stored = self._stored.pop(level)
             if stored.by_itself:
@@ -286,7 +283,6 @@ class _Interpreter(Moves):
             self.flow.call(which.value, 1.0 if times is None else times.value, block.place)
 
     def _said_before(self) -> str:
-        """Return the message written before a stop, or the stop's own."""
         text = self.path.last_text.removeprefix(MESSAGE)
         is_own = (
             self.path.last_kind == RowKind.MESSAGE and self.path.last_text == MESSAGE + text and text == plain(text)
@@ -295,7 +291,6 @@ class _Interpreter(Moves):
 
     @staticmethod
     def _nothing_left(block: ProgramBlock) -> None:
-        """Refuse words that the block does not use."""
         for letter, word in block.words.items():
             what = f"nothing in this line uses {letter}{word.value:g}"
             raise block.place.fault(word.column, what, "remove it, or give the code that it belongs to")

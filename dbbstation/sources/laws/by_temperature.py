@@ -148,10 +148,7 @@ def known_thermometers(motion: Motion) -> set[str]:
 
 
 def logged_degc(motion: Motion, name: str) -> tuple[NDArray[np.float64], float]:
-    """Return a thermometer's readings, shape (n,), and its start value [degC].
-
-    The session's smooth curve is used; a motion without session counts from its own begin.
-    """
+    """Return a thermometer's readings, shape (n,), and its start value [degC]."""
     if motion.setup is None or not motion.setup.thermometers or motion.time_s is None:
         own = motion.temperature_degc[name]
         return own, float(own[0])

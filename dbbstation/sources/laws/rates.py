@@ -21,8 +21,6 @@ def driven_in_time(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Return commanded strut lengths at rising times.
 
-    Of rows at one time the last counts.
-
     Returns:
         Times, shape (m,) [s], lengths then, shape (m, 6) [mm], and for each row of the motion its place among them,
         shape (n,). Of rows at one time the last one holds.

@@ -297,10 +297,7 @@ class Reader:
         return RunName(test, direction or in_column.direction, repeat)
 
     def asked_span_deg(self, table: ForeignTable) -> float | None:
-        """Return the span of a file's angles if no circle of the plan has it, else None [deg].
-
-        Tables with several runs are checked later.
-        """
+        """Return the span of a file's angles if no circle of the plan has it, else None [deg]."""
         name = self.mapping.column(ANGLE)
         if (
             name is None

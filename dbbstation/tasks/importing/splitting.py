@@ -39,10 +39,7 @@ def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pau
 
 
 def parts_by_direction(angle_deg: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Return the rows of each run, separated by a change of turning direction.
-
-    A turn back is at least 90 degrees; the run ends at its farthest angle.
-    """
+    """Return the rows of each run, separated by a change of turning direction."""
     travelled = np.unwrap(angle_deg, period=FULL_TURN_DEG)
     ends: list[int] = []
     low = high = 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
+from unicodedata import normalize
 
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.nc.toolpath import DECIMALS
@@ -19,15 +20,24 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 
+COMPENSATED = "compensated, greatest correction"
+"""How a header says that a program is compensated."""
+
 LONGEST_COMMENT = 200
 """LinuxCNC refuses lines of more than 252 characters; other controls have shorter comments, and cut them."""
 
 
 def plain(text: str) -> str:
     """Return text on one line of printable ASCII, cut to a comment's length."""
-    ascii_text = text.replace("µ", "u").encode("ascii", "replace").decode()
+    ascii_text = normalize("NFKC", text).replace("μ", "u").encode("ascii", "replace").decode()
     printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
     return printable[:LONGEST_COMMENT].strip()
+
+
+def already_compensated(name: str, how: str) -> StationError:
+    """Return the error for a compensated program."""
+    remedy = "compensate the nominal program that it was made from"
+    return StationError(f"this program is compensated already, {how}", where=name, remedy=remedy)
 
 
 class Dialect(ABC):
@@ -83,7 +93,7 @@ class Dialect(ABC):
 
         Raises:
             InputError: as `read`, or nothing moves.
-            StationError: a setup for a dialect that takes none.
+            StationError: a setup for a dialect that takes none, or a compensated program that its own check of offsets ends.
         """
         declared = {} if setup is None else {"setup": setup}
         if declared and not self.takes_setup:
@@ -91,5 +101,7 @@ class Dialect(ABC):
             raise StationError(what, where=name, remedy="leave them out, or post the program in machine coordinates")
         path = self.read(text, name, start=start, **declared)
         if not path.is_move.any():
+            if any(said.startswith(COMPENSATED) for said in path.text.values()):
+                raise already_compensated(name, "says its header")
             raise InputError([Problem(name, 0, 0, "this program moves nothing", "check that it is the file you mean")])
         return path

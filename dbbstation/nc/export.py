@@ -14,9 +14,10 @@ from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm, rounding_mm
+from dbbstation.nc.dialect import COMPENSATED
 from dbbstation.nc.limits import CHORD_MM, CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import is_marked, marked
-from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
+from dbbstation.nc.nominal import check_machine, check_nominal, checksum
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.nc.dialect import plain
+from dbbstation.nc.dialect import COMPENSATED, already_compensated, plain
 from dbbstation.nc.mark import decimals_of, is_marked
 from dbbstation.nc.toolpath import DECIMALS, RowKind
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
-
-COMPENSATED = "compensated, greatest correction"
-"""How a header says that a program is compensated."""
 
 CHECKSUMS = 99_999_999
 """Line numbers have eight digits at most in LinuxCNC's language: one program in fifty million has its own by chance."""
@@ -64,11 +61,7 @@ def check_nominal(toolpath: Toolpath) -> None:
     if not how and is_marked(toolpath):
         how = "say the last decimals of its poses"
     if how:
-        raise StationError(
-            f"this program is compensated already, {how}",
-            where=toolpath.name,
-            remedy="compensate the nominal program that it was made from",
-        )
+        raise already_compensated(toolpath.name, how)
 
 
 def check_machine(toolpath: Toolpath, machine: Machine) -> None:

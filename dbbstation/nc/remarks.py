@@ -22,7 +22,7 @@ def remarks_on(
     done: Compensation, asked_um: float, machine: Machine, dialect: Dialect, prefer: Prefer
 ) -> tuple[str, ...]:
     """Return sentences on an exceeded chord error, time lost in short pieces, and an uncorrected tilt."""
-    said = []
+    said = [*done.toolpath.notes]
     if done.chord_um > asked_um:
         said.append(
             f"the path is kept within {up(done.chord_um)} µm, not within {asked_um:g} µm, at line {done.chord_line}: the correction "

@@ -97,6 +97,7 @@ class Toolpath:
         holds: offsets and tool lengths for which the poses are valid, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape
             (6,), and diameters of tools by `D1`, shape (1,); a control may check them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
+        notes: sentences on what the program leaves open.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those written together, from 1.
         arc: centre [mm] in the first and second axis of its plane, spanned angle of a chord [rad], counter-clockwise positive, plane
@@ -120,6 +121,7 @@ class Toolpath:
     holds: Mapping[str, tuple[float, ...]] | None = None
     ending: Ending = Ending.STOP
     units_said: bool = True
+    notes: tuple[str, ...] = ()
     numbers: tuple[int, ...] = ()
     arc: NDArray[np.float64] | None = None
     run: int = 1
@@ -292,6 +294,7 @@ class ToolpathBuilder:
         corner_mm: rounding allowed in the moves that follow; None: not stated.
         unknown: axes with unknown position, a bit each; a move that names or feeds them makes them known.
         fed: rows up to the last move at feed.
+        left: rows up to the last rapid.
     """
 
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
@@ -300,6 +303,7 @@ class ToolpathBuilder:
         self.holds: dict[str, tuple[float, ...]] | None = None
         self.ending = Ending.STOP
         self.units_said = True
+        self.notes: tuple[str, ...] = ()
         self.numbers: tuple[int, ...] = ()
         self._start = start
         self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
@@ -308,7 +312,7 @@ class ToolpathBuilder:
         self._offset = 0
         self._rows: list[_Rows] = []
         self._text: dict[int, str] = {}
-        self._count = self.fed = 0
+        self._count = self.fed = self.left = 0
 
     def count_from(self, offset: Sequence[float]) -> None:
         """Set the offset of following moves' numbers from their poses, shape (6,) [mm, deg]."""
@@ -318,12 +322,16 @@ class ToolpathBuilder:
         """Add a move of each of successive lines, poses of shape (k, 6) [mm, deg], at F by way and by angle; None: rapids."""
         kind = RowKind.RAPID if feed is None else RowKind.FEED
         self._add(kind, poses, feed or _NO_FEED, line=line, step=1)
-        self.fed = self.fed if feed is None else self._count
+        if feed is None:
+            self.left = self._count
+        else:
+            self.fed = self._count
 
     def rapid(self, pose: NDArray[np.float64], *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
         """Add a move as fast as the machine can."""
         self.unknown = unknown
         self._add(RowKind.RAPID, pose[None], line=line, in_machine=in_machine)
+        self.left = self._count
 
     def feed(
         self,
@@ -334,13 +342,14 @@ class ToolpathBuilder:
         line: int = 0,
         in_machine: bool = False,
         arc: tuple[float, float, float, float] = _STRAIGHT,
+        unknown: int = 0,
     ) -> None:
         """Add moves at a feed.
 
         Args:
             deg_min: of moves that only turn; None: `mm_min`.
         """
-        self.unknown = 0
+        self.unknown = unknown
         feed = (mm_min, mm_min if deg_min is None else deg_min)
         self._add(RowKind.FEED, poses, feed, line=line, in_machine=in_machine, arc=arc)
         self.fed = self._count
@@ -425,6 +434,7 @@ class ToolpathBuilder:
             holds=self.holds,
             ending=self.ending,
             units_said=self.units_said,
+            notes=self.notes,
             numbers=self.numbers,
             arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 4),
         )

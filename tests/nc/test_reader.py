@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
-from dbbstation.errors import InputError
+from dbbstation.errors import InputError, StationError
+from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.rs274.reader import read_program
+from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import RowKind
 
 FIRST = "G21 G90 G94\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
@@ -164,6 +168,37 @@ def test_a_subprogram_runs_as_often_as_the_digits_before_its_number_say():
     assert path.poses[:, 0].tolist() == [0, 1, 2, 3, 4, 5]
 
 
-def test_a_program_without_moves_is_refused():
+def test_a_program_without_moves_is_refused(linuxcnc):
     with pytest.raises(InputError, match="moves nothing"):
-        read_program("G21\nM2\n", "part.ngc")
+        linuxcnc.toolpath("G21\nM2\n", "part.ngc")
+
+
+def test_a_compensated_program_without_its_offsets_is_still_known(linuxcnc, crooked):
+    setup = ControlSetup({"G54": (5.0, 0.0, 0.0, 0.0, 0.0, 0.0)})
+    path = linuxcnc.toolpath(f"G54\n{FIRST}G1 X5 F100\nM2\n", "part.ngc", setup=setup)
+    text = compensated_program(path, linuxcnc, Inverse(crooked)).text
+    with pytest.raises(StationError, match="compensated already, says its header"):
+        linuxcnc.toolpath(text, "true.ngc")
+
+
+GRBL = "G21 G90\nM3 S1000\nG1 Z-990 F300\nG0 X0 Y0\nG1 Z-1000\nG1 X50\nG0 Z-990\n"
+
+
+def test_moves_at_feed_before_the_first_place_and_an_end_by_a_rapid_are_stated(linuxcnc, crooked):
+    declared = np.array([np.nan] * 3 + [0.0] * 3)
+    path = linuxcnc.toolpath(GRBL, "part.ngc", start=declared)
+    assert path.unknown[path.is_move].tolist() == [0b11, 0, 0, 0, 0]
+    done = compensated_program(path, linuxcnc, Inverse(crooked))
+    assert any("line 3: the program does not state the place of X, Y before this move" in each for each in done.remarks)
+    assert any("ends without M2, M30 or %" in each for each in done.remarks)
+    first = next(line for line in done.text.splitlines() if line.startswith("G1"))
+    assert re.fullmatch(r"G1 Z-\d+\.\d{6}( A\S+ B\S+ C\S+)? F300", first)
+    for cut_short in (GRBL.removesuffix("G0 Z-990\n"), GRBL.replace("G0 X0 Y0", "G0 X0")):
+        with pytest.raises(InputError):
+            linuxcnc.toolpath(cut_short, "part.ngc", start=declared)
+
+
+def test_a_feed_in_the_line_of_its_units_counts_only_if_a_cut_uses_it():
+    assert read_program(f"{FIRST}G20 F10\nG1 X1 F2\nM2\n", "part.ngc").feed_mm_min[-1] == pytest.approx(50.8)
+    with pytest.raises(InputError, match=r"part\.ngc:3:5: F in the line of G20"):
+        read_program(f"{FIRST}G20 F10\nG0 X0\nG1 X1\nM2\n", "part.ngc")

@@ -123,8 +123,7 @@ def test_a_guard_lets_pass_what_it_holds_for_and_nothing_else(held, change):
     assert len(read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=setup)) > 0
     for name, values in setup.places.items():
         off = ControlSetup(places={**setup.places, name: (*values[:5], 0.001)})
-        with pytest.raises(InputError, match="moves nothing"):
-            read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=off)
+        assert not read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc", setup=off).is_move.any()
 
 
 OFFSETS = {

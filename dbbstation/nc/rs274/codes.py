@@ -94,6 +94,8 @@ _REMEDIES: dict[float, str] = {
     **dict.fromkeys((28.1, 30.1), "set reference points by hand, not in the program"),
     **dict.fromkeys((51, 51.1, 68, 68.2), _TURNED),
     7: "post the program with radii (G8)",
+    **dict.fromkeys((70, 71), "it is inch or millimetre on some controls, a cycle of lathes on others: write G20 or G21"),
+    72: "a cycle of lathes: post its single moves",
     **dict.fromkeys((87, 88), "post this cycle as single moves"),
 }
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.nc.rs274.blocks import ProgramBlock
-    from dbbstation.nc.rs274.tokens import Word
+    from dbbstation.nc.rs274.tokens import BadLine, Word
     from dbbstation.nc.setup import ControlSetup
 
 
@@ -120,6 +120,8 @@ class Modes:
         self._beside: Beside | None = None
         self._radius_number: Word | None = None
         self._left_contour = False
+        self._unplaced: BadLine | None = None
+        self._unsure_feed: BadLine | None = None
         self._system_said = False
         self.path.holds = {}
         self.path.count_from(self._state.offset)
@@ -153,6 +155,8 @@ class Modes:
 
     def _units(self, block: ProgramBlock) -> None:
         units = block.code(ModalGroup.UNITS)
+        if "F" in block.words:
+            self._unsure_feed = None
         if units is None:
             return
         self.path.units_said = True
@@ -161,7 +165,7 @@ class Modes:
             # LinuxCNC sets the feed before it changes units, so F would still count in the old ones.
             column, code = block.words["F"].column, name("G", units)
             what = f"F in the line of {code} counts in the units before it on some controls and after it on others"
-            raise block.place.fault(column, what, f"write {code} in a line before")
+            self._unsure_feed = block.place.fault(column, what, f"write {code} in a line before, or F in the next cut")
         self._state.unit_mm = unit_mm
 
     def _feed(self, block: ProgramBlock) -> None:

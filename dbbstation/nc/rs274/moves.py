@@ -169,10 +169,10 @@ class Moves(Modes):
     ) -> None:
         self._check_feed(block, block.first_column)
         self._begin_move(block, poses[-1])
-        speed = self._speed
+        speed, unknown = self._speed, bits_of(np.isnan(poses[-1]))
         if self._per_move:  # G93: one over the minutes of the move
             speed = Feed(*(max(each * self._speed.deg_min, LEAST_F) for each in length))
-        self.path.feed(poses, *speed, line=block.place.line, in_machine=in_machine, arc=arc)
+        self.path.feed(poses, *speed, line=block.place.line, in_machine=in_machine, arc=arc, unknown=unknown)
         self._state.pose = poses[-1]
 
     def _begin_move(self, block: ProgramBlock, target: NDArray[np.float64]) -> None:
@@ -195,6 +195,8 @@ class Moves(Modes):
             )
 
     def _check_feed(self, block: ProgramBlock, column: int) -> None:
+        if self._unsure_feed is not None:
+            raise self._unsure_feed
         if self._speed.mm_min <= 0.0:
             raise block.place.fault(
                 column, f"{name('G', self._motion or 0.0)} without a feed", "give F before or in it"
@@ -216,7 +218,7 @@ class Moves(Modes):
         if self._motion != RAPID and not through:
             unknown = [letter for letter, value in zip(AXES, target, strict=True) if math.isnan(value)]
             if unknown:
-                raise unknown_place(block, unknown)
+                self._cut_somewhere(block, unknown)
         known = [value for value in target if not math.isnan(value)]
         if max(map(abs, known), default=0.0) > FARTHEST_DEG and (
             max((abs(value) for value in target[:3] if not math.isnan(value)), default=0.0) > FARTHEST_MM
@@ -225,6 +227,14 @@ class Moves(Modes):
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
             raise block.place.fault(block.first_column, what, "check its numbers, and G91 and G20 before it")
         return np.array(target)
+
+    def _cut_somewhere(self, block: ProgramBlock, unknown: list[str]) -> None:
+        """Let a straight move at feed pass before the program first names all axes; it must name them later."""
+        fault = unknown_place(block, unknown)
+        left = any(AXES.index(letter) in self._away for letter in unknown)
+        if left or self._motion != LINEAR or self._per_move or self._cutter is not None:
+            raise fault
+        self._unplaced = self._unplaced or fault
 
     def _by_angle(self, block: ProgramBlock, pose: list[float], offset: tuple[float, ...]) -> list[float]:
         """Return X and Y of polar coordinates about the origin, in machine coordinates [mm] [LinuxCNC, Polar Coordinates]."""

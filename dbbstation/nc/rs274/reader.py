@@ -36,6 +36,8 @@ from dbbstation.nc.rs274.moves import FARTHEST_DEG, MOST_ROWS, Moves, named_axes
 MOST_FAULTS = 20
 """A program of another language has a fault in every line; the first ones tell."""
 
+NO_END = "the program ends without M2, M30 or %: check that it is whole"
+
 PAUSE, OPTIONAL_STOP = 0.0, 1.0
 ENDS = frozenset({2.0, 30.0})
 
@@ -60,10 +62,7 @@ def read_program(
         interpreter.run_all()
     except BadLine as fault:
         raise InputError(_unreadable(interpreter.flow) or [fault.problem]) from None
-    path = interpreter.path.built()
-    if not path.is_move.any():
-        raise InputError([Problem(file, 0, 0, "this program moves nothing", "check that it is the file you mean")])
-    return path
+    return interpreter.path.built()
 
 
 def _unreadable(flow: Flow) -> list[Problem]:
@@ -101,13 +100,22 @@ class _Interpreter(Moves):
                 self.flow.ended()
                 break
         else:
-            # A spindle that stops behind the last cut ends programs that have no other end, as for GRBL.
-            if not (self.flow.closed or (not self.flow.percent and 0 < self.path.fed <= self._stopped)):
+            # What stops its spindle or leaves behind the last cut ends without M2, as for GRBL.
+            if not (self.flow.closed or (not self.flow.percent and 0 < self.path.fed < max(self.path.left, self._stopped + 1))):
                 raise BadLine(self.flow.cut_short())
+            if not self.flow.closed:
+                self.path.notes += (NO_END,)
+        self._check_places(block)
+
+    def _check_places(self, block: ProgramBlock) -> None:
+        """Check that the program names every axis, and state where it does so late."""
         away = [math.isnan(value) and axis not in self._away for axis, value in enumerate(self._state.pose)]
         unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
         if unknown and self._moved:
-            raise unknown_place(block, unknown, "")
+            raise self._unplaced or unknown_place(block, unknown, "")
+        if self._unplaced is not None:
+            problem = self._unplaced.problem
+            self.path.notes += (f"line {problem.line}: {problem.what}: what leads there is corrected for where it names them first",)
 
     def _end_stored(self, place: Place) -> None:
         for level in [each for each in self._stored if each not in self.flow.runs]:
@@ -144,7 +152,7 @@ class _Interpreter(Moves):
     def _ran_lines(self, first: int) -> bool:
         """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""
         ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
-        if not ready or self._per_move or self._upright or self.path.unknown or self._cutter:
+        if not ready or self._per_move or self._upright or self.path.unknown or self._cutter or self._unsure_feed:
             return False
         lines, unit_mm = self.flow.plain_lines(), self._state.unit_mm
         if len(lines.axes) < LEAST_LINES:

@@ -227,7 +227,7 @@ def _program(
     check_reach(machine, done.toolpath)
     remarks = remarks_on(done, asked_um, machine, dialect, prefer)
     if inverse.strict:
-        check_kept(path.name, done, asked_um, machine)
+        check_kept(done, asked_um, machine)
     header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
     header.append(f"chord error asked for {asked_um:g} um, reached {done.chord_um:.3f} um")
     header += remarks

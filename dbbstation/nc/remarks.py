@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
 from dbbstation.nc.compensate import Prefer
-from dbbstation.nc.toolpath import line_of
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
@@ -25,7 +24,7 @@ def remarks_on(
     said = [*done.toolpath.notes]
     if done.chord_um > asked_um:
         said.append(
-            f"the path is kept within {up(done.chord_um)} µm, not within {asked_um:g} µm, at line {done.chord_line}: the correction "
+            f"the path is kept within {up(done.chord_um)} µm, not within {asked_um:g} µm, at {done.toolpath.place(done.chord_line)}: the correction "
             "has a step or bends more than the shortest pieces follow"
         )
     if dialect.look_ahead is None:
@@ -41,7 +40,7 @@ def remarks_on(
     return tuple(said)
 
 
-def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine) -> None:
+def check_kept(done: Compensation, asked_um: float, machine: Machine) -> None:
     """Refuse a program that exceeds the chord error or loses a feed, stating values that keep both.
 
     Raises:
@@ -50,7 +49,7 @@ def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine)
     if done.chord_um > asked_um:
         raise StationError(
             f"the path is kept within {up(done.chord_um)} µm here, not within {asked_um:g} µm",
-            where=line_of(name, done.chord_line),
+            where=done.toolpath.place(done.chord_line),
             remedy=f"--chord-um {up(done.chord_um)} is kept everywhere; without --strict the program is written as it is",
         )
     if math.isfinite(done.slowest_mm_min):
@@ -58,7 +57,7 @@ def check_kept(name: str, done: Compensation, asked_um: float, machine: Machine)
         raise StationError(
             f"the control reaches {f'F{reached}' if reached else 'no F'} here, with {said_acceleration(machine)}; the program takes about "
             f"{done.seconds:.0f} s at feed, {done.nominal_seconds:.0f} as written",
-            where=line_of(name, done.slowest_line),
+            where=done.toolpath.place(done.slowest_line),
             remedy=(f"F{reached} is kept everywhere; " if reached else "")
             + "without --strict the program is written as it is",
         )

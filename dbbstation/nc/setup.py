@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.nc.toolpath import SYSTEMS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 PER_SYSTEM = 20
 """Numbered parameters from one work system to the next."""
@@ -44,12 +44,16 @@ class ControlSetup:
         lengths: offsets of tools by number, each shape (6,) [mm, deg].
         diameters: of tools by number [mm].
         parameters: all numbered parameters of the control's file; None: unknown.
+        subprogram: returns path and text of the file of a subprogram by its name in small letters; None if there is none.
+        block_delete: whether the control skips lines that begin with a slash; None: unknown.
     """
 
     places: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     lengths: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     diameters: Mapping[int, float] = field(default_factory=dict)
     parameters: Mapping[int, float] | None = field(default=None, kw_only=True)
+    subprogram: Callable[[str], tuple[str, str] | None] = field(default=lambda _name: None, kw_only=True)
+    block_delete: bool | None = field(default=None, kw_only=True)
 
     def place(self, name: str) -> tuple[float, ...] | None:
         """Return a work offset, G92 or a reference point; None if unknown."""

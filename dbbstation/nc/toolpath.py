@@ -98,6 +98,7 @@ class Toolpath:
             (6,), and diameters of tools by `D1`, shape (1,); a control may check them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
         notes: sentences on what the program leaves open.
+        files: number of lines before each of its files, and the file's name; subprograms of other files follow the program.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those written together, from 1.
         arc: centre [mm] in the first and second axis of its plane, spanned angle of a chord [rad], counter-clockwise positive, plane
@@ -122,6 +123,7 @@ class Toolpath:
     ending: Ending = Ending.STOP
     units_said: bool = True
     notes: tuple[str, ...] = ()
+    files: tuple[tuple[int, str], ...] = ()
     numbers: tuple[int, ...] = ()
     arc: NDArray[np.float64] | None = None
     run: int = 1
@@ -131,7 +133,12 @@ class Toolpath:
 
     def where(self, row: int) -> str:
         """Return the line of a row, for messages."""
-        return line_of(self.name, int(self.line[row]))
+        return self.place(int(self.line[row]))
+
+    def place(self, line: int) -> str:
+        """Return a line, for messages; 0 is the program."""
+        before, file = next((each for each in reversed(self.files) if 0 < each[0] < line), (0, self.name))
+        return f"{file}:{line - before}" if line else file
 
     @property
     def corner_mm(self) -> float | None:
@@ -304,6 +311,7 @@ class ToolpathBuilder:
         self.ending = Ending.STOP
         self.units_said = True
         self.notes: tuple[str, ...] = ()
+        self.files: tuple[tuple[int, str], ...] = ()
         self.numbers: tuple[int, ...] = ()
         self._start = start
         self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
@@ -435,6 +443,7 @@ class ToolpathBuilder:
             ending=self.ending,
             units_said=self.units_said,
             notes=self.notes,
+            files=self.files,
             numbers=self.numbers,
             arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 4),
         )
@@ -503,11 +512,6 @@ def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.
     row = np.repeat(np.arange(len(pieces)), pieces)
     number = np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1
     return row, number / pieces[row]
-
-
-def line_of(program: str, line: int) -> str:
-    """Return a line of a program, for messages; 0 is the program."""
-    return f"{program}:{line}" if line else program
 
 
 def rounded(poses: NDArray[np.float64], decimals: Sequence[int] = DECIMALS) -> NDArray[np.float64]:

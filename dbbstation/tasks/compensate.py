@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
@@ -92,6 +92,12 @@ def compensate(
         ),
     ] = None,
     tools: Annotated[File | None, Option("LinuxCNC's tool table, for lengths not given.", kind="file")] = None,
+    subprograms: Annotated[
+        File | None, Option("Folder of subprograms that the program calls and does not contain.", kind="folder")
+    ] = None,
+    block_delete: Annotated[
+        Literal["on", "off"] | None, Option("How the control's switch stands for lines that begin with a slash.")
+    ] = None,
     chord_um: Annotated[float, replace(o.CHORD_UM, setting="program.chord_um")] = 1e3 * CHORD_MM,
     prefer: o.Prefer = "accuracy",
     strict: o.Strict = False,
@@ -172,8 +178,10 @@ def compensate(
     both = (("parameter file", parameters), ("tool table", tools))
     files = {what: Path(file) for what, file in both if file is not None}
     setup = None
-    if offsets or tool_lengths_mm or files:
-        setup = setup_of(offsets or {}, tool_lengths_mm or {}, *(files.get(what) for what, _ in both))
+    if offsets or tool_lengths_mm or files or subprograms is not None or block_delete is not None:
+        folder = None if subprograms is None else Path(subprograms)
+        given = [files.get(what) for what, _ in both]
+        setup = setup_of(offsets or {}, tool_lengths_mm or {}, *given, folder, block_delete)
     if out is not None:
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)
@@ -204,6 +212,7 @@ def compensate(
     named = {"program file": source} if isinstance(source, Path) else {}
     older = min((one.stat().st_mtime for one in named.values()), default=0.0)
     telling.note(*(OLDER.format(what) for what, file in files.items() if file.stat().st_mtime < older))
+    files |= {f"subprogram {Path(file).stem}": Path(file) for _, file in path.files[1:]}
     origin = origin_of({**named, **files}, inverse, (provenance or from_python)())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:

@@ -121,14 +121,18 @@ def program_text(path: Path | ProgramText) -> str:
 def setup_of(
     offsets: Mapping[str, Sequence[float]],
     lengths: Mapping[int, float],
-    parameters: Path | None,
-    tools: Path | None,
+    parameters: Path | None = None,
+    tools: Path | None = None,
+    subprograms: Path | None = None,
+    block_delete: str | None = None,
 ) -> ControlSetup:
     """Return the offsets and tool lengths of a control, declared ones before those of its files.
 
     Args:
         offsets: X, Y, Z, and A, B, C if not zero, of `G54` to `G59.3`, `G92`, `G28` and `G30` [mm, deg].
         parameters: LinuxCNC's parameter file.
+        subprograms: folder of files that the program calls.
+        block_delete: `on` or `off`; None: unknown.
 
     Raises:
         InputError: faults of the files.
@@ -146,7 +150,17 @@ def setup_of(
     diameters = {tool: words["D"] for tool, words in table.items() if "D" in words}
     own = {tool: (0.0, 0.0, float(length), 0.0, 0.0, 0.0) for tool, length in lengths.items()}
     known = None if parameters is None else parameters_of(program_text(parameters), str(parameters))
-    return ControlSetup(places, lengths_there | own, diameters, parameters=known)
+    called = (
+        {} if subprograms is None else {path.stem.lower(): path for path in sorted(subprograms.iterdir(), reverse=True)}
+    )
+
+    def subprogram(name: str) -> tuple[str, str] | None:
+        return (str(called[name]), program_text(called[name])) if name in called else None
+
+    skips = None if block_delete is None else block_delete == "on"
+    return ControlSetup(
+        places, lengths_there | own, diameters, parameters=known, subprogram=subprogram, block_delete=skips
+    )
 
 
 def _content(path: Path) -> bytes:

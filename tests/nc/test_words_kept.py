@@ -40,6 +40,9 @@ def written(linuxcnc, text: str) -> list[str]:
         "G54",
         "G59.3",
         "M7",
+        "M62 P1",
+        "M101",
+        "M199 P1.5 Q-2",
         "M30",
     ],
 )

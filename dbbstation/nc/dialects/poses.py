@@ -39,7 +39,7 @@ class Poses(Dialect):
         if told.any():
             row = int(np.argmax(told))
             what = f"{RowKind(toolpath.kind[row]).name.lower().replace('_', ' ')} {toolpath.text.get(row, '')}".rstrip()
-            raise CannotSayError(self.name, what, where=f"{toolpath.name}:{toolpath.line[row]}")
+            raise CannotSayError(self.name, what, where=toolpath.where(row))
         lines = [*(f"# {plain(text)}" for text in header), COLUMNS]
         moves = toolpath.is_move
         form = ",".join(f"%.{decimals}f" for decimals in self.decimals)

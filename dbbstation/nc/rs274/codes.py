@@ -33,6 +33,7 @@ class ModalGroup(StrEnum):
     OVERRIDE = "override switches"
     CALL = "subprogram"
     STATE = "stored modes"
+    OUTPUT = "output, or function of one's own"
 
 
 CYCLES = (73, 81, 82, 83, 85, 86, 89)
@@ -64,6 +65,7 @@ M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
     **dict.fromkeys((98, 99), ModalGroup.CALL),
     **dict.fromkeys((70, 71, 72, 73), ModalGroup.STATE),
+    **dict.fromkeys((62, 63, 64, 65, *range(100, 200)), ModalGroup.OUTPUT),
 }
 
 STORED: dict[ModalGroup, str] = {
@@ -94,7 +96,9 @@ _REMEDIES: dict[float, str] = {
     **dict.fromkeys((28.1, 30.1), "set reference points by hand, not in the program"),
     **dict.fromkeys((51, 51.1, 68, 68.2), _TURNED),
     7: "post the program with radii (G8)",
-    **dict.fromkeys((70, 71), "it is inch or millimetre on some controls, a cycle of lathes on others: write G20 or G21"),
+    **dict.fromkeys(
+        (70, 71), "it is inch or millimetre on some controls, a cycle of lathes on others: write G20 or G21"
+    ),
     72: "a cycle of lathes: post its single moves",
     **dict.fromkeys((87, 88), "post this cycle as single moves"),
 }

@@ -13,6 +13,7 @@ from dbbstation.nc.rs274.blocks import BLANKS
 from dbbstation.nc.rs274.expressions import ValueReader
 from dbbstation.nc.rs274.plain import letters_of, plain_lines
 from dbbstation.nc.rs274.tokens import BadLine, Place
+from dbbstation.nc.setup import ControlSetup
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -40,6 +41,7 @@ _O_LINE = re.compile(
 _KEYWORDS = frozenset(
     "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue".split()  # noqa: SIM905 - words
 )
+_SKIPPED = re.compile(r"[ \t]*/")
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 
 
@@ -76,26 +78,57 @@ class Flow:
 
     Args:
         outer: value of a parameter of the control; None if undefined.
+
+    Attributes:
+        files: lines before each file, and its name: the program first, then subprograms that it called.
     """
 
-    def __init__(self, text: str, file: str, outer: Callable[[int | str], float | None]) -> None:
-        self._lines, self._file, self._outer = text.split("\n"), file, outer
-        self.percent, self._next = self._opening()
+    def __init__(
+        self, text: str, file: str, outer: Callable[[int | str], float | None], setup: ControlSetup | None = None
+    ) -> None:
+        self._outer, self._setup = outer, setup or ControlSetup()
         self._o_lines: dict[int, OLine] = {}
         self._labels: dict[str, list[OLine]] = {}
-        line, begin = 1, 0
-        for match in _O_LINE.finditer(text):
-            line, begin = line + text.count("\n", begin, match.start()), match.start()
-            one = self._o_line(match, line)
-            self._o_lines[line] = one
-            self._labels.setdefault(one.label, []).append(one)
+        self._lines: list[str] = []
+        self.files: tuple[tuple[int, str], ...] = ()
+        self._append(text, file)
+        self._own_lines = len(self._lines)
+        self.percent, self._next = self._opening()
         self._frames: list[_Frame] = []
         self._globals: dict[int | str, float] = {}
         self._counts: dict[tuple[int, int], int] = {}
         self._begun = self.closed = False
         self._entered = 0
-        self._text, self._begins, self._ran = text, list[int](), 0
+        self._ran = 0
+
+    def _append(self, text: str, file: str) -> None:
+        """Add the lines of a file."""
+        before = len(self._lines)
+        self.files += ((before, file),)
+        self._lines += text.split("\n")
+        line, begin = 1 + before, 0
+        for match in _O_LINE.finditer(text):
+            line, begin = line + text.count("\n", begin, match.start()), match.start()
+            one = self._o_line(match, line)
+            self._o_lines[line] = one
+            self._labels.setdefault(one.label, []).append(one)
         self._letters: NDArray[np.uint8] | None = None
+        self._begins = list[int]()
+
+    def _found(self, label: str, keyword: str) -> list[OLine]:
+        """Return where a subprogram begins, after a look for its file if it is not among the lines."""
+        stem, begun = label.strip("<>"), {file for _, file in self.files}
+        for name in (stem, f"o{stem}", f"{stem:0>4}", f"o{stem:0>4}"):
+            if any(one.keyword == keyword for one in self._labels.get(label, [])):
+                break
+            file, text = self._setup.subprogram(name) or ("", "")
+            if file and file not in begun:
+                self._append("\n".join("" if is_percent(line) else line for line in text.split("\n")), file)
+        return [one for one in self._labels.get(label, []) if one.keyword == keyword]
+
+    def _place(self, line: int) -> Place:
+        before, file = next(each for each in reversed(self.files) if each[0] < line)
+        return Place(file, line, line - before if before else 0)
 
     def lines(self) -> Iterator[tuple[str, Place]]:
         """Yield lines without O-words in execution order.
@@ -103,15 +136,21 @@ class Flow:
         Raises:
             BadLine: an O-word that makes no sense, or the program does not end.
         """
-        last = self._text.rstrip(BLANKS + "\n").count("\n")
-        while self._next < len(self._lines):
+        last = next((at for at in range(self._own_lines, 0, -1) if self._lines[at - 1].strip(BLANKS)), 1) - 1
+        # Past its last line a file does not go on in the next one.
+        while self._next < len(self._lines) and not (self._next and any(self._next == at for at, _ in self.files)):
             self._ran += 1
-            place = Place(self._file, self._next + 1)
+            place = self._place(self._next + 1)
             if self._ran > len(self._lines) + MOST_AGAIN:
                 what = f"its loops and subprograms run more than {MOST_AGAIN} lines: they may never end"
                 raise place.fault(1, what, "check the conditions of its loops")
             line = self._lines[self._next]
             self._next += 1
+            skipped = _SKIPPED.match(line)
+            if skipped is not None and self._setup.block_delete is not None:
+                if self._setup.block_delete:
+                    continue
+                line = f"{skipped[0][:-1]} {line[skipped.end() :]}"
             word = self._o_lines.get(self._next)
             if word is not None:
                 self._run(word, place)
@@ -125,7 +164,7 @@ class Flow:
     def plain_lines(self) -> PlainLines:
         """Return what plain lines say from the line yielded last on."""
         if self._letters is None:
-            self._letters = letters_of(self._text)
+            self._letters = letters_of("\n".join(self._lines))
             self._begins = [0, *accumulate(len(line) + 1 for line in self._lines)]
         return plain_lines(self._letters, self._begins[self._next - 1])
 
@@ -145,17 +184,17 @@ class Flow:
         Raises:
             BadLine: the percent sign that closes it.
         """
-        if self.percent and not any(is_percent(line) for line in self._lines[self._next :]):
+        if self.percent and not any(is_percent(line) for line in self._lines[self._opening()[1] : self._own_lines]):
             raise BadLine(self.cut_short())
 
     def all_lines(self) -> Iterator[tuple[str, Place]]:
         """Yield all lines without O-words in file order, up to the closing percent sign."""
         begin = self._opening()[1]
-        for number, line in enumerate(self._lines[begin:], begin + 1):
+        for number, line in enumerate(self._lines[begin : self._own_lines], begin + 1):
             if self.percent and is_percent(line):
                 return
             if number not in self._o_lines:
-                yield line, Place(self._file, number)
+                yield line, self._place(number)
 
     def value_of(self, which: int | str) -> float | None:
         """Return the value of a parameter, None if undefined."""
@@ -178,10 +217,12 @@ class Flow:
         """
         if number > MOST_NUMBER and times == 1.0 and f"{number:.0f}" not in self._labels:
             times, number = divmod(number, MOST_NUMBER + 1.0)
-        found = [each for each in self._labels.get(f"{number:.0f}", []) if not each.keyword]
+        found = self._found(f"{number:.0f}", "")
         if len(found) != 1 or number != int(number):
             what = f"M98 calls the subprogram O{number:g}, of which there is {'none' if not found else 'more than one'}"
-            raise place.fault(1, what, "put it into this file behind M30, from its O number to M99")
+            raise place.fault(
+                1, what, f"put it behind M30, from O{number:g} to M99, or give its folder with --subprograms"
+            )
         if times >= 1.0:
             self._enter(found[0].line, int(times) - 1, place, by_number=True, parameters=dict(self._own()))
 
@@ -211,7 +252,7 @@ class Flow:
         """Return the fault of a program without an end."""
         end = "the % that closes it" if self.percent else "M2 or M30"
         what = f"the program ends without {end}: it may have been cut short"
-        return Problem(self._file, len(self._lines), 0, what, "copy it again, or add its end where it is whole")
+        return Problem(self.files[0][1], self._own_lines, 0, what, "copy it again, or add its end where it is whole")
 
     @staticmethod
     def _o_line(match: re.Match[str], line: int) -> OLine:
@@ -239,10 +280,12 @@ class Flow:
         self._next = self._find(word, place, ("endsub",)).line
 
     def _call(self, word: OLine, place: Place) -> None:
-        subs = [each for each in self._labels[word.label] if each.keyword == "sub"]
+        subs = self._found(word.label, "sub")
         if len(subs) != 1:
             what = f"the subprogram O{word.label} is {'not in this file' if not subs else 'in it more than once'}"
-            raise place.fault(1, what, "put it into the program, from its sub to its endsub")
+            raise place.fault(
+                1, what, "put it there, from its sub to its endsub, or give its folder with --subprograms"
+            )
         given, reader = [], self._reader(word, place)
         while reader.blanks() == "[":
             given.append(reader.bracket())
@@ -290,7 +333,7 @@ class Flow:
         if word.keyword == "endif" or self._holds(word, place):
             return
         branch = self._find(word, place, ("elseif", "else", "endif"))
-        while branch.keyword == "elseif" and not self._holds(branch, Place(self._file, branch.line)):
+        while branch.keyword == "elseif" and not self._holds(branch, self._place(branch.line)):
             branch = self._find(branch, place, ("elseif", "else", "endif"))
         self._next = branch.line
 

@@ -101,7 +101,7 @@ class Modes:
         self.path.units_said = False
         pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64)
         self._state = ControlState(setup, pose)
-        self.flow = Flow(text, file, self._state.parameter)
+        self.flow = Flow(text, file, self._state.parameter, setup)
         self._given = not np.isnan(pose).any()
         self._fixed = bits_of(~np.isnan(pose)) & TURNS
         self._motion: float | None = None
@@ -197,6 +197,8 @@ class Modes:
         said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
         self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
+        output = block.codes.get(ModalGroup.OUTPUT)
+        said += [] if output is None else [output, *(block.words.pop(letter, None) for letter in "PQ")]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
@@ -224,6 +226,7 @@ class Modes:
             return
         users = [self._in_line(block, ModalGroup.ONCE, {DWELL, 10.0}), self._in_line(block, ModalGroup.PATH, {64.0})]
         users += [self._in_line(block, ModalGroup.MOTION, ARCS) or self._modal_arc(block)]
+        users += [name("M", block.codes[ModalGroup.OUTPUT].value)] if ModalGroup.OUTPUT in block.codes else []
         both = [code for code in users if code]
         if len(both) > 1 and ("P" in block.words or both[0] == name("G", DWELL)):
             column = block.words["P"].column if "P" in block.words else 1
@@ -295,11 +298,12 @@ class Modes:
                 raise block.place.fault(word.column, f"{name('G', word.value)} needs D", "give the diameter")
             return number.value * self._state.unit_mm
         tool = self._state.tool if number is None else number.value
-        if tool is None or tool not in self._state.setup.diameters:
+        if tool is None or tool not in self._state.diameters:
             what = f"the diameter of tool {'in the spindle' if tool is None else f'{tool:g}'} is not known"
             raise block.place.fault(word.column, what, "give LinuxCNC's tool table with --tools")
-        diameter_mm = self._state.setup.diameters[int(tool)]
-        self._hold(f"D{tool:g}", (diameter_mm,))
+        diameter_mm = self._state.diameters[int(tool)]
+        if tool not in self._state.tools_set:
+            self._hold(f"D{tool:g}", (diameter_mm,))
         return diameter_mm
 
     def _note(self, block: ProgramBlock) -> None:
@@ -344,7 +348,8 @@ class Modes:
             self._upright = True  # A and B must stay so: G43.4 would tilt the tool length
         tool = block.words.pop("H", None)
         which = self._state.use_length(tool, block, word)
-        self._hold(f"H{which}", self._state.length)
+        if which not in self._state.tools_set:  # what the program sets itself needs no check
+            self._hold(f"H{which}", self._state.length)
         self._system(f"G43 H{which}", block)
 
     def _system(self, text: str, block: ProgramBlock) -> None:

@@ -62,6 +62,7 @@ def read_program(
         interpreter.run_all()
     except BadLine as fault:
         raise InputError(_unreadable(interpreter.flow) or [fault.problem]) from None
+    interpreter.path.files = interpreter.flow.files
     return interpreter.path.built()
 
 
@@ -101,7 +102,10 @@ class _Interpreter(Moves):
                 break
         else:
             # What stops its spindle or leaves behind the last cut ends without M2, as for GRBL.
-            if not (self.flow.closed or (not self.flow.percent and 0 < self.path.fed < max(self.path.left, self._stopped + 1))):
+            if not (
+                self.flow.closed
+                or (not self.flow.percent and 0 < self.path.fed < max(self.path.left, self._stopped + 1))
+            ):
                 raise BadLine(self.flow.cut_short())
             if not self.flow.closed:
                 self.path.notes += (NO_END,)
@@ -115,7 +119,9 @@ class _Interpreter(Moves):
             raise self._unplaced or unknown_place(block, unknown, "")
         if self._unplaced is not None:
             problem = self._unplaced.problem
-            self.path.notes += (f"line {problem.line}: {problem.what}: what leads there is corrected for where it names them first",)
+            self.path.notes += (
+                f"line {problem.line}: {problem.what}: what leads there is corrected for where it names them first",
+            )
 
     def _end_stored(self, place: Place) -> None:
         for level in [each for each in self._stored if each not in self.flow.runs]:
@@ -192,8 +198,8 @@ class _Interpreter(Moves):
         if block.codes or self._per_move or len(block.words) > _moved(block):
             self._units(block)
             self._feed(block)
-            self._functions(block)
             self._shared_words(block)
+            self._functions(block)
             if block.code(ModalGroup.ONCE) == DWELL:
                 self.path.dwell(self._dwell_s(block), line=block.place.line)
             self._modes(block)
@@ -224,7 +230,8 @@ class _Interpreter(Moves):
             self.path.count_from(self._state.offset)
         elif code == 10.0:  # noqa: PLR2004
             told, system, before = self._state.set_system(block)
-            self._hold(system, before)
+            if system:
+                self._hold(system, before)
             self._system(told, block)
         elif code in {28.0, 30.0}:
             self._to_reference(block)

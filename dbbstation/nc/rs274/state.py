@@ -36,6 +36,8 @@ class ControlState:
 
     def __init__(self, setup: ControlSetup, pose: NDArray[np.float64]) -> None:
         self.setup, self.pose, self.unit_mm, self.system = setup, pose, 1.0, 1
+        self.lengths, self.diameters = dict(setup.lengths), dict(setup.diameters)
+        self.tools_set: set[int] = set()
         self._systems: dict[int, tuple[float, ...]] = {}
         self.g92 = setup.place("G92") or ZERO
         self._suspended = self.g92
@@ -65,13 +67,12 @@ class ControlState:
     def set_system(self, block: ProgramBlock) -> tuple[str, str, tuple[float, ...]]:
         """Run G10 L2 or L20; return the equivalent, the system and its earlier offset."""
         word = block.codes[ModalGroup.ONCE]
+        if block.words.get("L", word).value == 1.0:
+            return self._set_tool(block), "", ()
         kind, which, turned = (block.words.pop(letter, None) for letter in "LPR")
         if kind is None or kind.value not in {2.0, 20.0} or which is None or which.value not in range(10):
             said = "" if kind is None else f" L{kind.value:g}"
-            what = f"G10{said} is not read"
-            raise block.place.fault(
-                word.column, what, "G10 L2 and L20 with P0 to P9 are; declare tools with --tool-length"
-            )
+            raise block.place.fault(word.column, f"G10{said} is not read", "G10 L1, L2 and L20 with P0 to P9 are")
         if turned is not None and turned.value != 0.0:
             raise block.place.fault(turned.column, "G10 with a rotation (R)", "post the program without rotation")
         system = int(which.value) or self.system
@@ -85,6 +86,26 @@ class ControlState:
         self._counted()
         words = " ".join(f"{letter}{digits(value)}" for letter, value in zip(AXES, offset, strict=True))
         return f"G10 L2 P{system} {words}", SYSTEMS[system - 1], before
+
+    def _set_tool(self, block: ProgramBlock) -> str:
+        """Run G10 L1, which sets length and radius of a tool in the control's table."""
+        word, which, radius = block.words.pop("L"), block.words.pop("P", None), block.words.pop("R", None)
+        if which is None or which.value < 1.0 or which.value != int(which.value):
+            raise block.place.fault(word.column, "G10 L1 without the number of a tool", "give P, a whole number from 1")
+        tool, said = int(which.value), f"G10 L1 P{which.value:g}"
+        length = list(self.lengths.get(tool, ZERO))
+        for axis, letter in enumerate(AXES):
+            value = self._taken(block, axis, letter)
+            if value is not None:
+                length[axis], said = value, f"{said} {letter}{digits(value)}"
+        self.lengths[tool] = tuple(length)
+        if radius is not None:
+            self.diameters[tool], said = (
+                2.0 * radius.value * self.unit_mm,
+                f"{said} R{digits(radius.value * self.unit_mm)}",
+            )
+        self.tools_set.add(tool)
+        return said
 
     def shift(self, code: float, block: ProgramBlock) -> None:
         """Run G52 or G92 to G92.3."""
@@ -112,11 +133,11 @@ class ControlState:
         if which is None or which < 1.0 or which != int(which):
             what = f"{name('G', code.value)} without the number of a tool" if tool is None else f"H{which:g} is no tool"
             raise block.place.fault(column, what, "give H, a whole number from 1")
-        if int(which) not in self.setup.lengths:
+        if int(which) not in self.lengths:
             what = f"the length of tool {which:g} is not known"
             remedy = f"give it with --tool-length {which:g}=MM, or LinuxCNC's tool table with --tools"
             raise block.place.fault(column, what, remedy)
-        self.length, self.length_said = self.setup.lengths[int(which)], True
+        self.length, self.length_said = self.lengths[int(which)], True
         self._counted()
         return int(which)
 

@@ -32,7 +32,7 @@ slip of the pen, and would be drawn out into millions of points before any limit
 
 _NOT_READ = {
     "[": ("an expression ([ ]) without its letter", "write the letter before it"),
-    "/": ("a line that can be skipped (/) is not read", "decide: remove the line, or the slash"),
+    "/": ("a line that a switch of the control skips (/)", "say how the switch stands: --block-delete on, or off"),
     "(": ("a comment without its end, or inside another", "close it with ) before the line ends"),
     "%": ("% stands alone on the first and the last line", "remove it"),
 }
@@ -81,14 +81,20 @@ class BadLine(Exception):  # noqa: N818 - never leaves this package
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A line of a program, for messages."""
+    """A line of a program, for messages.
+
+    Attributes:
+        line: from 1; lines of subprograms in other files follow.
+        within: the line in such a file; 0 in the program.
+    """
 
     file: str
     line: int
+    within: int = 0
 
     def fault(self, column: int, what: str, remedy: str) -> BadLine:
         """Return the exception for a fault in this place."""
-        return BadLine(Problem(self.file, self.line, column, what, remedy))
+        return BadLine(Problem(self.file, self.within or self.line, column, what, remedy))
 
 
 def unknown_value(_which: int | str) -> float:

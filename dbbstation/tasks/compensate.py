@@ -177,11 +177,9 @@ def compensate(
         pose[3:] = np.asarray(angles_deg, dtype=np.float64).reshape(3)
     both = (("parameter file", parameters), ("tool table", tools))
     files = {what: Path(file) for what, file in both if file is not None}
-    setup = None
-    if offsets or tool_lengths_mm or files or subprograms is not None or block_delete is not None:
-        folder = None if subprograms is None else Path(subprograms)
-        given = [files.get(what) for what, _ in both]
-        setup = setup_of(offsets or {}, tool_lengths_mm or {}, *given, folder, block_delete)
+    given = [files.get(what) for what, _ in both] + [None if subprograms is None else Path(subprograms)]
+    declared = bool(offsets or tool_lengths_mm or any(given) or block_delete is not None)
+    setup = setup_of(offsets or {}, tool_lengths_mm or {}, *given, block_delete) if declared else None
     if out is not None:
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)
@@ -207,13 +205,12 @@ def compensate(
     )
     warnings = () if inverse.identified is None else model_warnings(inverse.identified)
     telling.note(*warnings)
-    if not path.units_said:
-        telling.note(UNITS_NOT_SAID)
+    telling.note(*([] if path.units_said else [UNITS_NOT_SAID]))
     named = {"program file": source} if isinstance(source, Path) else {}
     older = min((one.stat().st_mtime for one in named.values()), default=0.0)
     telling.note(*(OLDER.format(what) for what, file in files.items() if file.stat().st_mtime < older))
-    files |= {f"subprogram {Path(file).stem}": Path(file) for _, file in path.files[1:]}
-    origin = origin_of({**named, **files}, inverse, (provenance or from_python)())
+    called = {f"subprogram {Path(file).stem}": Path(file) for _, file in path.files[1:]}
+    origin = origin_of({**named, **files, **called}, inverse, (provenance or from_python)())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:
         write_text(Path(out), done.text, force=force)

@@ -186,6 +186,22 @@ def test_a_start_pose_lets_a_program_begin_anywhere(tmp_path, model_file):
     assert run(compensate, part, "--start", "1,2", "--model", model_file, "--out", out).exit_code == 2
 
 
+def test_subprograms_and_skipped_lines_are_declared(tmp_path, model_file):
+    part, out, folder = tmp_path / "part.ngc", tmp_path / "true.ngc", tmp_path / "subs"
+    folder.mkdir()
+    (folder / "side.ngc").write_text("o<side> sub\nG1 X#1 F100\no<side> endsub\n")
+    part.write_text("G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\no<side> call [10]\n/G1 Y20\nM2\n")
+    declared = ["--subprograms", folder, "--model", model_file, "--out", out]
+    with pytest.raises(InputError, match=r"part\.ngc:4:1: .*--block-delete on, or off"):
+        run(compensate, part, *declared)
+    lengths = []
+    for switch in ("on", "off"):
+        run(compensate, part, *declared, "--block-delete", switch, "--force")
+        assert "subprogram side" in out.read_text()
+        lengths.append(sum(line.startswith("G1") for line in out.read_text().splitlines()))
+    assert 0 < lengths[0] < lengths[1]
+
+
 def test_bad_files_are_told(tmp_path, model_file):
     with pytest.raises(InputError, match="no such file"):
         run(compensate, tmp_path / "none.ngc", "--model", model_file, "--out", tmp_path / "x.ngc")

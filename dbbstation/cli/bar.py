@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.instrument_options import chosen_protocol, instrument_options
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import LineOptions
 from dbbstation.cli.output import echo
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
 from dbbstation.service.patience import driver_patience
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -21,80 +24,76 @@ if TYPE_CHECKING:
     from dbbstation.trace.steady import Steady
 
 
-@click.command()
-@instrument_options(required=True)
-@click.option("--serial-number", required=True, help="Serial number of the bar.")
-@click.option("--calibrator-serial", "calibrator_serial", required=True, help="Serial number of the calibrator.")
-@click.option(
-    "--calibrator-mm", type=Finite(20, 2000), required=True, help="Its length on the certificate, at 20 degC."
-)
-@click.option(
-    "--calibrator-u-um",
-    type=Finite(0, 100),
-    required=True,
-    help="Standard uncertainty u of the calibrator's length (U/2).",
-)
-@click.option("--certified", required=True, metavar="YYYY-MM-DD", help="Date of the certificate.")
-@click.option("--valid-until", metavar="YYYY-MM-DD", help="Last day on which it holds  [default: five years].")
-@click.option("--certificate", default="", help="Number of the certificate, and who issued it.")
-@click.option("--temp-c", type=Finite(-30, 80), required=True, help="Temperature of the bar [degC].")
-@click.option(
-    "--temp-u-k",
-    type=Finite(0.001, 10),
-    default=USUAL_TEMP_UNCERTAINTY_K,
-    show_default=True,
-    help="Standard uncertainty of that temperature [K].",
-)
-@click.option(
-    "--expansion-um-m-k",
-    type=Finite(0.01, 50),
-    default=STEEL_BAR_UM_M_K,
-    show_default="11.5, steel",
-    help="Thermal expansion of the bar [µm/(m K)].",
-)
-@click.option(
-    "--count", type=click.IntRange(20, 1_000_000), default=USUAL_READINGS, show_default=True, help="Readings."
-)
-@click.option(
-    "--resolution-um", type=Finite(0.0001, 100), help="Last digit of the display  [default: as readings show]."
-)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="File of the bar.")
-@click.option("--force", is_flag=True, help="Replace the file.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@dataclass(frozen=True, kw_only=True)
+class BarOptions:
+    """The bar that is read, by the keys of its file."""
+
+    serial_number: Annotated[str, Option("Serial number of the bar.")]
+    temp_c: Annotated[float, Option("Temperature of the bar [degC].", least=-30.0, most=80.0)]
+    temp_uncertainty_k: Annotated[
+        float,
+        Option("Standard uncertainty of that temperature [K].", flag="--temp-u-k", least=0.001, most=10.0),
+    ] = USUAL_TEMP_UNCERTAINTY_K
+    expansion_um_m_k: Annotated[
+        float,
+        Option("Thermal expansion of the bar [µm/(m K)].", usual="11.5, steel", least=0.01, most=50.0),
+    ] = STEEL_BAR_UM_M_K
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibratorOptions:
+    """The calibrator."""
+
+    calibrator_serial: Annotated[str, Option("Serial number of the calibrator.")]
+    calibrator_mm: Annotated[float, Option("Its length on the certificate, at 20 degC.", least=20.0, most=2000.0)]
+    calibrator_u_um: Annotated[
+        float, Option("Standard uncertainty u of the calibrator's length (U/2).", least=0.0, most=100.0)
+    ]
+    certified: Annotated[str, Option("Date of the certificate.", metavar="YYYY-MM-DD")]
+    valid_until: Annotated[
+        str | None, Option("Last day on which it holds  [default: five years].", metavar="YYYY-MM-DD")
+    ] = None
+    certificate: Annotated[str, Option("Number of the certificate, and who issued it.")] = ""
+
+    @property
+    def data(self) -> dict[str, object]:
+        """Return it by the keys of the bar's file."""
+        return {
+            "serial_number": self.calibrator_serial,
+            "length_mm": self.calibrator_mm,
+            "uncertainty_um": self.calibrator_u_um,
+            "certified": self.certified,
+            "valid_until": self.valid_until,
+            "certificate": self.certificate,
+        }
+
+
+@made()
 def bar(
+    line: LineOptions,
+    of_bar: BarOptions,
+    calibrator: CalibratorOptions,
     *,
-    instrument: str,
-    profile: str | None,
-    zero_mm: float | None,
-    port: str,
-    baud: int | None,
-    serial_number: str,
-    calibrator_serial: str,
-    calibrator_mm: float,
-    calibrator_u_um: float,
-    certified: str,
-    valid_until: str | None,
-    certificate: str,
-    temp_c: float,
-    temp_u_k: float,
-    expansion_um_m_k: float,
-    count: int,
-    resolution_um: float | None,
-    out: Path,
-    force: bool,
-    as_json: bool,
+    count: Annotated[int, Option("Readings.", least=20, most=1_000_000)] = USUAL_READINGS,
+    resolution_um: Annotated[
+        float | None,
+        Option("Last digit of the display  [default: as readings show].", least=0.0001, most=100.0),
+    ] = None,
+    out: Annotated[Path, Option("File of the bar.", kind="file")],
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
-    """Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
+    r"""Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
 
     Put the bar on the calibrator, a block of known length such as of Zerodur, and wait until it has the temperature of the
     shop. The readings are averaged. The bar's error is noted; recordings are never corrected. `calibrate` accounts for this error, its uncertainty and the bar's growth since.
 
     \b
     Examples:
-      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --serial-number DBB-0042 --calibrator-serial ZB-17 \\
+      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --serial-number DBB-0042 --calibrator-serial ZB-17 \
         --calibrator-mm 150.0003 --calibrator-u-um 0.25 --certified 2026-03-01 --temp-c 20.3 --out bar.yaml
       dbbstation check bar.yaml
-    """  # noqa: D301 (click reads the escape)
+    """
     from datetime import UTC, datetime
 
     from dbbstation.cli.output import print_json
@@ -103,27 +102,9 @@ def bar(
     from dbbstation.service.bar_reading import DRIFT
 
     refuse_existing(out, force=force)
-    protocol = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=calibrator_mm)
-    found = _read(protocol, port, baud, count, resolution_um)
-    file = _file(
-        found,
-        {
-            "serial_number": serial_number,
-            "temp_c": temp_c,
-            "temp_uncertainty_k": temp_u_k,
-            "expansion_um_m_k": expansion_um_m_k,
-        },
-        {
-            "serial_number": calibrator_serial,
-            "length_mm": calibrator_mm,
-            "uncertainty_um": calibrator_u_um,
-            "certified": certified,
-            "valid_until": valid_until,
-            "certificate": certificate,
-        },
-        instrument,
-        datetime.now(UTC),
-    )
+    protocol = line.protocol(bar_length_mm=calibrator.calibrator_mm)
+    found = _read(protocol, line.port, line.baud, count, resolution_um)
+    file = _file(found, asdict(of_bar), calibrator.data, line.instrument, datetime.now(UTC))
     write_bar(out, file, force=force)
     long_um, u_um = 1e3 * (found.mean_mm - file.length_mm), 1e3 * file.uncertainty_mm
     if as_json:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.circle_options import approach_of, circle_options
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import PROFILE
 from dbbstation.cli.output import echo, echo_line
-from dbbstation.cli.shared_options import chosen_tests_options, source_file_option
+from dbbstation.tasks import options as o
 from dbbstation.tasks.chosen import chosen_of
+from dbbstation.tasks.declare import Names, Option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,45 +26,39 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 
-def _anchor(_context: click.Context, _option: click.Parameter, given: str | None) -> str | None:
-    if given is None or re.fullmatch(r"[0-9a-f]{16,64}", given.lower()):
-        return None if given is None else given.lower()
-    raise click.BadParameter("sixteen to sixty-four hex digits, as a report and `dbbstation check` show them")
+def _anchor(text: str) -> str:
+    if re.fullmatch(r"[0-9a-f]{16,64}", text.lower()):
+        return text.lower()
+    raise ValueError("sixteen to sixty-four hex digits, as a report and `dbbstation check` show them")
 
 
-@click.command()
-@click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="FILE...")
-@source_file_option
-@chosen_tests_options
-@circle_options
-@click.option("--instrument", metavar="NAME", help="State the points per turn of this instrument at the plans' feeds.")
-@click.option("--profile", metavar="NAME", help="Variant of that instrument.")
-@click.option(
-    "--anchor",
-    metavar="HASH",
-    callback=_anchor,
-    help="State whether the sessions were changed since this anchor was noted.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@click.option(
-    "--schema",
-    metavar="FORMAT",
-    help="Print the JSON Schema of a format, such as dbb-plan/1, or of a command's --json, such as calibrate, and stop.",
-)
+@made()
 def check(
-    files: tuple[Path, ...],
+    files: Annotated[tuple[Path, ...], Option("of any format.", kind="argument", metavar="FILE...")] = (),
     *,
-    source_files: tuple[Path, ...],
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    step_deg: float,
-    clearance_mm: float,
-    bar_stays_on: bool,
-    instrument: str | None,
-    profile: str | None,
-    anchor: str | None,
-    as_json: bool,
-    schema: str | None,
+    source_files: o.SourcePaths = (),
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    step_deg: o.StepDeg = 0.1,
+    clearance_mm: o.ClearanceMm = 20.0,
+    bar_stays_on: o.BarStaysOn = False,
+    instrument: Annotated[
+        str | None,
+        Option("State the points per turn of this instrument at the plans' feeds.", metavar="NAME"),
+    ] = None,
+    profile: Annotated[str | None, replace(PROFILE, setting="")] = None,
+    anchor: Annotated[
+        str | None,
+        Option("State whether the sessions were changed since this anchor was noted.", metavar="HASH", parse=_anchor),
+    ] = None,
+    schema: Annotated[
+        str | None,
+        Option(
+            "Print the JSON Schema of a format, such as dbb-plan/1, or of a command's --json, such as calibrate, and stop.",
+            metavar="FORMAT",
+        ),
+    ] = None,
+    as_json: o.Json = False,
 ) -> None:
     r"""Validate machines, instruments, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
 
@@ -99,6 +96,7 @@ def check(
         raise click.UsageError("name at least one file or session folder")
 
     from dbbstation.files.own_sources import every_source
+    from dbbstation.nc.circle_program import Approach
 
     known = every_source(source_files)
     results = [_check_one(file, known) for file in files]
@@ -106,7 +104,7 @@ def check(
     machines = _sound(results, "dbb-machine")
     # Of several machines nobody has said which the plans are for.
     runs = [
-        _dry_run(plan, machine, tests, exclude, step_deg, approach_of(clearance_mm, bar_stays_on=bar_stays_on))
+        _dry_run(plan, machine, tests, exclude, step_deg, None if bar_stays_on else Approach(clearance_mm))
         for plan in _sound(results, "dbb-plan")
         for machine in (machines if len(machines) == 1 else ())
     ]
@@ -226,8 +224,8 @@ def _sound(results: Sequence[Checked], kind: str) -> list[Path]:
 def _dry_run(
     plan_file: Path,
     machine_file: Path,
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
+    tests: Names,
+    exclude: Names,
     step_deg: float,
     approach: Approach | None,
 ) -> DryRunResult:

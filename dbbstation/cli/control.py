@@ -2,70 +2,76 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import click
 
-from dbbstation.cli.number_types import Finite
-from dbbstation.cli.output import echo
-from dbbstation.cli.shared_options import source_file_option
+from dbbstation.cli.declared import made
+from dbbstation.cli.output import echo, say
+from dbbstation.tasks import options as o
 from dbbstation.tasks.control_state import numbers_of
+from dbbstation.tasks.declare import Names, Option
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-_FILE = click.Path(path_type=Path, dir_okay=False)
-_MODEL = click.option("--model", "model_file", type=_FILE, required=True, help="Calibrated model.")
-_MACHINE = click.option("--machine", type=_FILE, help="Machine file that the model must agree with.")
-_FORCE = click.option("--force", is_flag=True, help="Overwrite existing files.")
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_Result = TypeVar("_Result", bound=Any)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelOptions:
+    """The corrected machine."""
+
+    model: Annotated[Path, o.MODEL]
+    source_files: o.SourcePaths = ()
+    machine: Annotated[Path | None, Option("Machine file that the model must agree with.", kind="file")] = None
+
+    def written(self, task: Callable[..., _Result], out: Path, **given: Any) -> _Result:  # noqa: ANN401 - as the task has it
+        """Return what a task writes, its notes told."""
+        from datetime import UTC, datetime
+
+        from dbbstation.files.own_sources import every_source
+
+        day, known = datetime.now(UTC).date().isoformat(), every_source(self.source_files)
+        result = task(self.model, out, date=day, known=known, machine=self.machine, **given)
+        for note in result.notes:
+            say(f"note: {note}")
+        return result
 
 
 @click.group()
 def control() -> None:
-    """Correct a machine inside its control: a LinuxCNC kinematics made from the model, or parameters for an existing one.
+    r"""Correct a machine inside its control: a LinuxCNC kinematics made from the model, or parameters for an existing one.
 
     \b
     Examples:
       dbbstation control kinematics --model model.yaml --out dbbkins.comp
       dbbstation control parameters --model model.yaml --out genhexkins
-    """  # noqa: D301 (click reads the escape)
+    """
 
 
-@control.command()
-@_MODEL
-@source_file_option
-@click.option("--out", type=_FILE, required=True, help="Component to write: NAME.comp.")
-@_MACHINE
-@click.option(
-    "--leave-out",
-    "left_out",
-    multiple=True,
-    metavar="SOURCE,...",
-    help="Leave these sources uncorrected; may be given more than once.",
-)
-@click.option(
-    "--thermometers",
-    "thermometers",
-    multiple=True,
-    metavar="NAME,...",
-    help="Thermometers of the control, as columns without `_temp_c`; may be given more than once.",
-)
-@_FORCE
-@_JSON
+@made(group=control)
 def kinematics(
+    of: ModelOptions,
     *,
-    model_file: Path,
-    source_files: tuple[Path, ...],
-    out: Path,
-    machine: Path | None,
-    left_out: tuple[str, ...],
-    thermometers: tuple[str, ...],
-    force: bool,
-    as_json: bool,
+    out: Annotated[Path, Option("Component to write: NAME.comp.", kind="file")],
+    leave_out: Annotated[
+        Names, Option("Leave these sources uncorrected; may be given more than once.", metavar="SOURCE,...")
+    ] = (),
+    thermometers: Annotated[
+        Names,
+        Option(
+            "Thermometers of the control, as columns without `_temp_c`; may be given more than once.",
+            metavar="NAME,...",
+        ),
+    ] = (),
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
-    """Write a LinuxCNC kinematics component that takes the real machine to the commanded pose.
+    r"""Write a LinuxCNC kinematics component that takes the real machine to the commanded pose.
 
     It holds every source that depends on pose, strut length or thermometers. A source that depends on the way so far, such as
     play, is refused by name; --leave-out leaves it uncorrected.
@@ -74,25 +80,11 @@ def kinematics(
     Examples:
       dbbstation control kinematics --model model.yaml --out dbbkins.comp
       dbbstation control kinematics --model model.yaml --out dbbkins.comp --leave-out backlash --thermometers machine
-    """  # noqa: D301 (click reads the escape)
-    from datetime import UTC, datetime
+    """
+    from dbbstation.cli.output import print_result
+    from dbbstation.tasks.control import kinematics as task
 
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.files.own_sources import every_source
-    from dbbstation.tasks.control import kinematics as written
-
-    result = written(
-        model_file,
-        out,
-        date=datetime.now(UTC).date().isoformat(),
-        known=every_source(source_files),
-        machine=machine,
-        left_out=_each(left_out),
-        thermometers=_each(thermometers),
-        force=force,
-    )
-    for note in result.notes:
-        say(f"note: {note}")
+    result = of.written(task, out, left_out=leave_out, thermometers=thermometers, force=force)
     if as_json:
         print_result(result)
         return
@@ -106,41 +98,27 @@ def kinematics(
     _print("The way back", result.way_back)
 
 
-def _six(_context: click.Context, _option: click.Parameter, text: str | None) -> object:
-    try:
-        return None if text is None else numbers_of(text, {6})
-    except ValueError as error:
-        raise click.BadParameter(str(error)) from None
-
-
-@control.command()
-@_MODEL
-@source_file_option
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
-@_MACHINE
-@click.option(
-    "--volume",
-    callback=_six,
-    metavar="X,X,Y,Y,Z,Z",
-    help="Least and greatest X, Y and Z [mm]  [default: 200 mm, middle].",
-)
-@click.option("--tilt-deg", type=Finite(0, 90), default=15.0, show_default=True, help="Greatest A and B [deg].")
-@click.option("--ini", type=_FILE, help="INI file in use: tables and backlash that it has are named.")
-@_FORCE
-@_JSON
+@made(group=control)
 def parameters(
+    of: ModelOptions,
     *,
-    model_file: Path,
-    source_files: tuple[Path, ...],
-    out: Path,
-    machine: Path | None,
-    volume: Sequence[float] | None,
-    tilt_deg: float,
-    ini: Path | None,
-    force: bool,
-    as_json: bool,
+    out: Annotated[Path, Option("Folder to write to.", kind="folder")],
+    volume: Annotated[
+        list[float] | None,
+        Option(
+            "Least and greatest X, Y and Z [mm]  [default: 200 mm, middle].",
+            metavar="X,X,Y,Y,Z,Z",
+            parse=partial(numbers_of, counts={6}),
+        ),
+    ] = None,
+    tilt_deg: Annotated[float, Option("Greatest A and B [deg].", least=0.0, most=90.0)] = 15.0,
+    ini: Annotated[
+        Path | None, Option("INI file in use: tables and backlash that it has are named.", kind="file")
+    ] = None,
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
-    """Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
+    r"""Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
 
     A weaker way than `control kinematics`: refitted values imitate what genhexkins lacks. They are numbers for a control, never
     the machine. The table states the remaining errors of the tool in the volume.
@@ -149,48 +127,29 @@ def parameters(
     Examples:
       dbbstation control parameters --model model.yaml --out genhexkins
       dbbstation control parameters --model model.yaml --out genhexkins --volume -80,80,-80,80,-1050,-950 --tilt-deg 10
-    """  # noqa: D301 (click reads the escape)
-    from datetime import UTC, datetime
+    """
+    from dbbstation.cli.output import print_result, print_table
+    from dbbstation.tasks.control import parameters as task
 
-    from dbbstation.cli.output import print_result, print_table, say
-    from dbbstation.files.own_sources import every_source
-    from dbbstation.tasks.control import parameters as written
-
-    result = written(
-        model_file,
-        out,
-        date=datetime.now(UTC).date().isoformat(),
-        known=every_source(source_files),
-        machine=machine,
-        volume_mm=volume,
-        tilt_deg=tilt_deg,
-        ini=ini,
-        force=force,
-    )
-    for note in result.notes:
-        say(f"note: {note}")
+    result = of.written(task, out, volume_mm=volume, tilt_deg=tilt_deg, ini=ini, force=force)
     if as_json:
         print_result(result)
         return
     echo(f"{result.folder}: {', '.join(result.files)}")
     spans = ", ".join(f"{axis} {a:g} to {b:g}" for axis, a, b in zip("XYZAB", result.low, result.high, strict=False))
     echo(f"\nremaining errors in the volume {spans} [µm, deg]:")
-    rows = [[o.way, o.rms_um, o.largest_um, o.tilt_rms_deg, o.tilt_largest_deg] for o in result.left]
-    print_table(
-        ["control", "rms", "largest", "tilt rms", "tilt largest"],
-        [[way, f"{rms:.2f}", f"{most:.2f}", f"{tilt:.5f}", f"{tilted:.5f}"] for way, rms, most, tilt, tilted in rows],
-    )
+    rows = [
+        [one.way, _um(one.rms_um), _um(one.largest_um), f"{one.tilt_rms_deg:.5f}", f"{one.tilt_largest_deg:.5f}"]
+        for one in result.left
+    ]
+    print_table(["control", "rms", "largest", "tilt rms", "tilt largest"], rows)
     echo("\neach source alone, without and with parameters and tables [µm rms]:")
     print_table(
         ["source", "alone", "left", "held by"],
-        [[o.name, _um(o.rms_um), _um(o.left_rms_um), o.held_by] for o in result.sources],
+        [[one.name, _um(one.rms_um), _um(one.left_rms_um), one.held_by] for one in result.sources],
     )
     _print("INI file", result.ini)
     _print("The way back", result.way_back)
-
-
-def _each(texts: tuple[str, ...]) -> list[str]:
-    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
 
 
 def _um(value: float | None) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import re
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -18,13 +19,13 @@ from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import options_of
+from dbbstation.tasks.declare import Option, TaskParameter, annotations_of, options_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from dbbstation.errors import StationError
-    from dbbstation.tasks.declare import Declared, TaskParameter
+    from dbbstation.tasks.declare import Declared
 
 
 def save(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result
@@ -52,24 +53,19 @@ class CommandOutput:
     folder: bool = False
     table: bool = False
     said: str = ""
-    check: Callable[..., Path | None] | None = None
+    check: Callable[[Path], Path] | None = None
     refused: Callable[[Any, Path], StationError | None] = lambda _result, _path: None
     only_with: str = ""
     field: str = ""
     required: bool = False
 
     @property
-    def option(self) -> click.Option:
+    def option(self) -> click.Parameter:
         """Return it as click has it."""
-        kind = _PATHS["folder" if self.folder else "file"]
-        return click.Option(
-            [f"--{self.name}"],
-            type=kind,
-            required=self.required,
-            callback=self.check,
-            help=o.OUTPUTS[self.name],
-            metavar=self.metavar,
-        )
+        of = o.OUTPUTS[self.name]
+        kind = "folder" if self.folder else "file"
+        said = Option(of, kind=kind, metavar=self.metavar, parse=self.check, required=self.required)
+        return _checked(TaskParameter(self.name, Path, None, said))
 
 
 def figure(said: str = "") -> CommandOutput:
@@ -130,6 +126,51 @@ def command(
     options.append(click.Option(["--json", "as_json"], is_flag=True, help=o.JSON.help))
     options.sort(key=lambda one: isinstance(one, click.Option))
     return click.Command(task.name, params=options, callback=run, help=task.help)
+
+
+def made(
+    name: str = "", group: click.Group | None = None, kind: type[click.Command] = click.Command
+) -> Callable[[Callable[..., Any]], click.Command]:
+    """Make a command of a function; its options are parameters with an `Option`, and fields of a dataclass with such.
+
+    Args:
+        name: empty: the function's.
+        group: gets the command.
+    """
+
+    def give(function: Callable[..., Any]) -> click.Command:
+        kinds: dict[str, Any] = {
+            name: kind for name, (kind, _) in annotations_of(function).items() if is_dataclass(kind)
+        }
+        parts = {name: options_of(kind) for name, kind in kinds.items()}
+        every = options_of(function) | {name: one for part in parts.values() for name, one in part.items()}
+
+        @functools.wraps(function)
+        def run(**given: Any) -> Any:  # noqa: ANN401 - each option has a type of its own
+            groups = {name: kinds[name](**{one: given.pop(one) for one in part}) for name, part in parts.items()}
+            return function(**given, **groups)
+
+        options = sorted(map(_checked, every.values()), key=lambda one: isinstance(one, click.Option))
+        text = inspect.cleandoc(function.__doc__ or "").replace(r"\b", "\b")
+        found = kind(name or function.__name__, params=options, callback=run, help=text)
+        if group is not None:
+            group.add_command(found)
+        return found
+
+    return give
+
+
+def _checked(one: TaskParameter) -> click.Parameter:
+    found = option_of(one)
+
+    def check(_context: click.Context, _option: click.Parameter, value: Any) -> Any:  # noqa: ANN401 - each has a type of its own
+        try:
+            return one.default if value is None else one.checked(value)
+        except ArgumentError as error:
+            raise click.BadParameter(error.what) from None
+
+    found.callback = check
+    return found
 
 
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
@@ -219,7 +260,7 @@ def option_of(one: TaskParameter) -> click.Parameter:
         )
     make: Any = click.Option
     if option.setting:
-        make = partial(ShopOption, setting=option.setting)
+        make = partial(ShopOption, setting=option.setting, factor=option.factor, goes_with=option.goes_with)
     if option.usual or one.default not in (None, (), "", inspect.Parameter.empty):
         make = partial(make, default=None if required else one.default, show_default=option.usual or True)
     found: click.Option = make(
@@ -237,7 +278,7 @@ def _kind_of(one: TaskParameter) -> Any:  # noqa: ANN401 - a type of click
     option, kind = one.option, get_args(one.type)[0] if one.many else one.type
     if kind is Path or option.kind in _PATHS:
         return _PATHS[option.kind or "path"]
-    if get_origin(kind) is Literal and not one.many:
+    if get_origin(kind) is Literal and (option.whole or not one.many):
         return click.Choice(get_args(kind))
     if kind is int:
         lowest, highest = (None if end is None else int(end) for end in (option.least, option.most))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import click
-
+from dbbstation.cli.declared import made
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import COUNTED, ENDLESS, ProgressBar
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
     from dbbstation.results.demo import ControlWay, DemoCircle, DemoResult
 
 
-@click.command()
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="New folder for everything.")
-@click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Seed of the machine's errors.")
-@click.option("--quick", is_flag=True, help="Three tests instead of fifteen, in both directions.")
-@click.option(
-    "--control", "in_control", type=click.Choice(["linuxcnc"]), help="Compare four corrections in this control."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
-def demo(*, out: Path | None, seed: int, quick: bool, in_control: str | None, as_json: bool) -> None:
+@made()
+def demo(
+    *,
+    out: Annotated[Path | None, Option("New folder for everything.", kind="folder")] = None,
+    seed: Annotated[int, Option("Seed of the machine's errors.", least=0)] = 3,
+    quick: Annotated[bool, Option("Three tests instead of fifteen, in both directions.")] = False,
+    control: Annotated[Literal["linuxcnc"] | None, Option("Compare four corrections in this control.")] = None,
+    as_json: o.Json = False,
+) -> None:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
 
     Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. They are shown
@@ -49,10 +50,10 @@ def demo(*, out: Path | None, seed: int, quick: bool, in_control: str | None, as
 
     folder = out or unused_path(Path(), "dbbstation-demo")
     tests = QUICK if quick else None
-    if folder.exists() and in_control is None:
+    if folder.exists() and control is None:
         raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
     shown = DemoShown()
-    if in_control is not None:
+    if control is not None:
         from dbbstation.demo.in_control import run_ways
 
         try:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
-
-from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import ProtocolOptions, RateHz
 from dbbstation.cli.output import echo, json_text, say
-from dbbstation.cli.shared_options import source_file_option
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
 from dbbstation.system.virtual_ports import marked_virtual
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,67 +24,30 @@ if TYPE_CHECKING:
 _LOOK_S = 0.2
 
 
-@click.command()
-@protocol_options(required=True)
-@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Test plan.")
-@click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
-@click.option(
-    "--truth", type=click.Path(path_type=Path), help="Model file with the true errors of the virtual machine."
-)
-@source_file_option
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of everything random.")
-@click.option(
-    "--rate-hz",
-    type=Finite(0.1, 100000.0),
-    help="Sampling rate [1/s], if it is not the usual one.",
-)
-@click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
-@click.option(
-    "--time-scale",
-    type=Finite(0.01, 200.0),
-    default=1.0,
-    show_default=True,
-    help="Factor by which machine and line run faster than real time.",
-)
-@click.option(
-    "--wait",
-    is_flag=True,
-    help="Let machine time pass only in runs, as fast as samples are taken: for `measure --auto`, the same on any computer.",
-)
-@click.option(
-    "--noise-um",
-    type=Finite(min=0.0),
-    default=0.3,
-    show_default=True,
-    help="Standard deviation of the noise of a reading [µm].",
-)
-@click.option(
-    "--bar-um",
-    type=Finite(min=0.0),
-    default=0.5,
-    show_default=True,
-    help="Standard deviation of the bar's length error [µm].",
-)
-@click.option("--baud", type=click.IntRange(min=1), help="Baud rate that the virtual instrument is set to.")
-@click.option("--json", "as_json", is_flag=True, help="Print port and control address as one JSON line.")
+@made()
 def emulate(
+    chosen: ProtocolOptions,
     *,
-    instrument: str,
-    profile: str | None,
-    zero_mm: float | None,
-    plan_file: Path,
-    machine_file: Path,
-    truth: Path | None,
-    source_files: tuple[Path, ...],
-    seed: int,
-    programs: Path | None,
-    rate_hz: float | None,
-    time_scale: float,
-    wait: bool,
-    noise_um: float,
-    bar_um: float,
-    baud: int | None,
-    as_json: bool,
+    plan: Annotated[Path, Option("Test plan.")],
+    machine: Annotated[Path, Option("Nominal machine.")],
+    truth: Annotated[Path | None, Option("Model file with the true errors of the virtual machine.")] = None,
+    source_files: o.SourcePaths = (),
+    seed: Annotated[int, Option("Seed of everything random.", least=0)] = 0,
+    programs: Annotated[Path | None, Option("Folder of NC programs to run.", kind="folder")] = None,
+    rate_hz: RateHz = None,
+    time_scale: Annotated[
+        float, Option("Factor by which machine and line run faster than real time.", least=0.01, most=200.0)
+    ] = 1.0,
+    wait: Annotated[
+        bool,
+        Option(
+            "Let machine time pass only in runs, as fast as samples are taken: for `measure --auto`, the same on any computer."
+        ),
+    ] = False,
+    noise_um: Annotated[float, Option("Standard deviation of the noise of a reading [µm].", least=0.0)] = 0.3,
+    bar_um: Annotated[float, Option("Standard deviation of the bar's length error [µm].", least=0.0)] = 0.5,
+    baud: Annotated[int | None, Option("Baud rate that the virtual instrument is set to.", least=1)] = None,
+    as_json: o.Json = False,
 ) -> None:
     r"""Run a virtual hexapod with a ball bar, as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.
 
@@ -110,16 +72,17 @@ def emulate(
     from dbbstation.virtual.wire import VirtualInstrument
     from dbbstation.virtual.wire_clock import ScaledClock, WaitingClock
 
-    usual = chosen_protocol(instrument, profile, zero_mm)
+    usual = chosen.protocol()
     protocol = at_rate(usual, rate_hz)
     sent_hz, usual_hz = protocol.fastest_hz(baud) * time_scale, usual.fastest_hz(baud)
     if not wait and sent_hz > usual_hz:
-        say(f"note: sends {sent_hz:g} readings a second, {instrument} has {usual_hz:g}")
+        say(f"note: sends {sent_hz:g} readings a second, {chosen.instrument} has {usual_hz:g}")
     if protocol.voice("fault") is None:
-        say(f"note: {instrument} has no frame for a missing bar: it is silent until `mount` or `start` puts a ball up")
-    machine, plan = read_machine(machine_file), read_plan(plan_file)
-    model = _truth(machine, truth, source_files, seed)
-    virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
+        say(
+            f"note: {chosen.instrument} has no frame for a missing bar: it is silent until `mount` or `start` puts a ball up"
+        )
+    model = _truth(read_machine(machine), truth, source_files, seed)
+    virtual = VirtualMachine(model, read_plan(plan), seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
     virtual.check()
     clock = WaitingClock() if wait else ScaledClock(time_scale)
     cell = VirtualCell(virtual, clock)
@@ -141,7 +104,7 @@ def emulate(
             echo("switched off", err=True)
 
 
-def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], seed: int) -> MachineModel:
+def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, seed: int) -> MachineModel:
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.machine import machine_data, machine_parts
     from dbbstation.files.formats.model import read_model

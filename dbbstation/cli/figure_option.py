@@ -1,33 +1,15 @@
-"""`--figure FILE`: a figure in the format of its extension."""
+"""Figures in the format of their extension."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import click
+from typing import TYPE_CHECKING
 
 from dbbstation.cli.provenance import provenance
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from pathlib import Path
 
     from dbbstation.report.figure_format import Stamped
-
-_Function = TypeVar("_Function", bound="Callable[..., Any]")
-
-
-def figure_option(
-    what: str = "Write a figure here", name: str = "--figure", *, required: bool = False
-) -> Callable[[_Function], _Function]:
-    """Give a command this option as a path or None."""
-    return click.option(
-        name,
-        required=required,
-        type=click.Path(path_type=Path, dir_okay=False),
-        callback=known_format,
-        help=f"{what}, as SVG, PNG or PDF by the ending of its name.",
-    )
 
 
 def format_of(path: Path) -> Stamped:
@@ -37,15 +19,15 @@ def format_of(path: Path) -> Stamped:
     return Stamped(FigureFormat(path.suffix.lower()), provenance())
 
 
-def known_format(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
-    """Refuse other extensions before any work.
+def known_format(path: Path) -> Path:
+    """Return a path whose extension is a format, before any work.
 
     Raises:
-        click.BadParameter: the name ends otherwise.
+        ValueError: the name ends otherwise.
     """
     from dbbstation.report.figure_format import FigureFormat
 
-    if path is not None and path.suffix.lower() not in set(FigureFormat):
+    if path.suffix.lower() not in set(FigureFormat):
         ending = f"`{path.suffix}` is no format of figures" if path.suffix else f"`{path.name}` has no ending"
-        raise click.BadParameter(f"{ending}; let the name end in {', '.join(FigureFormat)}")
+        raise ValueError(f"{ending}; let the name end in {', '.join(FigureFormat)}")
     return path

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import made
 from dbbstation.cli.output import echo
-from dbbstation.cli.shared_options import chosen_tests_options, source_file_option
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Names, Option
 
 if TYPE_CHECKING:
     from dbbstation.results.fleet import FleetResult
-
-TASKS = ("calibrate", "circles", "diagnose", "report")
 
 ONLY_OF = {
     "sources": ("calibrate", "diagnose"),
@@ -27,69 +26,29 @@ ONLY_OF = {
 """Tasks that take an option; the others have none such."""
 
 
-@click.command()
-@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FOLDER...")
-@click.option("--task", "task", required=True, type=click.Choice(TASKS), help="Task for every session.")
-@click.option("--sources", metavar="A,B,...", help="Error sources, as `calibrate` and `diagnose` take them.")
-@source_file_option
-@click.option("--law-over-time", is_flag=True, help="As `calibrate` takes it.")
-@click.option(
-    "--method",
-    type=click.Choice(["jig", "conv-a", "conv-b"]),
-    default="jig",
-    show_default=True,
-    help="As `calibrate` takes it.",
-)
-@click.option("--findings", is_flag=True, help="As `circles` takes it.")
-@chosen_tests_options
-@click.option(
-    "--false-alarms",
-    type=Finite(1e-6, 0.5),
-    default=0.01,
-    show_default=True,
-    help="Probability that like machines show any unlike value.",
-)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("fleet"),
-    show_default=True,
-    help="Folder of the results; created if missing.",
-)
-@click.option(
-    "--table",
-    "out_table",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write the table here too: a .csv or .parquet file.",
-)
-@click.option("--jobs", type=click.IntRange(1), help="Processes of this computer  [default: one for each core].")
-@click.option(
-    "--scheduler", metavar="ADDRESS", default="", help="Dask scheduler that does it, such as tcp://server:8786."
-)
-@click.option("--apart", is_flag=True, help="Count each session without a serial number as a separate machine.")
-@click.option("--anew", is_flag=True, help="Work out again what is up to date.")
-@click.option("--force", is_flag=True, help="Replace an existing --table.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@made()
 def fleet(
-    folders: tuple[Path, ...],
+    folders: Annotated[tuple[Path, ...], Option("of sessions.", kind="argument", metavar="FOLDER...")],
     *,
-    task: str,
-    sources: str | None,
-    source_files: tuple[Path, ...],
-    law_over_time: bool,
-    method: Literal["jig", "conv-a", "conv-b"],
-    findings: bool,
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    false_alarms: float,
-    out: Path,
-    out_table: Path | None,
-    jobs: int | None,
-    scheduler: str,
-    apart: bool,
-    anew: bool,
-    force: bool,
-    as_json: bool,
+    task: Annotated[Literal["calibrate", "circles", "diagnose", "report"], Option("Task for every session.")],
+    sources: Annotated[Names | None, o.SOURCES] = None,
+    source_files: o.SourcePaths = (),
+    law_over_time: o.LawOverTime = False,
+    method: o.Method = "jig",
+    findings: o.Findings = False,
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    false_alarms: Annotated[float, Option(o.FALSE_ALARMS, least=1e-6, most=0.5)] = 0.01,
+    out: Annotated[Path, Option("Folder of the results; created if missing.", kind="folder")] = Path("fleet"),
+    table: Annotated[Path | None, Option("Write the table here too: a .csv or .parquet file.", kind="file")] = None,
+    jobs: Annotated[int | None, Option("Processes of this computer  [default: one for each core].", least=1)] = None,
+    scheduler: Annotated[
+        str, Option("Dask scheduler that does it, such as tcp://server:8786.", metavar="ADDRESS")
+    ] = "",
+    apart: Annotated[bool, Option("Count each session without a serial number as a separate machine.")] = False,
+    anew: o.Anew = False,
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
     r"""Do one task on every session of some folders, and show which machines are unlike their sisters.
 
@@ -115,17 +74,17 @@ def fleet(
     from dbbstation.tasks.fleet_work import FleetOptions
 
     _refuse_options_of_others(task)
-    if out_table is not None:
-        if out_table.suffix.lower() not in FORMATS:
-            raise click.UsageError(f"--table {out_table}: name a file that ends in {' or '.join(FORMATS)}")
-        refuse_outputs([out_table], force=force)
+    if table is not None:
+        if table.suffix.lower() not in FORMATS:
+            raise click.UsageError(f"--table {table}: name a file that ends in {' or '.join(FORMATS)}")
+        refuse_outputs([table], force=force)
     options = FleetOptions(
-        sources=None if sources is None else tuple(name.strip() for name in sources.split(",") if name.strip()),
+        sources=tuple(sources) if sources else None,
         method=method,
         law_over_time=law_over_time,
         findings=findings,
-        tests=tests,
-        exclude=exclude,
+        tests=tuple(tests),
+        exclude=tuple(exclude),
         source_files=tuple(path.absolute() for path in source_files),
         settings=shop_settings() if task == "report" else Settings(),
     )
@@ -144,8 +103,8 @@ def fleet(
             progress=lambda _, done=0, of=0: progress(done, of),
             say=say,
         )
-    if out_table is not None:
-        write_fleet_table(out_table, result, provenance(), force=force)
+    if table is not None:
+        write_fleet_table(table, result, provenance(), force=force)
     if as_json:
         print_result(result)
     else:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
-from dbbstation.cli.mapping_options import MappingOptions, mapping_options
-from dbbstation.cli.option_object import taken_from
+from dbbstation.cli.declared import made
+from dbbstation.cli.mapping_options import MappingOptions
 from dbbstation.cli.output import echo, echo_line, print_result
-from dbbstation.cli.session_options import SessionOptions, noted_options
+from dbbstation.cli.session_options import SessionOptions
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 from dbbstation.text.printable import printable
 
 if TYPE_CHECKING:
@@ -33,55 +35,45 @@ CONDITIONS = ("temperature", "operator", "job", "bar")
 """What a session notes and no table says."""
 
 
-@click.command("import")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE.csv...")
-@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder to make.")
-@click.option("--plan", type=click.Path(path_type=Path), help="Test plan whose circles were run.")
-@click.option("--machine", type=click.Path(path_type=Path), help="The machine, as its controller believed it.")
-@mapping_options
-@click.option(
-    "--run",
-    "named",
-    multiple=True,
-    metavar="FILE=TEST-DIRECTION,...",
-    help="Run of a file that does not state it, such as old1.csv=a-ccw or old1.csv=a-ccw-2; several in order.",
-)
-@click.option(
-    "--started",
-    multiple=True,
-    metavar="[FILE=]TIME",
-    help="Start of a file's first run, such as 2026-11-20T08:04+01:00, if the file does not state it.",
-)
-@click.option(
-    "--trust",
-    multiple=True,
-    type=click.Choice(["unit", "centre"]),
-    help="Take numbers that do not look like their unit, or circles that look centred, as they are; the session notes that.",
-)
-@noted_options
-@click.option(
-    "--not-known",
-    multiple=True,
-    type=click.Choice(CONDITIONS),
-    help="A condition that is unknown; the session notes this. May be given more than once.",
-)
-@click.option("--yes", is_flag=True, help="Write without asking.")
-@click.option("--dry-run", is_flag=True, help="Try the import and show the result without writing it.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@made("import")
 def import_(
-    files: tuple[Path, ...],
+    of_mapping: MappingOptions,
+    noted: SessionOptions,
     *,
-    out: Path,
-    plan: Path | None,
-    machine: Path | None,
-    named: tuple[str, ...],
-    started: tuple[str, ...],
-    trust: tuple[str, ...],
-    not_known: tuple[str, ...],
-    yes: bool,
-    dry_run: bool,
-    as_json: bool,
-    **options: Any,  # noqa: ANN401 - those of the mapping and of the conditions
+    files: Annotated[tuple[Path, ...], Option("recordings.", kind="argument", metavar="FILE.csv...")],
+    out: Annotated[Path, Option("Session folder to make.", kind="folder")],
+    plan: Annotated[Path | None, Option("Test plan whose circles were run.")] = None,
+    machine: Annotated[Path | None, Option("The machine, as its controller believed it.")] = None,
+    run: Annotated[
+        tuple[str, ...],
+        Option(
+            "Run of a file that does not state it, such as old1.csv=a-ccw or old1.csv=a-ccw-2; several in order.",
+            metavar="FILE=TEST-DIRECTION,...",
+            whole=True,
+        ),
+    ] = (),
+    started: Annotated[
+        tuple[str, ...],
+        Option(
+            "Start of a file's first run, such as 2026-11-20T08:04+01:00, if the file does not state it.",
+            metavar="[FILE=]TIME",
+            whole=True,
+        ),
+    ] = (),
+    trust: Annotated[
+        tuple[Literal["unit", "centre"], ...],
+        Option(
+            "Take numbers that do not look like their unit, or circles that look centred, as they are; the session notes that.",
+            whole=True,
+        ),
+    ] = (),
+    not_known: Annotated[
+        tuple[Literal["temperature", "operator", "job", "bar"], ...],
+        Option("A condition that is unknown; the session notes this. May be given more than once.", whole=True),
+    ] = (),
+    yes: Annotated[bool, Option("Write without asking.")] = False,
+    dry_run: Annotated[bool, Option("Try the import and show the result without writing it.")] = False,
+    as_json: o.Json = False,
 ) -> None:
     r"""Take recordings that another program made into a sealed session.
 
@@ -104,15 +96,14 @@ def import_(
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
-    of_mapping = taken_from(options, MappingOptions)
-    remembered = of_mapping.mapping_file
+    remembered = of_mapping.mapping
     if remembered is not None and remembered.exists():
         remembered = None
     elif remembered is not None:
         refuse_existing(remembered, force=False)
     asker = Asker()
-    told = _Told(named, started, frozenset(trust), not_known)
-    found = _read(asker, files, of_mapping, (plan, machine), told, taken_from(options, SessionOptions))
+    told = _Told(run, started, frozenset(trust), not_known)
+    found = _read(asker, files, of_mapping, (plan, machine), told, noted)
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
     with staged(*writes, dry=dry_run) as put:
         if not as_json:
@@ -227,7 +218,7 @@ def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str
         told = replace(told, operator=asker.text("who measured", _or("--operator", "operator"), default=""))
     if not told.job and "job" not in not_known:
         told = replace(told, job=asker.text("what it was measured for", _or("--job", "job"), default=""))
-    if told.bar_file is None and told.bar_length_mm is None and "bar" not in not_known:
+    if told.bar is None and told.bar_length_mm is None and "bar" not in not_known:
         option = _or("--bar FILE, or --bar-length-mm with --bar-uncertainty-um", "bar")
         length_mm = asker.number("calibrated length of the bar [mm]", option)
         told = replace(told, bar_length_mm=length_mm)
@@ -238,7 +229,7 @@ def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str
 
 
 def _unknown(told: SessionOptions) -> list[str]:
-    has_bar = told.bar_file is not None or told.bar_length_mm is not None
+    has_bar = told.bar is not None or told.bar_length_mm is not None
     known = (told.ambient_temp_c is not None, bool(told.operator), bool(told.job), has_bar)
     return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
 

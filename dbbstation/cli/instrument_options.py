@@ -3,93 +3,79 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
-import click
-
-from dbbstation.cli.number_types import Finite
-from dbbstation.cli.shop import shop_option
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.protocol import Protocol
 
-_Function = TypeVar("_Function", bound="Callable[..., Any]")
+INSTRUMENT = Option(
+    "Name of an instrument (`dbbstation instrument list`), or a protocol file.", metavar="NAME", setting="instrument"
+)
+PROFILE = Option(
+    "Variant of the instrument, such as its firmware or resolution (`dbbstation instrument list NAME`).",
+    metavar="NAME",
+    setting="profile",
+    goes_with="instrument",
+)
+ZERO_MM = Option("Distance between the ball centres at zero of a short display [mm].", least=20.0, most=2000.0)
+PORT = Option("Port name, or a URL such as socket://127.0.0.1:4001 or rfc2217://127.0.0.1:4001.", setting="port")
+Baud = Annotated[
+    int | None, Option("Baud rate, if the instrument is not set to the usual one.", least=1, setting="baud")
+]
+RateHz = Annotated[float | None, Option("Sampling rate [1/s], if it is not the usual one.", least=0.1, most=100_000.0)]
+Spy = Annotated[
+    Path | None,
+    Option("Write every byte of the line with its time into this new file, for `instrument replay`.", kind="file"),
+]
 
 
-def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
-    """Give a command `--instrument`, `--profile` and `--zero-mm`; the first is required unless set by the shop."""
-    return _given(
-        shop_option(
-            "--instrument",
-            setting="instrument",
-            required=required,
-            metavar="NAME",
-            help="Name of an instrument (`dbbstation instrument list`), or a protocol file.",
-        ),
-        shop_option(
-            "--profile",
-            setting="profile",
-            goes_with="instrument",
-            metavar="NAME",
-            help="Variant of the instrument, such as its firmware or resolution (`dbbstation instrument list NAME`).",
-        ),
-        click.option(
-            "--zero-mm",
-            type=Finite(20.0, 2000.0),
-            help="Distance between the ball centres at zero of a short display [mm].",
-        ),
-    )
+@dataclass(frozen=True, kw_only=True)
+class ProtocolOptions:
+    """An instrument; the name is required unless set by the shop."""
+
+    instrument: Annotated[str, replace(INSTRUMENT, required=True)] = ""
+    profile: Annotated[str | None, PROFILE] = None
+    zero_mm: Annotated[float | None, ZERO_MM] = None
+
+    def protocol(self, *, bar_length_mm: float | None = None) -> Protocol:
+        """Return its protocol.
+
+        Args:
+            bar_length_mm: zero of a relative one, if no other is given.
+
+        Raises:
+            InstrumentError: unknown instrument or profile, or a relative one without zero.
+            InputError: faults of the protocol file.
+        """
+        from dbbstation.instrument.library import load_instrument, with_zero
+
+        protocol = load_instrument(self.instrument, self.profile)
+        if self.zero_mm is None and protocol.length.relative:
+            return with_zero(protocol, bar_length_mm)
+        return with_zero(protocol, self.zero_mm)
 
 
-def instrument_options(*, required: bool) -> Callable[[_Function], _Function]:
-    """Give a command `protocol_options`, `--port` and `--baud`; required unless set by the shop."""
-    of_protocol = protocol_options(required=required)
-    of_line = _given(
-        shop_option(
-            "--port",
-            setting="port",
-            required=required,
-            help="Port name, or a URL such as socket://127.0.0.1:4001 or rfc2217://127.0.0.1:4001.",
-        ),
-        shop_option(
-            "--baud",
-            setting="baud",
-            type=click.IntRange(min=1),
-            help="Baud rate, if the instrument is not set to the usual one.",
-        ),
-    )
-    return lambda function: of_protocol(of_line(function))
+@dataclass(frozen=True, kw_only=True)
+class LineOptions(ProtocolOptions):
+    """An instrument on a line; the port is required unless set by the shop."""
+
+    port: Annotated[str, replace(PORT, required=True)] = ""
+    baud: Baud = None
 
 
-def spy_option(function: _Function) -> _Function:
-    """Give a command `--spy FILE`."""
-    option = click.option(
-        "--spy",
-        type=click.Path(dir_okay=False, path_type=Path),
-        help="Write every byte of the line with its time into this new file, for `instrument replay`.",
-    )
-    return option(function)
+@dataclass(frozen=True, kw_only=True)
+class OpenLine(LineOptions):
+    """The same where nothing is required."""
 
-
-def chosen_protocol(
-    instrument: str, profile: str | None, zero_mm: float | None, *, bar_length_mm: float | None = None
-) -> Protocol:
-    """Return the protocol of the options.
-
-    Raises:
-        InstrumentError: unknown instrument or profile, or a relative one without zero.
-        InputError: faults of the protocol file.
-    """
-    from dbbstation.instrument.library import load_instrument, with_zero
-
-    protocol = load_instrument(instrument, profile)
-    if zero_mm is None and protocol.length.relative:
-        zero_mm = bar_length_mm
-    return with_zero(protocol, zero_mm)
+    instrument: Annotated[str, INSTRUMENT] = ""
+    port: Annotated[str, PORT] = ""
 
 
 @contextmanager
@@ -108,12 +94,3 @@ def spying(path: Path | None, protocol: Protocol, port: str, *, force: bool = Fa
     refuse_recorded(path)
     with ByteLog(path, instrument=protocol.name, profile=protocol.profile, port=port, force=force) as log:
         yield log
-
-
-def _given(*options: Callable[[_Function], _Function]) -> Callable[[_Function], _Function]:
-    def give(function: _Function) -> _Function:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return give

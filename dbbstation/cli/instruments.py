@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import PROFILE
 from dbbstation.cli.output import echo
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
 
-@click.command()
-@click.argument("name", required=False)
-@click.option("--profile", metavar="NAME", help="Variant of the instrument; by default the usual one.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None:
-    """List the instruments that are known, or show one: NAME, or a protocol file.
+@made()
+def instruments(
+    name: Annotated[str | None, Option("instrument.", kind="argument-text")] = None,
+    *,
+    profile: Annotated[str | None, replace(PROFILE, setting="")] = None,
+    as_json: o.Json = False,
+) -> None:
+    r"""List the instruments that are known, or show one: NAME, or a protocol file.
 
     \b
     Examples:
@@ -25,7 +32,7 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
       dbbstation instrument list heidenhain-nd281b
       dbbstation instrument list keyence-dl-rs1a --profile gt-70a
       dbbstation instrument list ./my-gauge.yaml
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_result
     from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
     from dbbstation.results.instruments import InstrumentsResult, instrument_result

@@ -2,100 +2,107 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
-from dbbstation.cli.mapping_options import AS_WRITTEN
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import made
+from dbbstation.cli.mapping_options import AsWritten
 from dbbstation.cli.output import echo, echo_line
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from dbbstation.files.formats.jig import JigFile
+    from dbbstation.files.recordings.cmm_sheet import Measured
     from dbbstation.plan.repeatability import HolderResult
 
-_UNITS = ("mm", "µm", "um", "m", "inch", "mil", "µinch")
-_SHEET = click.argument("sheet", type=click.Path(path_type=Path), metavar="SHEET")
-_UNIT = click.option(
-    "--unit", type=click.Choice(_UNITS), help="Unit of a table's coordinates  [default: as the sheet says, else mm]."
-)
-_U_UNIT = click.option(
-    "--u-unit",
-    type=click.Choice(_UNITS),
-    help="Unit of the uncertainties, such as µm beside mm  [default: as in the sheet, else the coordinates' unit].",
-)
-_COLUMN = click.option(
-    "--columns",
-    "columns",
-    multiple=True,
-    metavar="WHAT=NAME",
-    help="Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit of a row per coordinate; such as x=Ist_X  [default: by their names].",
-)
+_Unit = Literal["mm", "µm", "um", "m", "inch", "mil", "µinch"]
 
 
-def _as_written(function: Callable[..., None]) -> Callable[..., None]:
-    for option in reversed(AS_WRITTEN):
-        function = option(function)
-    return function
+@dataclass(frozen=True, kw_only=True)
+class SheetOptions(AsWritten):
+    """A sheet and how it is written."""
 
+    sheet: Annotated[Path, Option("sheet of the CMM.", kind="argument", metavar="SHEET")]
+    columns: Annotated[
+        tuple[str, ...],
+        Option(
+            "Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit of a row per coordinate; such as x=Ist_X  [default: by their names].",
+            metavar="WHAT=NAME",
+            whole=True,
+        ),
+    ] = ()
+    unit: Annotated[_Unit | None, Option("Unit of a table's coordinates  [default: as the sheet says, else mm].")] = (
+        None
+    )
 
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-_FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
+    def read(
+        self, coverage: float | None, u_unit: str | None = None, *, of_one_holder: bool = False
+    ) -> Sequence[Measured]:
+        """Return the rows; arguments as of `read_sheet`."""
+        from dbbstation.files.formats.number_language import number_language
+        from dbbstation.files.recordings.cmm_sheet import read_sheet
+
+        return read_sheet(
+            self.sheet,
+            _pairs(self.columns, "--columns", _WHAT),
+            _micro(self.unit),
+            coverage,
+            u_unit=_micro(u_unit),
+            of_one_holder=of_one_holder,
+            numbers=number_language(self.decimal, self.separator),
+            encoding=self.encoding,
+        )
 
 
 @click.group()
 def jig() -> None:
-    """Make a jig file from the sheet of a coordinate measuring machine; find how well holders repeat.
+    r"""Make a jig file from the sheet of a coordinate measuring machine; find how well holders repeat.
 
     \b
     Examples:
       dbbstation jig sheet cmm.csv --before plate.yaml --u-um 0.8 --out plate-2026.yaml
       dbbstation jig holders mountings.csv --before plate.yaml --out plate-2026.yaml
-    """  # noqa: D301 (click reads the escape)
+    """
 
 
-@jig.command()
-@_SHEET
-@click.option(
-    "--before", "before", required=True, type=click.Path(path_type=Path), help="Jig file whose plate and holders stay."
-)
-@_COLUMN
-@_as_written
-@_UNIT
-@_U_UNIT
-@click.option(
-    "--names", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig with another name in the sheet."
-)
-@click.option(
-    "--coverage", "coverage", type=Finite(0.5, 5), help="Coverage factor of the sheet's uncertainties, 2 for U (k = 2)."
-)
-@click.option("--u-um", type=Finite(0.01, 1000), help="Standard uncertainty of coordinates without a stated one [µm].")
-@click.option("--cmm-temp-c", type=Finite(-30, 80), help="Temperature of the plate while it was measured [degC].")
-@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Jig file to write.")
-@_FORCE
-@_JSON
+@made(group=jig)
 def sheet(
-    sheet: Path,
+    given: SheetOptions,
     *,
-    before: Path,
-    columns: tuple[str, ...],
-    unit: str | None,
-    decimal: str | None,
-    separator: str | None,
-    encoding: str | None,
-    u_unit: str | None,
-    names: tuple[str, ...],
-    coverage: float | None,
-    u_um: float | None,
-    cmm_temp_c: float | None,
-    out: Path,
-    force: bool,
-    as_json: bool,
+    before: Annotated[Path, Option("Jig file whose plate and holders stay.")],
+    u_unit: Annotated[
+        _Unit | None,
+        Option(
+            "Unit of the uncertainties, such as µm beside mm  [default: as in the sheet, else the coordinates' unit]."
+        ),
+    ] = None,
+    names: Annotated[
+        tuple[str, ...],
+        Option("Ball of the jig with another name in the sheet.", metavar="LABEL=BALL", whole=True),
+    ] = (),
+    coverage: Annotated[
+        float | None,
+        Option("Coverage factor of the sheet's uncertainties, 2 for U (k = 2).", least=0.5, most=5.0),
+    ] = None,
+    u_um: Annotated[
+        float | None,
+        Option("Standard uncertainty of coordinates without a stated one [µm].", least=0.01, most=1000.0),
+    ] = None,
+    cmm_temp_c: Annotated[
+        float | None,
+        Option("Temperature of the plate while it was measured [degC].", least=-30.0, most=80.0),
+    ] = None,
+    out: Annotated[Path, Option("Jig file to write.", kind="file")],
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
-    """Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
+    r"""Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
 
     Coordinates are in the jig's frame. Plate and holders come from --before. Uncertainties of three axes become one, their root mean
     square: a jig file has one per ball. Each ball is shown with its change against the jig before.
@@ -104,26 +111,20 @@ def sheet(
     Examples:
       dbbstation jig sheet cmm.csv --before plate.yaml --columns x=X --columns "u=U (k=2)" --coverage 2 --out new.yaml
       dbbstation jig sheet plate.dmo --before plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_result, print_table
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.jig import jig_text, read_jig
-    from dbbstation.files.formats.number_language import number_language
     from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.files.recordings.cmm_sheet import jig_of_sheet, read_sheet
+    from dbbstation.files.recordings.cmm_sheet import jig_of_sheet
     from dbbstation.results.jig import MeasuredBall, SheetResult
 
     refuse_existing_table(out, force=force)
     old = read_jig(before)
-    numbers = number_language(decimal, separator)
-    named = _pairs(columns, "--columns", _WHAT)
-    measured = read_sheet(
-        sheet, named, _micro(unit), coverage, u_unit=_micro(u_unit), numbers=numbers, encoding=encoding
-    )
     new = jig_of_sheet(
         old,
-        measured,
-        str(sheet),
+        given.read(coverage, u_unit),
+        str(given.sheet),
         names=_pairs(names, "--names"),
         uncertainty_um=u_um,
         cmm_temp_c=cmm_temp_c,
@@ -155,40 +156,25 @@ def sheet(
     echo_line(f"{len(balls)} balls written to {out}")
 
 
-@jig.command()
-@_SHEET
-@_COLUMN
-@_as_written
-@_UNIT
-@click.option("--holder", help="Holder of all rows, if the table does not state it.")
-@click.option(
-    "--cmm-repeatability-um",
-    type=Finite(0, 100),
-    default=0.0,
-    help="Standard deviation of what the CMM reads of a ball that stays; its variance is taken off  [default: 0].",
-)
-@click.option(
-    "--before", "before", type=click.Path(path_type=Path), help="Jig file whose holders get the result; with --out."
-)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Jig file to write.")
-@_FORCE
-@_JSON
+@made(group=jig)
 def holders(
-    sheet: Path,
+    given: SheetOptions,
     *,
-    columns: tuple[str, ...],
-    unit: str | None,
-    decimal: str | None,
-    separator: str | None,
-    encoding: str | None,
-    holder: str | None,
-    cmm_repeatability_um: float,
-    before: Path | None,
-    out: Path | None,
-    force: bool,
-    as_json: bool,
+    holder: Annotated[str | None, Option("Holder of all rows, if the table does not state it.")] = None,
+    cmm_repeatability_um: Annotated[
+        float,
+        Option(
+            "Standard deviation of what the CMM reads of a ball that stays; its variance is taken off.",
+            least=0.0,
+            most=100.0,
+        ),
+    ] = 0.0,
+    before: Annotated[Path | None, Option("Jig file whose holders get the result; with --out.")] = None,
+    out: Annotated[Path | None, Option("Jig file to write.", kind="file")] = None,
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
-    """Find how well holders put their ball back, from centres over repeated mountings [CAL III-B].
+    r"""Find how well holders put their ball back, from centres over repeated mountings [CAL III-B].
 
     One row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual. Deviations from the mean of
     each place count. The standard deviation per axis, with its chi-square interval, is what a jig file calls `repeatability_um`.
@@ -197,12 +183,10 @@ def holders(
     Examples:
       dbbstation jig holders mountings.csv
       dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --before plate.yaml --out plate-2026.yaml
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError, Problem
-    from dbbstation.files.formats.number_language import number_language
     from dbbstation.files.provenance import refuse_existing_table
-    from dbbstation.files.recordings.cmm_sheet import read_sheet
     from dbbstation.plan.repeatability import repeatability
     from dbbstation.results.jig import HoldersResult
 
@@ -212,19 +196,17 @@ def holders(
         )
     if out is not None:
         refuse_existing_table(out, force=force)
-    numbers = number_language(decimal, separator)
-    named = _pairs(columns, "--columns", _WHAT)
-    rows = read_sheet(sheet, named, _micro(unit), 1.0, of_one_holder=True, numbers=numbers, encoding=encoding)
+    rows = given.read(1.0, of_one_holder=True)
     found: dict[str, HolderResult] = {}
     try:
-        for name, places in _by_holder(rows, holder, sheet).items():
+        for name, places in _by_holder(rows, holder, given.sheet).items():
             found[name] = repeatability(places, cmm_repeatability_um)
     except ValueError as error:
         raise InputError(
-            [Problem(str(sheet), 0, 0, str(error), "put each ball up at least twice, ten times is usual")]
+            [Problem(str(given.sheet), 0, 0, str(error), "put each ball up at least twice, ten times is usual")]
         ) from error
     if before is not None and out is not None:
-        _write_holders(found, before, out, sheet, force=force)
+        _write_holders(found, before, out, given.sheet, force=force)
     if as_json:
         print_result(HoldersResult(found, None if out is None else str(out)))
         return

@@ -5,13 +5,14 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
 from dbbstation.cli.number_options import shops_numbers
-from dbbstation.cli.number_types import Finite
-from dbbstation.files.formats.number_language import SEPARATORS, SIGNS, number_language
+from dbbstation.files.formats.number_language import SEPARATORS, number_language
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -22,107 +23,83 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.tasks.importing.proposal import Proposed
 
-_Function = TypeVar("_Function", bound="Callable[..., Any]")
 
-AS_WRITTEN = (
-    click.option(
-        "--decimal",
-        type=click.Choice([".", ","]),
-        help="Decimal sign in the files  [default: the shop's, else found by looking].",
-    ),
-    click.option(
-        "--separator",
-        type=click.Choice([*SIGNS, *SIGNS.values()]),
-        metavar="[comma|semicolon|tab]",
-        help="Separator of columns  [likewise].",
-    ),
-    click.option(
-        "--encoding",
-        type=click.Choice(["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"]),
-        help="Encoding of the files  [default: utf-8; detected for sheets].",
-    ),
-)
-"""How tables are written."""
+@dataclass(frozen=True, kw_only=True)
+class AsWritten:
+    """How tables are written; None if not given."""
 
-_OPTIONS = (
-    click.option(
-        "--mapping",
-        "mapping_file",
-        type=click.Path(path_type=Path, dir_okay=False),
-        help="Meaning of the columns: read if the file exists, else written for the next time.",
-    ),
-    click.option(
-        "--columns",
-        "columns",
-        multiple=True,
-        metavar="NAME=MEANING:UNIT",
-        help="Meaning of a column, such as Winkel=angle:deg, Abw=deviation:µm, T1=bar_temp_c:degC or Nr=ignored.",
-    ),
-    click.option("--angle-zero-deg", type=Finite(-720, 720), help="Machine's angle, from +X to +Y, at the files' 0."),
-    click.option(
-        "--angle-grows",
-        type=click.Choice(["ccw", "cw", "travel"]),
-        help="Sense in which the files' angles grow, seen from +Z.",
-    ),
-    click.option(
-        "--angle-span-deg",
-        type=Finite(300, 3600),
-        help="Span of a run's angles, if it is neither a turn nor the plan's path; one turn of it counts.",
-    ),
-    click.option(
-        "--trace",
-        type=click.Choice(["whole", "turn"]),
-        help="Files without angles: the whole run with feed-in and feed-out, or the full turn alone.",
-    ),
-    click.option(
-        "--split",
-        type=click.Choice(["gaps", "direction"]),
-        help="Several runs in a file: parted by gaps (pauses, times that begin anew, empty lines), or where the angles turn round.",
-    ),
-    click.option(
-        "--zone", metavar="ZONE", help="Time zone of dates without one, such as +01:00  [default: this computer's]."
-    ),
-    click.option("--zero-mm", type=Finite(20, 2000), help="Length of the bar at which the deviation is 0 [mm]."),
-    click.option("--file-name", metavar="PATTERN", help="Pattern of file names, such as '{test}_{direction}'."),
-    *AS_WRITTEN,
-)
+    decimal: Annotated[Literal[".", ","] | None, Option(o.DECIMAL)] = None
+    separator: Annotated[
+        Literal["comma", "semicolon", "tab", ",", ";", "\t"] | None,
+        Option(o.SEPARATOR, metavar="[comma|semicolon|tab]"),
+    ] = None
+    encoding: Annotated[
+        Literal["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"] | None,
+        Option("Encoding of the files  [default: utf-8; detected for sheets]."),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class MappingOptions:
-    """Given options; None or empty if not given."""
+class MappingOptions(AsWritten):
+    """What columns mean; None or empty if not given."""
 
-    mapping_file: Path | None
-    columns: tuple[str, ...]
-    angle_zero_deg: float | None
-    angle_grows: str | None
-    angle_span_deg: float | None
-    trace: str | None
-    split: str | None
-    zone: str | None
-    zero_mm: float | None
-    file_name: str | None
-    decimal: str | None
-    separator: str | None
-    encoding: str | None
+    mapping: Annotated[
+        Path | None,
+        Option("Meaning of the columns: read if the file exists, else written for the next time.", kind="file"),
+    ] = None
+    columns: Annotated[
+        tuple[str, ...],
+        Option(
+            "Meaning of a column, such as Winkel=angle:deg, Abw=deviation:µm, T1=bar_temp_c:degC or Nr=ignored.",
+            metavar="NAME=MEANING:UNIT",
+            whole=True,
+        ),
+    ] = ()
+    angle_zero_deg: Annotated[
+        float | None, Option("Machine's angle, from +X to +Y, at the files' 0.", least=-720.0, most=720.0)
+    ] = None
+    angle_grows: Annotated[
+        Literal["ccw", "cw", "travel"] | None, Option("Sense in which the files' angles grow, seen from +Z.")
+    ] = None
+    angle_span_deg: Annotated[
+        float | None,
+        Option(
+            "Span of a run's angles, if it is neither a turn nor the plan's path; one turn of it counts.",
+            least=300.0,
+            most=3600.0,
+        ),
+    ] = None
+    trace: Annotated[
+        Literal["whole", "turn"] | None,
+        Option("Files without angles: the whole run with feed-in and feed-out, or the full turn alone."),
+    ] = None
+    split: Annotated[
+        Literal["gaps", "direction"] | None,
+        Option(
+            "Several runs in a file: parted by gaps (pauses, times that begin anew, empty lines), or where the angles turn round."
+        ),
+    ] = None
+    zone: Annotated[
+        str | None,
+        Option("Time zone of dates without one, such as +01:00  [default: this computer's].", metavar="ZONE"),
+    ] = None
+    zero_mm: Annotated[
+        float | None, Option("Length of the bar at which the deviation is 0 [mm].", least=20.0, most=2000.0)
+    ] = None
+    file_name: Annotated[
+        str | None, Option("Pattern of file names, such as '{test}_{direction}'.", metavar="PATTERN")
+    ] = None
 
     @property
     def kept(self) -> Path | None:
         """Return the mapping's file, or None."""
-        return self.mapping_file if self.mapping_file is not None and self.mapping_file.exists() else None
+        return self.mapping if self.mapping is not None and self.mapping.exists() else None
 
     @property
     def said(self) -> list[str]:
         """Return given options that a mapping states too."""
-        given = [one.name for one in fields(self)[1:] if getattr(self, one.name) not in (None, ())]
-        return ["--" + ("column" if name == "columns" else name.replace("_", "-")) for name in given]
-
-
-def mapping_options(function: _Function) -> _Function:
-    """Give a command these options."""
-    for option in reversed(_OPTIONS):
-        function = option(function)
-    return function
+        given = [one.name for one in fields(self) if getattr(self, one.name) not in (None, ())]
+        return [f"--{name.replace('_', '-')}" for name in given if name != "mapping"]
 
 
 def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, ForeignTable]:
@@ -144,7 +121,7 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
     if kept is not None:
         if options.said:
             also = ", ".join(options.said)
-            raise click.UsageError(f"{options.mapping_file} says what columns mean: edit it, or leave out {also}")
+            raise click.UsageError(f"{options.mapping} says what columns mean: edit it, or leave out {also}")
         mapping = read_mapping(kept)
         language, encoding = mapping.numbers, mapping.encoding
     shops = shops_numbers() if language is None else None
@@ -198,7 +175,7 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
             f"which column has the readings of the bar; these are not understood: {unknown}",
         )
     own = set(table.table.names) >= EXPORTED
-    trace = options.trace
+    trace: str | None = options.trace
     if ANGLE not in means and not own and trace is None:
         unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
         question = (
@@ -248,7 +225,7 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
 
 
 def _angle(options: MappingOptions, asker: Asker, *, own: bool) -> dict[str, object]:
-    grows = "ccw" if own else options.angle_grows
+    grows: str | None = "ccw" if own else options.angle_grows
     grows = grows or asker.text(
         "sense in which the files' angles grow, seen from +Z", "--angle-grows", ["ccw", "cw", "travel"]
     )

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
-
-from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import LineOptions, Spy, spying
 from dbbstation.cli.output import echo, json_text
 from dbbstation.cli.provenance import provenance
 from dbbstation.service.patience import RECONNECT_S
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from dbbstation.instrument.reading import Reading
@@ -22,27 +23,17 @@ NO_PARITY = "note: this port does not tell of characters with a wrong parity; co
 """Said of network ports, and on Windows."""
 
 
-@click.command()
-@instrument_options(required=True)
-@click.option("--count", type=click.IntRange(min=1), help="Number of readings after which to stop.")
-@spy_option
-@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="The same as --spy.")
-@click.option("--force", is_flag=True, help="Overwrite the file of --spy.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per reading, and one with the totals.")
+@made()
 def monitor(
+    line: LineOptions,
     *,
-    instrument: str,
-    profile: str | None,
-    zero_mm: float | None,
-    port: str,
-    baud: int | None,
-    count: int | None,
-    spy: Path | None,
-    log: Path | None,
-    force: bool,
-    as_json: bool,
+    count: Annotated[int | None, Option("Number of readings after which to stop.", least=1)] = None,
+    spy: Spy = None,
+    log: Annotated[Path | None, Option("The same as --spy.", kind="file")] = None,
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
-    """Show what an instrument measures, until Ctrl-C.
+    r"""Show what an instrument measures, until Ctrl-C.
 
     \b
     Examples:
@@ -50,13 +41,13 @@ def monitor(
       dbbstation instrument monitor --instrument streaming-encoder --port COM3 --count 100 --json
       dbbstation instrument monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --spy bytes.txt
       dbbstation instrument monitor --instrument tesa-tt80 --profile tt80 --zero-mm 150.0003 --port /dev/ttyUSB1
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.instrument.driver import Instrument
 
-    protocol = chosen_protocol(instrument, profile, zero_mm)
+    protocol = line.protocol()
     with ExitStack() as stack:
-        book = stack.enter_context(spying(spy or log, protocol, port, force=force))
-        driver = stack.enter_context(Instrument(protocol, port, baud=baud, log=book, reconnect_s=RECONNECT_S))
+        book = stack.enter_context(spying(spy or log, protocol, line.port, force=force))
+        driver = stack.enter_context(Instrument(protocol, line.port, baud=line.baud, log=book, reconnect_s=RECONNECT_S))
         if protocol.line.parity != "none" and not driver.sees_damage:
             echo(NO_PARITY, err=True)
         first_s: float | None = None

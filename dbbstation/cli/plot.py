@@ -3,33 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Literal
 
-import click
-
-from dbbstation.cli.figure_option import figure_option, format_of
-from dbbstation.cli.shared_options import chosen_tests_options, filter_option
-
-KINDS = ("polar", "deviation", "spectrum", "map", "compare")
+from dbbstation.cli.declared import made
+from dbbstation.cli.figure_option import format_of, known_format
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 
-@click.command()
-@click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option("--kind", type=click.Choice(KINDS), default="polar", show_default=True, help="Kind of figure.")
-@filter_option
-@chosen_tests_options
-@figure_option("Write the figure here", "--out", required=True)
-@click.option("--force", is_flag=True, help="Replace an existing file.")
-@click.option("--json", "as_json", is_flag=True, help="Print what is drawn, with its figures, as JSON.")
+@made()
 def plot(
-    sessions: tuple[Path, ...],
+    sessions: Annotated[tuple[Path, ...], o.SESSIONS],
     *,
-    kind: str,
-    filter: str,  # noqa: A002 - the standard's word
-    tests: tuple[str, ...],
-    exclude: tuple[str, ...],
-    out: Path,
-    force: bool,
-    as_json: bool,
+    kind: Annotated[Literal["polar", "deviation", "spectrum", "map", "compare"], Option("Kind of figure.")] = "polar",
+    filter: o.Filter = "none",  # noqa: A002 - the standard's word
+    tests: o.Tests = (),
+    exclude: o.Exclude = (),
+    out: Annotated[Path, Option(o.OUTPUTS["figure"], kind="file", parse=known_format)],
+    force: o.Force = False,
+    as_json: o.Json = False,
 ) -> None:
     r"""Draw measured circles: one figure with a title block, as SVG, PNG or PDF.
 

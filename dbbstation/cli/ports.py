@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import click
-
+from dbbstation.cli.declared import made
 from dbbstation.cli.output import echo
+from dbbstation.tasks import options as o
 
 
-@click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def ports(*, as_json: bool) -> None:
-    """List the serial ports of this computer.
+@made()
+def ports(*, as_json: o.Json = False) -> None:
+    r"""List the serial ports of this computer.
 
     \b
     Example:
       dbbstation instrument ports
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_json
     from dbbstation.instrument.link import connected_ports
 

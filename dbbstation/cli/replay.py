@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 import click
 
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE, ZERO_MM
 from dbbstation.cli.output import echo
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 
-@click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--instrument", metavar="NAME", help="Name of an instrument, or a protocol file [default: that of the log]."
-)
-@click.option("--profile", metavar="NAME", help="Variant of the instrument [default: that of the log].")
-@click.option(
-    "--zero-mm",
-    type=Finite(20.0, 2000.0),
-    default=None,
-    help="Length at zero of a short display [mm]; without it, lengths count from zero.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: float | None, as_json: bool) -> None:
-    """Decode a byte log that `--spy` wrote (or `monitor --log`): every reading, and everything that is not understood.
+@made()
+def replay(
+    file: Annotated[Path, Option("byte log.", kind="argument")],
+    *,
+    instrument: Annotated[str | None, replace(INSTRUMENT, setting="", usual="that of the log")] = None,
+    profile: Annotated[str | None, replace(PROFILE, setting="", usual="that of the log")] = None,
+    zero_mm: Annotated[float | None, replace(ZERO_MM, usual="lengths count from zero")] = None,
+    as_json: o.Json = False,
+) -> None:
+    r"""Decode a byte log that `--spy` wrote (or `monitor --log`): every reading, and everything that is not understood.
 
     \b
     Examples:
       dbbstation instrument replay bytes.txt
       dbbstation instrument replay bytes.txt --instrument streaming-encoder --json
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_json
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
     from dbbstation.instrument.library import load_instrument, with_zero

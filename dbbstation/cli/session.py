@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
+from dbbstation.cli.declared import made
 from dbbstation.cli.output import echo
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
 
-_FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="FOLDER")
-_RUN = click.argument("run", metavar="RUN")
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_Folder = Annotated[Path, Option("of the session.", kind="argument", metavar="FOLDER")]
+_Run = Annotated[str, Option("of the session.", kind="argument-text", metavar="RUN")]
+_Reason = Annotated[str, Option("Reason, for the session file.")]
 
 
 @click.group()
 def session() -> None:
-    """List the runs of a session, accept or reject them afterwards, take in or seal recordings, change a plan on purpose.
+    r"""List the runs of a session, accept or reject them afterwards, take in or seal recordings, change a plan on purpose.
 
     \b
     Examples:
@@ -30,29 +35,27 @@ def session() -> None:
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
       dbbstation session seal recorded-elsewhere
       dbbstation session log 2026-11-20-hexapod-7
-    """  # noqa: D301 (click reads the escape)
+    """
 
 
-@session.command("list")
-@_FOLDER
-@_JSON
-def list_runs(folder: Path, *, as_json: bool) -> None:
-    """List every run: when it was started, its mounting, its state, its samples (received, lost, rejected), and why it was rejected.
+@made("list", session)
+def list_runs(folder: _Folder, *, as_json: o.Json = False) -> None:
+    r"""List every run: when it was started, its mounting, its state, its samples (received, lost, rejected), and why it was rejected.
 
     \b
     Examples:
       dbbstation session list 2026-11-20-hexapod-7
       dbbstation session list 2026-11-20-hexapod-7 --json
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_result, print_table
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.sessions import ListedRun, ListedSession
     from dbbstation.text.counting import repeats_in_order
 
     read = read_session(folder)
-    missing = [f"{test} {direction}" for test, direction in _missing(read)]
+    missing, runs = _missing(read), repeats_in_order(read.runs)
     if as_json:
-        runs = tuple(
+        listed = tuple(
             ListedRun(
                 run=_name(run),
                 test=run.test,
@@ -65,20 +68,20 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
                 counts=run.counts,
                 file=run.path.relative_to(read.folder).as_posix(),
             )
-            for run in repeats_in_order(read.runs)
+            for run in runs
         )
-        print_result(ListedSession(read.name, read.virtual, runs, tuple(missing)))
+        print_result(ListedSession(read.name, read.virtual, listed, tuple(missing)))
         return
     rows = [
         [
             _name(run),
-            "" if run.started is None else run.started.strftime("%Y-%m-%d %H:%M:%S %Z").strip(),
-            "" if run.mounting is None else str(run.mounting),
+            _at(run.started),
+            "" if run.mounting is None else run.mounting,
             run.state.value,
             "" if run.counts is None else run.counts.text,
             run.reason,
         ]
-        for run in repeats_in_order(read.runs)
+        for run in runs
     ]
     print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
     for circle, count in _repeated(read):
@@ -86,13 +89,15 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
     echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
 
 
-@session.command()
-@_FOLDER
-@_RUN
-@click.option("--reason", help="Reason; required for runs with lost samples or no circle.")
-@_JSON
-def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None:
-    """Accept a run that was rejected or not judged, such as a-cw-2.
+@made(group=session)
+def accept(
+    folder: _Folder,
+    run: _Run,
+    *,
+    reason: Annotated[str, Option("Reason; required for runs with lost samples or no circle.")] = "",
+    as_json: o.Json = False,
+) -> None:
+    r"""Accept a run that was rejected or not judged, such as a-cw-2.
 
     A run that lost more samples than the plan allows, or whose recording shows no circle, is accepted with a reason only. On a
     terminal it is asked for.
@@ -101,32 +106,26 @@ def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None
     Examples:
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2 --reason "lost samples lie before the turn"
-    """  # noqa: D301 (click reads the escape)
-    _tell(run, _judged(folder, run, accepted=True, reason=(reason or "").strip()), as_json=as_json)
+    """
+    _tell(run, _judged(folder, run, accepted=True, reason=reason.strip()), as_json=as_json)
 
 
-@session.command()
-@_FOLDER
-@_RUN
-@click.option("--reason", required=True, help="Reason, for the session file.")
-@_JSON
-def reject(folder: Path, run: str, *, reason: str, as_json: bool) -> None:
-    """Reject a run, such as a-cw-2, and note why. Its recording is kept; no command uses it any more.
+@made(group=session)
+def reject(folder: _Folder, run: _Run, *, reason: _Reason, as_json: o.Json = False) -> None:
+    r"""Reject a run, such as a-cw-2, and note why. Its recording is kept; no command uses it any more.
 
     \b
     Examples:
       dbbstation session reject 2026-11-20-hexapod-7 a-cw-2 --reason "chip under the holder"
-    """  # noqa: D301 (click reads the escape)
+    """
     if not reason.strip():
         raise click.UsageError("say why with --reason: whoever reads the session later will ask")
     _tell(run, _judged(folder, run, accepted=False, reason=reason.strip()), as_json=as_json)
 
 
-@session.command("take-in")
-@_FOLDER
-@_JSON
-def take_in(folder: Path, *, as_json: bool) -> None:
-    """List sealed runs that lie in the session's folder and are in no list.
+@made("take-in", session)
+def take_in(folder: _Folder, *, as_json: o.Json = False) -> None:
+    r"""List sealed runs that lie in the session's folder and are in no list.
 
     `dbbstation check` names them. They may come from a second program that wrote into the folder, or from a session file
     that was restored. They are `complete` then: accept or reject each.
@@ -135,7 +134,7 @@ def take_in(folder: Path, *, as_json: bool) -> None:
     Examples:
       dbbstation session take-in 2026-11-20-hexapod-7
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session import unlisted_sealed
@@ -152,14 +151,16 @@ def take_in(folder: Path, *, as_json: bool) -> None:
         echo("the session lists every sealed run already")
 
 
-@session.command()
-@_FOLDER
-@click.option("--reason", required=True, help="Reason, for the session file.")
-@click.option("--plan", type=click.Path(path_type=Path), help="Plan that takes the place of the session's.")
-@click.option("--machine", type=click.Path(path_type=Path), help="Machine that takes the place of the session's.")
-@_JSON
-def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None, as_json: bool) -> None:
-    """Change what was sealed on purpose, and note why.
+@made(group=session)
+def amend(
+    folder: _Folder,
+    *,
+    reason: _Reason,
+    plan: Annotated[Path | None, Option("Plan that takes the place of the session's.")] = None,
+    machine: Annotated[Path | None, Option("Machine that takes the place of the session's.")] = None,
+    as_json: o.Json = False,
+) -> None:
+    r"""Change what was sealed on purpose, and note why.
 
     Plan and machine of a session are sealed when it is made: a change without a note is refused by every command. This accepts the session as it is, with another plan or machine if given. The file as it was stays in the folder
     `sealed`. The session file says what was changed, when and why, with both hashes; `dbbstation check` shows it. A list of runs that was changed by hand is accepted in the same way.
@@ -168,7 +169,7 @@ def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None,
     Examples:
       dbbstation session amend 2026-11-20-hexapod-7 --reason "joint 3 measured again" --machine measured.yaml
       dbbstation session amend 2026-11-20-hexapod-7 --reason "ball 4-short was 0.1 mm off in the sheet"
-    """  # noqa: D301 (click reads the escape)
+    """
     from datetime import UTC, datetime
 
     from dbbstation.cli.output import print_json
@@ -189,12 +190,14 @@ def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None,
         echo(f"{one.what}: amended{kept}")
 
 
-@session.command()
-@_FOLDER
-@click.option("--dry-run", is_flag=True, help="List the runs that would get a hash, without writing.")
-@_JSON
-def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
-    """Seal a session that was recorded elsewhere.
+@made(group=session)
+def seal(
+    folder: _Folder,
+    *,
+    dry_run: Annotated[bool, Option("List the runs that would get a hash, without writing.")] = False,
+    as_json: o.Json = False,
+) -> None:
+    r"""Seal a session that was recorded elsewhere.
 
     A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
     `sealed`. From then on a changed recording or plan is noticed, and runs that were taken out or exchanged.
@@ -203,7 +206,7 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
     Examples:
       dbbstation session seal recorded-elsewhere --dry-run
       dbbstation session seal recorded-elsewhere
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.sealing import seal_session, sealing
 
@@ -223,11 +226,9 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
         echo(f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}")
 
 
-@session.command()
-@_FOLDER
-@_JSON
-def log(folder: Path, *, as_json: bool) -> None:
-    """List what happened in a session: runs, verdicts with their reasons, notes, amendments, each with its time and link.
+@made(group=session)
+def log(folder: _Folder, *, as_json: o.Json = False) -> None:
+    r"""List what happened in a session: runs, verdicts with their reasons, notes, amendments, each with its time and link.
 
     The last line is the anchor of the session. Noted elsewhere, it tells later whether anything was changed that stood there:
     `dbbstation check --anchor`.
@@ -236,7 +237,7 @@ def log(folder: Path, *, as_json: bool) -> None:
     Examples:
       dbbstation session log 2026-11-20-hexapod-7
       dbbstation session log 2026-11-20-hexapod-7 --json
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_result, print_table
     from dbbstation.files.recordings.event_log import keys_told, read_event_log, runs_told
     from dbbstation.files.recordings.session import read_session
@@ -245,38 +246,23 @@ def log(folder: Path, *, as_json: bool) -> None:
     read = read_session(folder)
     found = read_event_log(read.folder, [])
     events = () if found is None else found.events
+    told = [runs_told(event) or ", ".join(keys_told(event)) for event in events]
     if as_json:
         listed = tuple(
-            ListedEvent(
-                event=number,
-                at=None if event.at is None else event.at.isoformat(),
-                what=event.what,
-                about=runs_told(event) or ", ".join(keys_told(event)),
-                link=event.link,
-            )
-            for number, event in enumerate(events, start=1)
+            ListedEvent(number, None if one.at is None else one.at.isoformat(), one.what, about, one.link)
+            for number, (one, about) in enumerate(zip(events, told, strict=True), start=1)
         )
         print_result(SessionEvents(read.name, listed, events[-1].link if events else None))
         return
-    rows = [
-        [
-            number,
-            "" if event.at is None else event.at.strftime("%Y-%m-%d %H:%M:%S %Z").strip(),
-            event.what,
-            runs_told(event) or ", ".join(keys_told(event)),
-        ]
-        for number, event in enumerate(events, start=1)
-    ]
-    if rows:
+    if events:
+        rows = [[k, _at(one.at), one.what, told[k - 1]] for k, one in enumerate(events, start=1)]
         print_table(["event", "at", "what", "about"], rows)
     echo(f"anchor {events[-1].link}" if events else "no event log; `dbbstation session seal` begins one")
 
 
-@session.command()
-@_FOLDER
-@_JSON
-def rebuild(folder: Path, *, as_json: bool) -> None:
-    """Write the session file anew, as the event log has it.
+@made(group=session)
+def rebuild(folder: _Folder, *, as_json: o.Json = False) -> None:
+    r"""Write the session file anew, as the event log has it.
 
     For a session file that was spoilt, is gone, or was edited by mistake. The present file is kept in the folder `sealed`.
     The recordings are not touched.
@@ -284,7 +270,7 @@ def rebuild(folder: Path, *, as_json: bool) -> None:
     \b
     Examples:
       dbbstation session rebuild 2026-11-20-hexapod-7
-    """  # noqa: D301 (click reads the escape)
+    """
     from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.rebuilding import rebuild as written
 
@@ -294,6 +280,10 @@ def rebuild(folder: Path, *, as_json: bool) -> None:
         return
     kept = f"; as it was: {former}" if former else ""
     echo(f"session file written from {events} events{kept}")
+
+
+def _at(moment: datetime | None) -> str:
+    return "" if moment is None else moment.strftime("%Y-%m-%d %H:%M:%S %Z").strip()
 
 
 def _name(run: RunEntry) -> str:
@@ -316,12 +306,12 @@ def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
     return [(circle, runs) for circle, runs in counted.items() if runs > 1]
 
 
-def _missing(read: SessionFolder) -> list[tuple[str, str]]:
+def _missing(read: SessionFolder) -> list[str]:
     from dbbstation.files.recordings.entries import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
     planned = [(name, direction) for name, test in read.plan.tests.items() for direction in test.directions]
-    return [(name, direction.value) for name, direction in planned if (name, direction) not in done]
+    return [f"{name} {direction}" for name, direction in planned if (name, direction) not in done]
 
 
 def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:

@@ -2,96 +2,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
-from dbbstation.cli.number_types import Finite
-from dbbstation.cli.shop import from_settings, shop_option
+from dbbstation.cli.instrument_options import Spy
+from dbbstation.cli.shop import from_settings
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
+    from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.files.recordings.session_details import SessionDetails
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
     from dbbstation.station.assembly import Job
 
-_Function = TypeVar("_Function", bound="Callable[..., Any]")
 
-_OPTIONS = (
-    click.option("--operator", default="", help="Name of the operator."),
-    click.option("--job", default="", help="Job or order number: what it is measured for."),
-    shop_option("--serial-number", setting="serial_number", default="", help="Serial number of the machine."),
-    click.option("--ambient-temp-c", type=Finite(), help="Temperature of the shop [degC]."),
-    shop_option("--bar-serial-number", setting="bar.serial_number", default="", help="Serial number of the bar."),
-    shop_option(
-        "--bar-length-mm",
-        setting="bar.calibrated_length_mm",
-        type=Finite(),
-        help="Calibrated distance between the ball centres [mm]; held against the plan's radii, never added to readings.",
-    ),
-    shop_option(
-        "--bar-uncertainty-um",
-        setting="bar.calibrator_uncertainty_mm",
-        factor=1e3,
-        type=Finite(),
-        help="Standard uncertainty u of that length [µm].",
-    ),
-    shop_option(
-        "--bar-temp-c", setting="bar.temp_c", type=Finite(), help="Temperature of the bar at its calibration [degC]."
-    ),
-)
-
-
-_OF_BAR = (
-    click.option(
-        "--bar", "bar_file", type=click.Path(path_type=Path), help="Calibration of the bar, from `dbbstation bar`."
-    ),
-    click.option("--bar-waiver", default="", help="Why it is measured without a fresh calibration of the bar."),
-)
-
-_AGE = shop_option(
-    "--largest-bar-age-h",
-    setting="limits.largest_bar_age_h",
-    type=Finite(0.1, 10_000),
-    help="Older calibrations of the bar are refused [h]  [default: 24].",
-)
-
-
-def noted_options(function: _Function) -> _Function:
-    """Give a command these options as keywords of `SessionOptions`."""
-    for option in reversed((*_OPTIONS, *_OF_BAR)):
-        function = option(function)
-    return function
-
-
-def session_options(function: _Function) -> _Function:
-    """Give a command the same, with a limit for the bar's age."""
-    return noted_options(_AGE(function))
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SessionOptions:
-    """Stated facts of machine, shop and bar.
+    """Stated facts of machine, shop and bar."""
 
-    Attributes:
-        bar_temp_c: at calibration; None if unknown.
-        bar_file: instead of these; None for none.
-        bar_waiver: reason for no fresh calibration; may be empty.
-    """
-
-    operator: str
-    job: str
-    serial_number: str
-    ambient_temp_c: float | None
-    bar_serial_number: str
-    bar_length_mm: float | None
-    bar_uncertainty_um: float | None
-    bar_temp_c: float | None
-    bar_file: Path | None
-    bar_waiver: str
+    operator: Annotated[str, Option("Name of the operator.")] = ""
+    job: Annotated[str, Option("Job or order number: what it is measured for.")] = ""
+    serial_number: Annotated[str, Option("Serial number of the machine.", setting="serial_number")] = ""
+    ambient_temp_c: Annotated[float | None, Option("Temperature of the shop [degC].")] = None
+    bar_serial_number: Annotated[str, Option("Serial number of the bar.", setting="bar.serial_number")] = ""
+    bar_length_mm: Annotated[
+        float | None,
+        Option(
+            "Calibrated distance between the ball centres [mm]; held against the plan's radii, never added to readings.",
+            setting="bar.calibrated_length_mm",
+        ),
+    ] = None
+    bar_uncertainty_um: Annotated[
+        float | None,
+        Option("Standard uncertainty u of that length [µm].", setting="bar.calibrator_uncertainty_mm", factor=1e3),
+    ] = None
+    bar_temp_c: Annotated[
+        float | None, Option("Temperature of the bar at its calibration [degC].", setting="bar.temp_c")
+    ] = None
+    bar: Annotated[Path | None, Option("Calibration of the bar, from `dbbstation bar`.")] = None
+    bar_waiver: Annotated[str, Option("Why it is measured without a fresh calibration of the bar.")] = ""
 
     def details(self, stroke_mm: float | None = None) -> SessionDetails:
         """Return what a session notes.
@@ -106,14 +60,14 @@ class SessionOptions:
             if (text := getattr(self, name)) and not text.strip():
                 option = name.replace("_", "-")
                 raise click.UsageError(f"--{option} is blank: state it, or leave --{option} out")
-        if self.bar_file is None:
-            bar = self._bar(stroke_mm)
+        if self.bar is None:
+            bar = self._stated_bar(stroke_mm)
         else:
             from dbbstation.files.formats.bar import read_bar
 
             if self.of_bar:
                 raise click.UsageError("--bar says everything of the bar: leave out --bar-length-mm and the like")
-            bar = read_bar(self.bar_file).to_bar(stroke_mm)
+            bar = read_bar(self.bar).to_bar(stroke_mm)
         return SessionDetails(
             self.serial_number.strip(),
             self.operator.strip(),
@@ -140,13 +94,13 @@ class SessionOptions:
         Raises:
             InputError: faults of the bar's file.
         """
-        if self.bar_file is None:
+        if self.bar is None:
             return self.bar_length_mm
         from dbbstation.files.formats.bar import read_bar
 
-        return read_bar(self.bar_file).length_mm
+        return read_bar(self.bar).length_mm
 
-    def _bar(self, stroke_mm: float | None) -> Bar | None:
+    def _stated_bar(self, stroke_mm: float | None) -> Bar | None:
         from dbbstation.plan.bar import Bar
 
         length_mm, u_um = self.bar_length_mm, self.bar_uncertainty_um
@@ -159,18 +113,90 @@ class SessionOptions:
         return Bar(self.bar_serial_number, length_mm, u_um / 1e3, None, self.bar_temp_c, None, stroke_mm)
 
 
-def require_bar(job: Job, largest_age_h: float | None) -> None:
-    """Refuse a new session whose plan needs the bar's length without fresh calibration or reason.
+@dataclass(frozen=True, kw_only=True)
+class RecordingOptions(SessionOptions):
+    """The same, with what is done while runs are recorded."""
 
-    Raises:
-        InputError: what is wrong with the bar, and what to do.
-    """
-    from datetime import UTC, datetime
+    spy: Spy = None
+    largest_loss_percent: Annotated[
+        float | None,
+        Option(
+            "A run that lost more of its samples is repeated [%]  [default: the plan's, else 0.5].",
+            setting="limits.largest_loss_percent",
+            least=0.0,
+            most=100.0,
+        ),
+    ] = None
+    model: Annotated[
+        Path | None,
+        Option(
+            "Judge circles by this calibrated model of the machine, not by its nominal geometry.",
+            kind="file",
+            metavar="MODEL.yaml",
+        ),
+    ] = None
+    source_files: o.SourcePaths = ()
+    # The values of `Order` and `Gate`; a test holds them together, so that no command waits for what those import.
+    order: Annotated[
+        Literal["plan", "holder", "drift"],
+        Option(
+            "As the plan has its tests; by holder and ball, each put up once; or heights in turn, apart from drift."
+        ),
+    ] = "plan"
+    gate: Annotated[
+        Literal["plan", "first", "holders"],
+        Option(
+            "Test repeated at the end to show drift, if the plan names none: the first one, or the first of each holder."
+        ),
+    ] = "plan"
+    programs: Annotated[Path | None, Option("Folder of TEST-DIRECTION programs.", kind="folder")] = None
+    largest_bar_age_h: Annotated[
+        float | None,
+        Option(
+            "Older calibrations of the bar are refused [h]  [default: 24].",
+            setting="limits.largest_bar_age_h",
+            least=0.1,
+            most=10_000.0,
+        ),
+    ] = None
 
-    from dbbstation.files.recordings.session import SESSION_FILE
-    from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
+    def in_force(self, plan: InlinePlan) -> InlinePlan:
+        """Return the plan in this order, with the limit of lost samples.
 
-    if job.details.bar_waiver or (job.folder / SESSION_FILE).is_file():
-        return
-    largest = USUAL_AGE_H if largest_age_h is None else largest_age_h
-    check_bar_known(job.details.bar, job.plan.to_domain(), datetime.now(UTC), largest)
+        The command line overrides the plan, which overrides the shop's settings.
+        """
+        from dbbstation.service.order import Gate, Order, ordered
+
+        percent, stated = self.largest_loss_percent, plan.plan.largest_loss_percent is not None
+        if percent is not None and not (stated and from_settings("largest_loss_percent")):
+            plan = replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": percent}))
+        return ordered(plan, Order(self.order), Gate(self.gate))
+
+    def judging_model(self) -> IdentifiedModel | None:
+        """Return the model of expected circles, or None.
+
+        Raises:
+            InputError: every fault with its place.
+        """
+        if self.model is None:
+            return None
+        from dbbstation.files.formats.model import read_model
+        from dbbstation.files.own_sources import every_source
+
+        return read_model(self.model, every_source(self.source_files))
+
+    def require_bar(self, job: Job) -> None:
+        """Refuse a new session whose plan needs the bar's length without fresh calibration or reason.
+
+        Raises:
+            InputError: what is wrong with the bar, and what to do.
+        """
+        from datetime import UTC, datetime
+
+        from dbbstation.files.recordings.session import SESSION_FILE
+        from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
+
+        if job.details.bar_waiver or (job.folder / SESSION_FILE).is_file():
+            return
+        largest = USUAL_AGE_H if self.largest_bar_age_h is None else self.largest_bar_age_h
+        check_bar_known(job.details.bar, job.plan.to_domain(), datetime.now(UTC), largest)

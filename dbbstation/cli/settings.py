@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
+from dbbstation.cli.declared import made
 from dbbstation.cli.lazy import made_ready
 from dbbstation.cli.output import echo, echo_line
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
@@ -37,11 +40,13 @@ class _WithShipped(click.Command):
 SHIPPED = "shipped"
 
 
-@click.command(cls=_WithShipped)
-@click.argument("folder", required=False, type=click.Path(path_type=Path), metavar="[SESSION]")
-@click.option("--template", is_flag=True, help="Print a settings file with every key as a comment, and stop.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
+@made(kind=_WithShipped)
+def settings(
+    folder: Annotated[Path | None, Option("session.", kind="argument", metavar="[SESSION]")] = None,
+    *,
+    template: Annotated[bool, Option("Print a settings file with every key as a comment, and stop.")] = False,
+    as_json: o.Json = False,
+) -> None:
     r"""Show the shop's settings: every key, its value, and the file and line that it comes from.
 
     Settings are looked for in `dbbstation-settings.yaml` beside SESSION, in the folder that holds it, or in the working folder if a command takes no session. Then in `settings.yaml` in the user's configuration folder. The first file

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import click
 
+from dbbstation.cli.declared import made
 from dbbstation.cli.output import echo, echo_line
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 _FIXTURES = (
     "bars",
@@ -75,12 +79,14 @@ EXAMPLES = {
 """Names that help texts use, and the files that `examples` has for them; a name that ends with a slash is a folder."""
 
 
-@click.command()
-@click.argument("name", required=False, metavar="[NAME]")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Copy NAME into this folder.")
-@click.option("--force", is_flag=True, help="Replace existing files.")
-@click.option("--json", "as_json", is_flag=True, help="Print the names as JSON.")
-def shipped(name: str | None, *, out: Path | None, force: bool, as_json: bool) -> None:
+@made()
+def shipped(
+    name: Annotated[str | None, Option("what is copied.", kind="argument-text", metavar="[NAME]")] = None,
+    *,
+    out: Annotated[Path | None, Option("Copy NAME into this folder.", kind="folder")] = None,
+    force: o.Force = False,
+    as_json: o.Json = False,
+) -> None:
     r"""List plans, machines, jigs, a small session and examples that come with the program, or copy some of them.
 
     NAME is one of them, or a kind such as `plans`. `examples` has the files that help texts name.

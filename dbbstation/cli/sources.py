@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-import click
-
+from dbbstation.cli.declared import made
 from dbbstation.cli.output import echo
-from dbbstation.cli.shared_options import source_file_option
+from dbbstation.tasks import options as o
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from dbbstation.results.sources import SourceDescription
@@ -17,17 +17,19 @@ if TYPE_CHECKING:
 WIDTH = 110
 
 
-@click.command()
-@click.argument("name", required=False)
-@click.option(
-    "--machine",
-    "machine_file",
-    type=click.Path(path_type=Path),
-    help="Machine file or session folder: also print the parameters that the cause has there, with their usual sizes.",
-)
-@source_file_option
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[Path, ...], as_json: bool) -> None:
+@made()
+def sources(
+    name: Annotated[str | None, Option("cause.", kind="argument-text")] = None,
+    *,
+    machine: Annotated[
+        Path | None,
+        Option(
+            "Machine file or session folder: also print the parameters that the cause has there, with their usual sizes."
+        ),
+    ] = None,
+    source_files: o.SourcePaths = (),
+    as_json: o.Json = False,
+) -> None:
     r"""List the causes of error that are known, or show one: NAME.
 
     Each has a description, its symptoms in recordings, a way to confirm and to cure it, its equation with source, its needs, and how exactly real machines follow its formula.
@@ -47,17 +49,17 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
     from dbbstation.sources.registry import sources_named
 
     known = every_source(source_files)
-    machine = None
-    if machine_file is not None:
-        machine = read_machine(machine_file / "machine.yaml" if machine_file.is_dir() else machine_file)
+    given = None
+    if machine is not None:
+        given = read_machine(machine / "machine.yaml" if machine.is_dir() else machine)
     if name is not None:
         (source,) = sources_named([name], known)
-        if machine is not None:
+        if given is not None:
             try:
-                source.parameters(machine)
+                source.parameters(given)
             except ModelError as error:
-                raise ModelError(error.what, where=str(machine_file), remedy=error.remedy) from error
-        found = source_description(source, machine)
+                raise ModelError(error.what, where=str(machine), remedy=error.remedy) from error
+        found = source_description(source, given)
         if as_json:
             print_result(found)
         else:

@@ -6,26 +6,23 @@ import sys
 import tempfile
 import threading
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
-from dbbstation.cli.judging_model import judging_model, judging_model_options
-from dbbstation.cli.loss import loss_option, with_loss_limit
-from dbbstation.cli.number_types import Finite
-from dbbstation.cli.option_object import taken_from
-from dbbstation.cli.order_options import in_order, order_options, programs_option
+from dbbstation.cli.declared import made
+from dbbstation.cli.instrument_options import LineOptions, OpenLine, spying
 from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import SessionOptions, require_bar, session_options
+from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, virtual_port
 from dbbstation.system.hang_up import ended_when_hung_up
 from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered
 from dbbstation.system.virtual_ports import is_virtual
+from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,7 +30,6 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.choice import Choice, Limits
     from dbbstation.service.held_line import HeldLine
-    from dbbstation.service.memory import Line
     from dbbstation.service.runner import Opener
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
@@ -45,48 +41,23 @@ _DEMO_INSTRUMENT = "streaming-encoder"
 _DEMO_SEED = 3
 
 
-@click.command()
-@click.option("--plan", "plan_file", type=click.Path(path_type=Path), help="Test plan.")
-@click.option("--machine", "machine_file", type=click.Path(path_type=Path), help="Nominal machine.")
-@instrument_options(required=False)
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), help="Session folder. An existing session is continued."
-)
-@click.option("--virtual", is_flag=True, help="Use a virtual machine and instrument.")
-@click.option(
-    "--time-scale",
-    type=Finite(SLOWEST, FASTEST),
-    default=1.0,
-    show_default=True,
-    help="Factor by which the virtual machine runs faster than real time, with --virtual.",
-)
-@spy_option
-@loss_option
-@judging_model_options
-@order_options
-@programs_option
-@session_options
+@made()
 def station(
+    line: OpenLine,
+    noted: RecordingOptions,
     *,
-    plan_file: Path | None,
-    machine_file: Path | None,
-    instrument: str | None,
-    profile: str | None,
-    zero_mm: float | None,
-    port: str | None,
-    baud: int | None,
-    spy: Path | None,
-    out: Path | None,
-    virtual: bool,
-    time_scale: float,
-    largest_loss_percent: float | None,
-    largest_bar_age_h: float | None,
-    model_file: Path | None,
-    source_files: tuple[Path, ...],
-    order: str,
-    gate: str,
-    programs: Path | None,
-    **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
+    plan: Annotated[Path | None, Option("Test plan.")] = None,
+    machine: Annotated[Path | None, Option("Nominal machine.")] = None,
+    out: Annotated[Path | None, Option("Session folder. An existing session is continued.", kind="folder")] = None,
+    virtual: Annotated[bool, Option("Use a virtual machine and instrument.")] = False,
+    time_scale: Annotated[
+        float,
+        Option(
+            "Factor by which the virtual machine runs faster than real time, with --virtual.",
+            least=SLOWEST,
+            most=FASTEST,
+        ),
+    ] = 1.0,
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
 
@@ -102,27 +73,23 @@ def station(
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
     """
-    noted = taken_from(told, SessionOptions)
     if noted.job.endswith((".yaml", ".yml")):
-        if virtual or any(given is not None for given in (plan_file, machine_file, out)):
+        if virtual or any(given is not None for given in (plan, machine, out)):
             raise click.UsageError("a job says what is measured: leave out --plan, --machine, --out and --virtual")
         _check_terminal()
-        return _operate(Path(noted.job), judging_model(model_file, source_files))
+        return _operate(Path(noted.job), noted.judging_model())
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
-    port = None if virtual and from_settings("port") else port
-    baud = None if virtual and from_settings("baud") else baud
-    if not virtual and time_scale == 1.0 and plan_file is None and machine_file is None and out is None:
-        _check_terminal()
-        return _begin(
-            replace(
-                _given(_line(instrument, profile, port, baud, zero_mm), spy, (order, gate), noted), programs=programs
-            ),
-            _limits(largest_loss_percent, largest_bar_age_h),
-            judging_model(model_file, source_files),
+    if virtual:
+        line = replace(
+            line,
+            port="" if from_settings("port") else line.port,
+            baud=None if from_settings("baud") else line.baud,
         )
-    _check_options(
-        virtual=virtual, time_scale=time_scale, baud=baud, needed=(plan_file, machine_file, instrument, port, out)
-    )
+    if not virtual and time_scale == 1.0 and plan is None and machine is None and out is None:
+        _check_terminal()
+        return _begin(_given(line, noted), _limits(noted), noted.judging_model())
+    needed = (plan, machine, line.instrument or None, line.port or None, out)
+    _check_options(virtual=virtual, time_scale=time_scale, baud=line.baud, needed=needed)
     _check_terminal()
     from dbbstation.cli.measure_talk import Log
     from dbbstation.files.formats.machine import read_machine
@@ -140,57 +107,56 @@ def station(
         folder, _, rest = _DEMO[what].partition("/")
         return shipped_folder(folder) / rest
 
-    plan_file = plan_file or demo("plan")
-    machine = read_machine(machine_file or demo("machine"))
-    plan = in_order(with_loss_limit(read_inline_plan(plan_file), largest_loss_percent), order, gate)
-    name = instrument or _DEMO_INSTRUMENT
-    protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=noted.stated_length_mm())
+    plan = plan or demo("plan")
+    nominal, whole = read_machine(machine or demo("machine")), noted.in_force(read_inline_plan(plan))
+    line = replace(line, instrument=line.instrument or _DEMO_INSTRUMENT)
+    protocol = line.protocol(bar_length_mm=noted.stated_length_mm())
     details = noted.details(protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
         job = Job(
-            machine,
-            plan,
+            nominal,
+            whole,
             folder,
             details,
-            {} if programs is None else load_programs(programs, plan.to_domain(), machine),
-            rate_hz=protocol.fastest_hz(baud),
+            {} if noted.programs is None else load_programs(noted.programs, whole.to_domain(), nominal),
+            rate_hz=protocol.fastest_hz(line.baud),
             range_mm=protocol.length.range_mm,
-            model=judging_model(model_file, source_files),
+            model=noted.judging_model(),
             instrument=ReadBy(
                 protocol.name,
-                profile or "",
-                virtual_port(time_scale) if virtual else str(port),
-                virtual or is_virtual(str(port)),
+                line.profile or "",
+                virtual_port(time_scale) if virtual else line.port,
+                virtual or is_virtual(line.port),
             ),
         )
-        job.check(str(plan_file))
+        job.check(str(plan))
         if (folder / SESSION_FILE).is_file():
             check_not_mixed(folder, read_session(folder), job.instrument)
         if not virtual:
-            require_bar(job, largest_bar_age_h)
-        helper = None
+            noted.require_bar(job)
+        observers: list[Observer] = [Log()]
         if virtual:
             from dbbstation.service.virtual_place import virtual_place
 
             echo("switching on the virtual machine …", err=True)
             place = stack.enter_context(
                 virtual_place(
-                    machine,
-                    plan.to_domain(),
+                    nominal,
+                    whole.to_domain(),
                     protocol,
                     time_scale=time_scale,
                     seed=_DEMO_SEED,
                     programs=job.programs,
                 )
             )
-            job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
-        say_sampling(plan.to_domain(), protocol, baud)
-        log = stack.enter_context(spying(spy, protocol, str(port)))
-        observers: list[Observer] = [Log(), *([] if helper is None else [helper])]
-        line = HeldLine(protocol, str(port), baud, clock=job.clock, time_scale=time_scale, log=log)
-        stack.callback(line.close)
-        return _run(job, opener(job, line, observers=observers), line)
+            job, line = replace(job, clock=place.clock, time_scale=time_scale), replace(line, port=place.port)
+            observers.append(place.helper)
+        say_sampling(whole.to_domain(), protocol, line.baud)
+        log = stack.enter_context(spying(noted.spy, protocol, line.port))
+        held = HeldLine(protocol, line.port, line.baud, clock=job.clock, time_scale=time_scale, log=log)
+        stack.callback(held.close)
+        return _run(job, opener(job, held, observers=observers), held)
 
 
 def _check_options(
@@ -246,42 +212,36 @@ def _operate(path: Path, model: IdentifiedModel | None) -> int:
     return _shown(StationApp(None, None, front=front, operated=operated))
 
 
-def _line(
-    instrument: str | None, profile: str | None, port: str | None, baud: int | None, zero_mm: float | None
-) -> Line:
-    from dbbstation.service.memory import Line
-
-    return Line(instrument=instrument or "", profile=profile or "", port=port or "", baud=baud, zero_mm=zero_mm)
-
-
-def _given(line: Line, spy: Path | None, sequence: tuple[str, str], noted: SessionOptions) -> Choice:
+def _given(line: LineOptions, noted: RecordingOptions) -> Choice:
     from dbbstation.service.choice import Choice
+    from dbbstation.service.memory import Line
     from dbbstation.service.order import Gate, Order
 
-    lost = ["spy"] if spy is not None else []
+    lost = ["spy"] if noted.spy is not None else []
     lost += noted.of_bar
     if lost:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in lost)
         raise click.UsageError(f"{names} goes with --plan, --machine, --instrument, --port and --out")
     return Choice(
-        line=line,
-        bar=noted.bar_file,
+        line=Line(**asdict(line) | {"profile": line.profile or ""}),
+        bar=noted.bar,
         bar_waiver=noted.bar_waiver.strip(),
         operator=noted.operator,
         serial_number=noted.serial_number,
         job=noted.job,
-        order=Order(sequence[0]),
-        gate=Gate(sequence[1]),
+        order=Order(noted.order),
+        gate=Gate(noted.gate),
         ambient_temp_c=noted.ambient_temp_c,
+        programs=noted.programs,
     )
 
 
-def _limits(largest_loss_percent: float | None, largest_bar_age_h: float | None) -> Limits:
+def _limits(noted: RecordingOptions) -> Limits:
     from dbbstation.service.choice import Limits
     from dbbstation.station.bar_known import USUAL_AGE_H
 
     over_plan = not from_settings("largest_loss_percent")
-    return Limits(largest_bar_age_h or USUAL_AGE_H, largest_loss_percent, over_plan)
+    return Limits(noted.largest_bar_age_h or USUAL_AGE_H, noted.largest_loss_percent, over_plan)
 
 
 def _shown(app: StationApp) -> int:

@@ -33,13 +33,9 @@ def program(
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),
     exclude: o.Exclude = (),
-    step_deg: Annotated[
-        float, Option("Angle between points [deg].", setting="program.step_deg", least=0.01, most=5.0)
-    ] = 0.1,
-    clearance_mm: Annotated[
-        float, Option("Height of rapid moves above the first point [mm].", setting="program.clearance_mm", least=0.0)
-    ] = 20.0,
-    bar_stays_on: Annotated[bool, Option("Start and end with the bar on its balls: no rapids, no stops.")] = False,
+    step_deg: o.StepDeg = 0.1,
+    clearance_mm: o.ClearanceMm = 20.0,
+    bar_stays_on: o.BarStaysOn = False,
     chord_um: Annotated[float, o.CHORD_UM] = 1e3 * CIRCLE_CHORD_MM,
     prefer: o.Prefer = "accuracy",
     strict: o.Strict = False,

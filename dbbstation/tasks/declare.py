@@ -5,11 +5,13 @@ A parameter without an `Option` is for Python only. This module loads fast, sinc
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import functools
 import inspect
 import math
 import re
+import sys
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 from os import PathLike
@@ -48,7 +50,10 @@ class Option:
         kind: `argument` and `argument-file` have no flag; `path`, `file` or `folder`; empty: by the type.
         usual: what its absence means, shown as default.
         least: `most`, `above`: range of a number.
+        factor: of a setting in another unit.
+        goes_with: option beside which the setting counts for nothing.
         objects: scripts may give other objects than paths.
+        whole: commas part no values.
         flag: on the command line; empty: the name.
         required: on the command line, though scripts may leave it out.
         parse: makes a value of the command line's texts, or raises ValueError.
@@ -64,7 +69,10 @@ class Option:
     above: float | None = None
     only_with: str = ""
     not_with: tuple[str, ...] = ()
+    factor: float = 1.0
+    goes_with: str = ""
     objects: bool = False
+    whole: bool = False
     flag: str = ""
     required: bool = False
     parse: Callable[[Any], Any] | None = None
@@ -124,7 +132,9 @@ class TaskParameter:
     def _read(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
         kind = self.type
         if self.option.parse is not None:
-            texts = isinstance(value, str) or (isinstance(value, tuple) and all(isinstance(one, str) for one in value))
+            texts = isinstance(value, str | Path) or (
+                isinstance(value, tuple) and all(isinstance(one, str) for one in value)
+            )
             return self.option.parse(value) if texts else value
         if kind is Path:
             return Path(value)
@@ -144,6 +154,8 @@ class TaskParameter:
                 return given
             return tuple(one if self.option.objects and not isinstance(one, str) else Path(one) for one in given)
         texts = [value] if isinstance(value, str) else list(value)
+        if self.option.whole:
+            return tuple(texts)
         names = dict.fromkeys(name.strip() for text in texts for name in text.split(",") if name.strip())
         kind = get_args(self.type)[0]
         return tuple(_one_of(name, get_args(kind)) if get_origin(kind) is Literal else name for name in names)
@@ -252,19 +264,28 @@ def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Functi
 
 
 def options_of(function: Callable[..., Any]) -> dict[str, TaskParameter]:
-    """Return the parameters of a function that have an `Option`, by name."""
-    own, found = inspect.unwrap(function), {}
-    for name, one in inspect.signature(own).parameters.items():
-        try:
-            annotation = eval(one.annotation, own.__globals__)  # noqa: S307 - of our own source
-        except NameError:
-            continue  # a type for checkers only is no option
+    """Return the parameters of a function, or the fields of a dataclass, that have an `Option`, by name."""
+    found = {}
+    for name, (annotation, one) in annotations_of(function).items():
         kinds = [annotation, *(get_args(annotation) if get_origin(annotation) in {Union, UnionType} else ())]
         option = next(
             (mark for kind in kinds for mark in getattr(kind, "__metadata__", ()) if isinstance(mark, Option)), None
         )
         if option is not None:
             found[name] = TaskParameter(name, _plain(annotation), one.default, option)
+    return found
+
+
+def annotations_of(function: Callable[..., Any]) -> dict[str, tuple[Any, inspect.Parameter]]:
+    """Return annotation and parameter by name, of a function or a dataclass; without types for checkers only."""
+    own, found = inspect.unwrap(function), {}
+    homes = {
+        name: kind for kind in reversed(getattr(own, "__mro__", ())) for name in vars(kind).get("__annotations__", ())
+    }
+    for name, one in inspect.signature(own).parameters.items():
+        with contextlib.suppress(NameError):
+            names = vars(sys.modules[homes.get(name, own).__module__])
+            found[name] = (eval(one.annotation, names), one)  # noqa: S307 - of our own source
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
@@ -20,6 +21,8 @@ MODEL_WITH_FINDINGS = replace(MODEL, only_with="findings")
 Model = Annotated[_Model, MODEL]
 FORCE, JSON = Option("Replace existing files."), Option("Print the result as JSON.")
 Force = Annotated[bool, FORCE]
+Json = Annotated[bool, replace(JSON, flag="--json")]
+Out = Annotated[File, Option("Write the result here.", kind="file")]
 OUTPUTS = {
     "out": "Write the result here.",
     "table": "Write the table here, as CSV.",
@@ -41,26 +44,31 @@ Method = Annotated[
 ]
 FALSE_ALARMS = "Probability of a false alarm, in all compared quantities together."
 Dialect = Annotated[str, Option("Language to write: a name, or FILE.py.", metavar="D", setting="program.dialect")]
+StepDeg = Annotated[float, Option("Angle between points [deg].", setting="program.step_deg", least=0.01, most=5.0)]
+ClearanceMm = Annotated[
+    float, Option("Height of rapid moves above the first point [mm].", setting="program.clearance_mm", least=0.0)
+]
+BarStaysOn = Annotated[bool, Option("Start and end with the bar on its balls: no rapids, no stops.")]
 CHORD_UM = Option("Greatest distance between a move and the commanded path [µm].", least=0.001, most=1000.0)
 TimeS = Annotated[
     float | None, Option("Start after the session's start [s], for models that depend on time.", metavar="S")
 ]
 Findings = Annotated[bool, Option("Judge every run too: number, limit, verdict.")]
-SessionPaths = Annotated[Sessions, Option("session folders or session files.", kind="argument", metavar="SESSION...")]
+SESSIONS = Option("session folders or session files.", kind="argument", metavar="SESSION...")
+SessionPaths = Annotated[Sessions, SESSIONS]
 RecordedSessions = Annotated[
     Sessions | Recorded,
     Option("session folders, or what `load` returned of them.", kind="argument", metavar="SESSION...", objects=True),
 ]
 Tests = Annotated[Names, Option("Take these tests only; may be given more than once.", metavar="TEST,...")]
 Exclude = Annotated[Names, Option("Leave tests out; may be given more than once.", metavar="TEST,...")]
-SourceFiles = Annotated[
-    Files,
-    Option(
-        "Python file with error sources or physics of your own. It is executed. May be given more than once.",
-        kind="path",
-        metavar="FILE.py",
-    ),
-]
+SOURCE_FILES = Option(
+    "Python file with error sources or physics of your own. It is executed. May be given more than once.",
+    kind="path",
+    metavar="FILE.py",
+)
+SourceFiles = Annotated[Files, SOURCE_FILES]
+SourcePaths = Annotated[tuple[Path, ...], SOURCE_FILES]
 HeldOut = Annotated[bool, Option("Leave out the held-out test, which takes most of the time.")]
 Filter = Annotated[
     Literal["none", "15", "30", "50", "150"],

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.figure_option import format_of
+from studies.figure_option import figure_option
 
 if TYPE_CHECKING:
     from pathlib import Path

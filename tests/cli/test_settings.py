@@ -8,7 +8,8 @@ import shutil
 
 import pytest
 
-from dbbstation.cli import DONE, FAILED, USAGE, loss
+from dbbstation.cli import DONE, FAILED, USAGE, session_options
+from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.cli.settings import built_in
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.settings import read_settings
@@ -216,10 +217,11 @@ def test_a_loss_limit_goes_into_the_plan_that_has_none(monkeypatch):
     own = stating.plan.largest_loss_percent
     assert own not in {None, 2.0}
     for of_settings, of_stating in ((True, own), (False, 2.0)):
-        monkeypatch.setattr(loss, "from_settings", lambda _, answer=of_settings: answer)
-        assert loss.with_loss_limit(silent, 2.0).to_domain().largest_loss_percent == 2.0
-        assert loss.with_loss_limit(stating, 2.0).plan.largest_loss_percent == of_stating
-        assert loss.with_loss_limit(stating, None).plan.largest_loss_percent == own
+        monkeypatch.setattr(session_options, "from_settings", lambda _, answer=of_settings: answer)
+        two, none = RecordingOptions(largest_loss_percent=2.0), RecordingOptions()
+        assert two.in_force(silent).to_domain().largest_loss_percent == 2.0
+        assert two.in_force(stating).plan.largest_loss_percent == of_stating
+        assert none.in_force(stating).plan.largest_loss_percent == own
 
 
 @pytest.mark.parametrize("separator", [";", "\t"])

@@ -10,10 +10,11 @@ import time
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
-from dbbstation.cli import order_options
+from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.errors import InputError, TravelError
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.recordings.entries import Note
@@ -33,6 +34,7 @@ from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
 from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.tasks.declare import options_of
 from dbbstation.virtual.wire import VirtualInstrument
 from tests.cli.conftest import call
 
@@ -389,5 +391,6 @@ def test_a_temperature_is_never_noted_before_what_was_noted_already(tmp_path: Pa
 
 
 def test_the_orders_of_the_command_line_are_those_of_the_service() -> None:
-    assert tuple(Order) == order_options.ORDERS
-    assert tuple(Gate) == order_options.GATES
+    options = options_of(RecordingOptions)
+    assert tuple(Order) == get_args(options["order"].type)
+    assert tuple(Gate) == get_args(options["gate"].type)

@@ -6,8 +6,6 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
 from dbbstation.computing.threads import with_one_thread
@@ -38,7 +36,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.diagnosis.explained import Explained, SettledCircles
-    from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
@@ -115,21 +112,10 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
         second_start_agrees=None if stopped else settled.second_start_agrees(),
-        cancelling=_cancelling(explained),
+        cancelling=cancelling({m.cause.name: outcome.effect([m.cause.name]) for m in members}, "µm", 1e3),
         next_tests=() if stopped else next_tests(explained, findings, elsewhere),
         limits=limits_of(settled),
     )
-
-
-def _cancelling(explained: Explained) -> Cancelling | None:
-    settled, samples = explained.settled, explained.channel.columns.samples
-    values = settled.comparison.estimates(settled.best.members).values if settled.best.members else np.zeros(0)
-    effects = {}
-    for member in settled.best.members:
-        own, values = values[: len(member.columns)], values[len(member.columns) :]
-        if member.cause.named:
-            effects[member.cause.name] = samples[:, member.columns] @ own
-    return cancelling(effects, "µm", 1e3)
 
 
 def _widened(explained: Explained) -> Explained:

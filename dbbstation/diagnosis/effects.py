@@ -22,7 +22,7 @@ from dbbstation.trace.analysis import figures
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -134,7 +134,6 @@ def effects_of(
         hidden = None if unseen is None or places is None else _parted(group, unseen[:, places].T)
         spread = [_answers(observation, lengths[k], group, roots) for k, observation in enumerate(observations)]
         circles = tuple(_circle(o, effect) for o, effect in zip(observations, effects, strict=True))
-        centres = [circle.centre_um for circle in circles]
         texts = group[0].source.texts
         space, space_u = _over_the_workspace(model, without, group, (roots, hidden))
         found.append(
@@ -142,9 +141,9 @@ def effects_of(
                 cause=name,
                 sources=tuple(dict.fromkeys(f.source.name for f in group)),
                 g_um=float(np.mean([circle.g_um for circle in circles])),
-                g_u_um=_u_of_mean_g(observations, effects, spread, circles),
-                centre_um=float(np.mean([np.hypot(*centre) for centre in centres])),
-                centre_u_um=_u_of_centres(observations, effects, spread, centres),
+                g_u_um=_u_of_mean(circles, spread, _changed_g_um),
+                centre_um=float(np.mean([np.hypot(*circle.centre_um) for circle in circles])),
+                centre_u_um=_u_of_mean(circles, spread, _changed_centres_um),
                 workspace_um=space,
                 workspace_u_um=space_u,
                 measured_g_um=sum(circle.measured_g_um for circle in circles) / len(circles),
@@ -248,47 +247,31 @@ def _own_g_um(raw: RawCircle, effect_mm: NDArray[np.float64]) -> float:
     return smooth_circularity_um(raw, raw.circle.bar_mm + effect_mm)
 
 
-def _u_of_mean_g(
-    observations: Sequence[Observation],
-    effects: Sequence[NDArray[np.float64]],
-    spread: Sequence[NDArray[np.float64] | None],
+def _u_of_mean(
     circles: Sequence[CuredCircle],
-) -> float | None:
-    changes = []
-    for observation, effect, answers, circle in zip(observations, effects, spread, circles, strict=True):
-        if answers is None:
-            return None
-        lengths = [observation.raw.circle.bar_mm + effect + change for change in answers.T]
-        changes.append(np.array(smooth_circularities_um(observation.raw, lengths)) - circle.g_um)
-    return _norm_of_mean(np.array(changes))
-
-
-def _u_of_centres(
-    observations: Sequence[Observation],
-    effects: Sequence[NDArray[np.float64]],
     spread: Sequence[NDArray[np.float64] | None],
-    centres: Sequence[NDArray[np.float64]],
+    changed_um: Callable[[CuredCircle, list[NDArray[np.float64]]], NDArray[np.float64]],
 ) -> float | None:
-    changes = []
-    for observation, effect, answers, centre in zip(observations, effects, spread, centres, strict=True):
+    """Return the standard uncertainty of a figure's mean over all runs, from what some lengths change of it; None if unknown."""
+    found = []
+    for circle, answers in zip(circles, spread, strict=True):
         if answers is None:
             return None
-        raw = observation.raw
-        own = figures(raw, raw.circle.bar_mm + effect).centre_mm
-        moved = [
-            float(
-                np.hypot(
-                    *(centre + 1e3 * (np.asarray(figures(raw, raw.circle.bar_mm + effect + change).centre_mm) - own))
-                )
-            )
-            for change in answers.T
-        ]
-        changes.append([one - float(np.hypot(*centre)) for one in moved])
-    return _norm_of_mean(np.array(changes))
+        length_mm = circle.raw.circle.bar_mm + circle.effect_mm
+        found.append(changed_um(circle, [length_mm + change for change in answers.T]))
+    each = np.array(found)
+    return float(np.linalg.norm(each.mean(axis=0))) if each.size else 0.0
 
 
-def _norm_of_mean(changes: NDArray[np.float64]) -> float:
-    return float(np.linalg.norm(changes.mean(axis=0))) if changes.size else 0.0
+def _changed_g_um(circle: CuredCircle, lengths_mm: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    return np.array(smooth_circularities_um(circle.raw, lengths_mm)) - circle.g_um
+
+
+def _changed_centres_um(circle: CuredCircle, lengths_mm: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    raw, own = circle.raw, circle.raw.circle.bar_mm + circle.effect_mm
+    own_mm = np.asarray(figures(raw, own).centre_mm)
+    moved = [circle.centre_um + 1e3 * (np.asarray(figures(raw, one).centre_mm) - own_mm) for one in lengths_mm]
+    return np.array([float(np.hypot(*one)) for one in moved]) - float(np.hypot(*circle.centre_um))
 
 
 def _over_the_workspace(

@@ -43,9 +43,6 @@ class Spline(Form):
         flat = BSpline.design_matrix(share.ravel(), knots, CUBIC).toarray()
         return np.asarray(flat.reshape(*share.shape, self.functions)[..., : self.count], dtype=np.float64)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
-        return np.linspace(low, high, 3 * self.functions)
-
 
 @dataclass(frozen=True, eq=False)
 class Power(Form):
@@ -58,9 +55,6 @@ class Power(Form):
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return (((values - middle) / half) ** self.power)[..., None]
-
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
-        return np.linspace(low, high, 3 if self.power == 1 else 13)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +97,3 @@ class Stretches(Form):
         """Return the visible part of each stretch, shape (n, p)."""
         begun, ended = (self.response(values[..., None] - np.array(edges)) for edges in (self.first, self.last))
         return np.asarray(begun - ended, dtype=np.float64)
-
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
-        edges = np.array([[a - 0.5, a + 0.5, b - 0.5, b + 0.5] for a, b in zip(self.first, self.last, strict=True)])
-        return np.unique(np.clip(np.concatenate([[low], edges.ravel(), [high]]), low, high))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.bank import Bank
-    from dbbstation.inference.model_comparison import Cause
+    from dbbstation.inference.model_comparison import Cause, Variant
     from dbbstation.inference.settled import Settled
 
 POWER = 0.9
@@ -46,7 +46,7 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
         key = ", ".join(sorted(followed_by(settled.bank, cause.name)))
         if key not in asked or bends > len(asked[key].variants[0].columns):
             asked[key] = cause
-    found = [_detectable(settled, key, cause) for key, cause in asked.items()]
+    found = [_over_variables(settled, key, cause) for key, cause in asked.items()]
     return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
 
 
@@ -60,14 +60,8 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
         if whole < (NOTHING * settled.noise.innovation) ** 2 * len(white):
             continue
         shown = np.diag(settled.comparison.beside((), variant.columns)) * settled.noise.innovation**2
-        seen, size = float(variant.plausible**2 @ shown) / whole, None
-        if seen >= ENTIRELY:
-            products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)
-            size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
-        concealed = float(np.clip(1.0 - seen, 0.0, 1.0))
-        found.append(
-            Detectable(cause.name, None if size is None else MARGIN * size, concealed, laws[cause.name].confirm)
-        )
+        seen = float(variant.plausible**2 @ shown) / whole
+        found.append(_detectable(settled, cause, variant, samples, seen, cause.name, laws[cause.name].confirm))
     return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
 
 
@@ -80,20 +74,33 @@ def _family(bank: Bank, name: str) -> Family | None:
     return None if of is None else of.family
 
 
-def _detectable(settled: Settled, follows: str, cause: Cause) -> Detectable:
+def _over_variables(settled: Settled, follows: str, cause: Cause) -> Detectable:
     kept, variant = settled.channel.kept, cause.variants[0]
     samples = settled.bank.samples(variant.columns)[kept]
     samples = samples - samples.mean(axis=0)
     base = settled.channel.base.samples[kept]
     axes = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))[0]
     rest = samples - axes @ (axes.T @ samples)
-    shown = float(np.sum(rest**2) / max(float(np.sum(samples**2)), 1e-300))
-    if shown < ENTIRELY:
-        return Detectable(follows, None, 1.0)
-    others = [m for m in settled.best.members if m.cause.name != cause.name]
-    products = settled.comparison.beside(others, variant.columns)
-    size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
-    return Detectable(follows, None if size is None else MARGIN * size, max(1.0 - shown, 0.0))
+    return _detectable(
+        settled, cause, variant, samples, float(np.sum(rest**2) / max(np.sum(samples**2), 1e-300)), follows
+    )
+
+
+def _detectable(
+    settled: Settled,
+    cause: Cause,
+    variant: Variant,
+    samples: NDArray[np.float64],
+    shown: float,
+    follows: str,
+    confirm: str | None = None,
+) -> Detectable:
+    """Return the size from which a form is seen, given the share of its squares that the base leaves."""
+    size = None
+    if shown >= ENTIRELY:
+        products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)
+        size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
+    return Detectable(follows, None if size is None else MARGIN * size, float(np.clip(1.0 - shown, 0.0, 1.0)), confirm)
 
 
 def least_seen(

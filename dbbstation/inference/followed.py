@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import logsumexp
@@ -256,23 +256,6 @@ class ClassGain:
 
 MOST_PARTS = 0.5
 """Share of the held-out rows that must be in parts with a gain: what happened in a few parts goes on in no others."""
-
-
-class PartGains(Protocol):
-    """Held-out gains of classes."""
-
-    @property
-    def rows(self) -> Sequence[NDArray[np.bool_]]:
-        """Return the parts' rows, shape (n,) each."""
-
-    def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """Return the gain of everything over some variables; None: everything."""
-
-    def but_for(self, ignored: Collection[str]) -> PartGains:
-        """Return the same without effects of some variables alone, such as time."""
-
-    def errors_with(self, wanted: Collection[str]) -> list[float]:
-        """Return each part's rms error with effects of these variables alone; none given: with everything."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,9 +36,9 @@ class Form(ABC):
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return each amplitude's curve at values, shape (..., p)."""
 
-    @abstractmethod
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Return printed places between extremes, shape (q,)."""
+        """Return printed places between extremes, shape (q,); by default three, which a straight line needs."""
+        return np.linspace(low, high, 3)
 
     def text(self, unit: str) -> str:
         """Return the form's distinction in the variable's unit; may be empty."""
@@ -230,9 +230,6 @@ class Proportional(Form):
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         return (values / self.unit)[..., None]
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
-        return np.linspace(low, high, 3)
-
 
 @dataclass(frozen=True, eq=False)
 class Plane(Form):
@@ -254,9 +251,6 @@ class Plane(Form):
         """Return coordinates in their unit; values of shape (n, c)."""
         scaled = values / self.unit
         return np.column_stack([scaled, np.ones(len(scaled))]) if self.constant else scaled
-
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
-        return np.linspace(low, high, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,9 +304,6 @@ class Spring(Form):
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return one, and the distance in 100 mm; values of shape (n,)."""
         return np.column_stack([np.ones(len(values)), (values - self.about) / 100.0])
-
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
-        return np.linspace(low, high, 3)
 
 
 RINGS_FOR = 4.0

@@ -26,8 +26,8 @@ from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from dbbstation.inference.chosen_anew import ChosenAnew
-    from dbbstation.inference.followed import ClassGain, PartGains, VariableClass
+    from dbbstation.inference.chosen_anew import ChosenAnew, KnownGains
+    from dbbstation.inference.followed import ChosenWithoutParts, ClassGain, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Detectable
     from dbbstation.inference.settled import Settled
@@ -42,7 +42,7 @@ WAYS = ("value", "direction", "late", "in_time")
 def levels_of(
     settled: Settled,
     left: LeftOver,
-    parts: PartGains | None,
+    parts: ChosenWithoutParts | KnownGains | None,
     held_out: HeldOutError | ChosenAnew | None,
     matters: float | None = None,
     *,
@@ -130,7 +130,7 @@ def _followed(
     settled: Settled,
     one: VariableClass,
     probabilities: VariableProbabilities,
-    parts: PartGains | None,
+    parts: ChosenWithoutParts | KnownGains | None,
     held_out: HeldOutError | ChosenAnew | None,
 ) -> Followed:
     probability = min(probabilities.of(each) for each in one.each)

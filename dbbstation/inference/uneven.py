@@ -87,11 +87,7 @@ def has_long_tails(new: NDArray[np.float64]) -> bool:
     if not np.any(new):
         return False
     scaled = new / np.sqrt(np.mean(np.square(new)))
-    weight, tails = most_probable_tails(scaled)
-    # Under the weights that belong to it, the scale of Student's t is the weighted mean of squares.
-    scale = float(np.sqrt(np.mean(np.square(weight * scaled))))
-    student = float(np.sum(log_student(scaled / scale, tails))) - len(new) * float(np.log(scale))
-    return student > -0.5 * len(new)
+    return max(student_likelihood(scaled, tails) for tails in TAILS) > -0.5 * len(new)
 
 
 def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:

@@ -392,8 +392,8 @@ def test_a_spent_search_that_meets_an_earlier_outcome_is_judged_in_its_columns(r
     )
     first = settle(whole, look=False, static=False, beginnings=(Beginning.NOTHING,))
     monkeypatch.setattr(settling, "_meets", lambda *_: True)
-    options = settling._Options(look=False, static=False, most_expanded=8, most_looks=1, in_time=True, thorough=True)
-    spent = settling._from(Bank(whole), (), {}, Beginning.NOTHING, options, lambda _: None, SearchWork(1.0), [first])
+    how = settling._How(look=False, static=False, work=SearchWork(1.0))
+    spent = settling._from(Bank(whole), (), {}, Beginning.NOTHING, how, [first])
     assert first.best.members[0].columns.max() >= Bank(whole).count
     assert spent.stopped
     assert spent.log_probability == first.log_probability

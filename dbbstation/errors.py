@@ -102,6 +102,11 @@ class InputError(StationError):
             lines.append(f"and {len(self.problems) - MOST_LISTED} more faults")
         super().__init__("\n".join(lines))
 
+    @classmethod
+    def of(cls, file: object, what: str, remedy: str = "", line: int = 0, column: int = 0) -> InputError:
+        """Return the error of one fault."""
+        return cls([Problem(str(file), line, column, what, remedy)])
+
 
 class ArgumentError(StationError, ValueError):
     """A value that a task does not take; `where` is the parameter."""

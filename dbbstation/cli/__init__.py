@@ -93,9 +93,9 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: A
       dbbstation COMMAND --help                        what a command does, with examples
     """  # noqa: D301 - \b is click's mark for "do not wrap"
     if settings is not None and not os.path.isfile(settings):  # noqa: PTH113 - before anything else is imported
-        from dbbstation.errors import InputError, Problem
+        from dbbstation.errors import InputError
 
-        raise InputError([Problem(settings, 0, 0, "there is no such file", "check the path")])
+        raise InputError.of(settings, "there is no such file", "check the path")
 
 
 def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> None:

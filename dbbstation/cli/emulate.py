@@ -105,7 +105,7 @@ def emulate(
 
 
 def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, seed: int) -> MachineModel:
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
     from dbbstation.files.formats.machine import machine_data, machine_parts
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
@@ -117,12 +117,12 @@ def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, see
     model = read_model(file, every_source(source_files)).model.of_the_machine()
     if machine_data(machine_parts(model.machine)) != machine_data(machine_parts(machine)):
         what = f"its nominal machine ({model.machine.name}) is not the one given with --machine ({machine.name})"
-        raise InputError([Problem(str(file), 0, 0, what, "give the machine file that the model was made for")])
+        raise InputError.of(file, what, "give the machine file that the model was made for")
     return model
 
 
 def _programs(folder: Path) -> Callable[[str], CommandedPath]:
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
     from dbbstation.files.gateway import content_of
     from dbbstation.station.programs import read_toolpath
     from dbbstation.virtual.path import path_of
@@ -130,7 +130,7 @@ def _programs(folder: Path) -> Callable[[str], CommandedPath]:
     def read(name: str) -> CommandedPath:
         path = folder / name
         if path.parent != folder or not path.is_file():
-            raise InputError([Problem(str(path), 0, 0, "there is no such program", f"name a file in {folder}")])
+            raise InputError.of(path, "there is no such program", f"name a file in {folder}")
         return path_of(read_toolpath(path, content_of(path)))
 
     return read

@@ -313,7 +313,7 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
 
 
 def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> list[str]:
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
     from dbbstation.tasks.importing.plausible import CHANCE
     from dbbstation.tasks.importing.runs import chance_of_runs
 
@@ -329,7 +329,7 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
         "as they are"
     )
     if not asker.terminal:
-        raise InputError([Problem(runs[0].file, 0, 0, what, remedy)])
+        raise InputError.of(runs[0].file, what, remedy)
     if not click.confirm(printable(f"{what}. Are they raw all the same"), err=True):
         raise click.UsageError(remedy)
     return [f"centres: {what}; they were confirmed to be raw"]

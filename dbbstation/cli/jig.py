@@ -185,7 +185,7 @@ def holders(
       dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --before plate.yaml --out plate-2026.yaml
     """
     from dbbstation.cli.output import print_result
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.plan.repeatability import repeatability
     from dbbstation.results.jig import HoldersResult
@@ -202,9 +202,7 @@ def holders(
         for name, places in _by_holder(rows, holder, given.sheet).items():
             found[name] = repeatability(places, cmm_repeatability_um)
     except ValueError as error:
-        raise InputError(
-            [Problem(str(given.sheet), 0, 0, str(error), "put each ball up at least twice, ten times is usual")]
-        ) from error
+        raise InputError.of(given.sheet, str(error), "put each ball up at least twice, ten times is usual") from error
     if before is not None and out is not None:
         _write_holders(found, before, out, given.sheet, force=force)
     if as_json:
@@ -217,7 +215,7 @@ def holders(
 
 def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
     from dbbstation.cli.provenance import provenance
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
     from dbbstation.files.formats.jig import HolderSchema, checked_jig, jig_text, read_jig
     from dbbstation.files.provenance import write_table
 
@@ -225,7 +223,7 @@ def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, s
     unknown = [name for name in found if name not in old.holders]
     if unknown:
         what = f"the jig has no holder {', '.join(unknown)}"
-        raise InputError([Problem(str(before), 0, 0, what, f"its holders: {', '.join(old.holders)}")])
+        raise InputError.of(before, what, f"its holders: {', '.join(old.holders)}")
     scatter = {name: float(f"{one.together.s_um:.4g}") for name, one in found.items()}
     holders = {name: HolderSchema.model_construct(repeatability_um=s_um) for name, s_um in scatter.items()}
     new = checked_jig(jig_text(old.model_copy(update={"holders": {**old.holders, **holders}})), str(sheet))
@@ -283,16 +281,14 @@ def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str
     """Return centres by holder and place, shape (n, axes) each [µm]."""
     import numpy as np
 
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
 
     groups: dict[tuple[str, object], list[tuple[float, ...]]] = {}
     for row in rows:
         name = row.holder or holder
         if not name:
             what = "nothing says which holder this row is of"
-            raise InputError(
-                [Problem(str(sheet), row.line, 0, what, "say it with --columns holder=NAME, or --holder for all")]
-            )
+            raise InputError.of(sheet, what, "say it with --columns holder=NAME, or --holder for all", line=row.line)
         centre = tuple(1e3 * value for value in row.centre_mm if np.isfinite(value))
         groups.setdefault((name, row.name or row.bore), []).append(centre)
     found: dict[str, list[Any]] = {}

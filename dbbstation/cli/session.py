@@ -317,7 +317,7 @@ def _missing(read: SessionFolder) -> list[str]:
 def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
     import difflib
 
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError
     from dbbstation.files.recordings.entries import RunState
     from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session_writer import SessionWriter
@@ -327,7 +327,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
         if run not in entries:
             near = difflib.get_close_matches(run, entries, n=1, cutoff=0.6)
             remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"
-            raise InputError([Problem(str(folder), 0, 0, f"the session has no run {run}", remedy)])
+            raise InputError.of(folder, f"the session has no run {run}", remedy)
         entry = entries[run]
         if accepted and not reason and entry.state is not RunState.RECORDING:
             reason = _reason_for(run, writer.session.unusable(entry))

@@ -6,7 +6,7 @@ import csv
 import io
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import is_number
 from dbbstation.text.printable import printable
 
@@ -66,7 +66,5 @@ def csv_rows(
         except csv.Error as error:
             line = first_line - 1 + reader.line_num
             what = f"a cell has more than {csv.field_size_limit():,} characters"
-            raise InputError(
-                [Problem(file, line, 0, what, "check its quotation marks and which file it is")]
-            ) from error
+            raise InputError.of(file, what, "check its quotation marks and which file it is", line=line) from error
         yield first_line - 1 + reader.line_num, cells

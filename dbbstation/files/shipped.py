@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 
 
 def shipped_folder(name: str) -> Path:
@@ -17,9 +17,7 @@ def shipped_folder(name: str) -> Path:
     for folder in (package / name, package.parent / name):
         if folder.is_dir():
             return folder
-    raise InputError(
-        [Problem(str(package / name), 0, 0, "this folder of the installation is missing", "install dbbstation again")]
-    )
+    raise InputError.of(package / name, "this folder of the installation is missing", "install dbbstation again")
 
 
 def package_text(name: str) -> str:

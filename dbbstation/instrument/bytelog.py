@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
-from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.errors import InputError, OutputError
 from dbbstation.files.gateway import opened
 from dbbstation.files.inputs import note_read
 from dbbstation.files.source_text import lines_of, unreadable
@@ -132,7 +132,7 @@ def read_byte_log(path: Path) -> Iterator[Chunk]:
         t_s = float(match[1]) if match is not None else math.inf
         if match is None or t_s > _LONGEST_S:
             remedy = "every line is: seconds, < or >, bytes in hexadecimal"
-            raise InputError([Problem(str(path), number, 1, "this line of the byte log cannot be read", remedy)])
+            raise InputError.of(path, "this line of the byte log cannot be read", remedy, line=number, column=1)
         direction: Literal["<", ">"] = "<" if match[2] == "<" else ">"
         yield Chunk(t_s, direction, bytes.fromhex(match[3]))
 
@@ -153,5 +153,5 @@ def _lines(path: Path) -> Generator[tuple[int, str]]:
     except OSError as error:
         raise InputError([unreadable(path, error)]) from error
     except UnicodeDecodeError:
-        raise InputError([Problem(str(path), number, 0, "not UTF-8 text, so no byte log")]) from None
-    raise InputError([Problem(str(path), 1, 1, f"not a byte log: the first line is not {_HEAD!r}")])
+        raise InputError.of(path, "not UTF-8 text, so no byte log", line=number) from None
+    raise InputError.of(path, f"not a byte log: the first line is not {_HEAD!r}", line=1, column=1)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 from dbbstation.nc.registry import dialect_of_file
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.plan.circle import FULL_TURN_DEG
@@ -64,7 +64,7 @@ def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.fl
             f"its longest move at feed takes {end_s - begin_s:.2f} s, {2.0 * missing_deg:.0f} degrees too little for "
             f"the circle at {circle.feed_mm_min:g} mm/min"
         )
-        raise InputError([Problem(toolpath.name, 0, 0, what, "name the program that this run was made with")])
+        raise InputError.of(toolpath.name, what, "name the program that this run was made with")
     poses = toolpath.at_time(np.clip((begin_s + end_s) / 2.0 + after_middle_s, begin_s, end_s))
     _check_near(toolpath, poses, circle, phi_deg)
     return poses
@@ -78,7 +78,7 @@ def _arc_s(toolpath: Toolpath) -> tuple[float, float]:
     longest = int(np.argmax(np.bincount(stretch, weights=lasts)))
     rows = np.flatnonzero((stretch == longest) & ~stops)
     if len(rows) == 0:
-        raise InputError([Problem(toolpath.name, 0, 0, "this program has no moves at feed", "name the run's program")])
+        raise InputError.of(toolpath.name, "this program has no moves at feed", "name the run's program")
     end_s = toolpath.end_s
     return float(end_s[rows[0]] - lasts[rows[0]]), float(end_s[rows[-1]])
 
@@ -98,4 +98,4 @@ def _check_near(
             theta = float(circle.theta_deg(phi_deg[sample : sample + 1])[0] % FULL_TURN_DEG)
             what = f"it commands {worst[sample]:.3f} {unit} off the plan's circle at {theta:.1f} degrees"
             remedy = "name the program of this test and direction"
-            raise InputError([Problem(toolpath.name, 0, 0, what, remedy)])
+            raise InputError.of(toolpath.name, what, remedy)

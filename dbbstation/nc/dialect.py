@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 from unicodedata import normalize
 
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, StationError
 from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
@@ -103,5 +103,5 @@ class Dialect(ABC):
         if not path.is_move.any():
             if any(said.startswith(COMPENSATED) for said in path.text.values()):
                 raise already_compensated(name, "says its header")
-            raise InputError([Problem(name, 0, 0, "this program moves nothing", "check that it is the file you mean")])
+            raise InputError.of(name, "this program moves nothing", "check that it is the file you mean")
         return path

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, StationError
 from dbbstation.files.formats.bar import write_bar
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
 from dbbstation.service.bar_reading import DRIFT, bar_file, read_on_calibrator
@@ -127,10 +127,10 @@ class BarCalibration:
             )
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            raise InputError([Problem("bar", 0, 0, f"{'.'.join(map(str, first['loc']))}: {first['msg']}")]) from error
+            raise InputError.of("bar", f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
         except ValueError as error:
             what = f"{error}; `dbbstation bar --resolution-um` takes the last digit of the display"
-            raise InputError([Problem("bar", 0, 0, what)]) from error
+            raise InputError.of("bar", what) from error
         write_bar(path, file)
         drifted = abs(found.drift_mm) > DRIFT * file.uncertainty_mm
         long_um = 1e3 * (found.mean_mm - file.length_mm)

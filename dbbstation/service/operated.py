@@ -233,7 +233,7 @@ def read_operated(path: Path) -> Operated:
         InputError: every fault of it and its files.
     """
     if not path.is_file():
-        raise InputError([Problem(str(path), 0, 0, "there is no such file", "check the path")])
+        raise InputError.of(path, "there is no such file", "check the path")
     job = read_job(path)
     if faults := instrument_faults(path):
         raise InputError(faults)

@@ -112,7 +112,7 @@ def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
     if file.fmu is not None:
         fmu = (path.parent / file.fmu).absolute()
         if fault := fault_of_fmu(fmu):
-            raise InputError([Problem(str(path.parent / file.fmu), 0, 0, fault, "name another FMU")])
+            raise InputError.of(path.parent / file.fmu, fault, "name another FMU")
         return FmuSimulator(fmu, file.variables, ports, tuple(file.outputs), file.time_limit_s)
     python = path.parent / str(file.python)
     simulator_of(python)
@@ -138,12 +138,12 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
         raise InputError(faults)
     kind, place = found[0].kind, found[0].place
     if isabstract(kind):
-        raise InputError([Problem(place.file, place.line, 0, f"{kind.__name__} lacks simulate", CONTRACT)])
+        raise InputError.of(place.file, f"{kind.__name__} lacks simulate", CONTRACT, line=place.line)
     try:
         return kind()
     except FOREIGN as error:
         line = line_in(error, place.file) or place.line
-        raise InputError([Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT)]) from error
+        raise InputError.of(place.file, f"{kind.__name__}: {in_words(error)}", CONTRACT, line=line) from error
 
 
 def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:

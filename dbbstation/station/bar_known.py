@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -49,4 +49,4 @@ def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: f
         what = f"the bar was last on its calibrator {age_h:.0f} h ago, {largest_age_h:g} h are allowed"
     else:
         return
-    raise InputError([Problem("bar", 0, 0, what, _REMEDY)])
+    raise InputError.of("bar", what, _REMEDY)

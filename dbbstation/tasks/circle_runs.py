@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
-from dbbstation.errors import InputError, Problem, TraceError
+from dbbstation.errors import InputError, TraceError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import judge_session
 from dbbstation.files.recordings.session import SessionFolder, opened
@@ -77,7 +77,7 @@ def load_circles(
         warnings += _many(session, used)
     if not circles:
         places = ", ".join(str(session.folder) for session in sessions)
-        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept a run, or exclude fewer tests")])
+        raise InputError.of(places, "no accepted run is left", "accept a run, or exclude fewer tests")
     return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
 
 

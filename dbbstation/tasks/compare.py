@@ -6,7 +6,7 @@ import os
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
@@ -66,7 +66,7 @@ def compare(
     one, other = (load(each, tests=tests, exclude=exclude, progress=progress, stop=stop) for each in (a, b))
     if set(one.sessions.values()) == set(other.sessions.values()):
         what = f"this is the same session as {os.fspath(a)}, byte for byte"
-        raise InputError([Problem(os.fspath(b), 0, 0, what, "give two sessions")])
+        raise InputError.of(os.fspath(b), what, "give two sessions")
     for name, recorded in (("A", one), ("B", other)):
         telling.note(*(f"{name}: {warning}" for warning in recorded.warnings))
     candidates = sources_named(default_candidates(known_sources()))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dbbstation import __version__
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import model_text
 from dbbstation.files.formats.settings import Settings
@@ -105,7 +105,7 @@ def _refuse_other_inputs(inputs: Mapping[str, str]) -> None:
     for path, digest in inputs.items():
         if digest_of(Path(path)) != digest:
             what = "this file is another one where the work is done, or was changed since"
-            raise InputError([Problem(path, 0, 0, what, "let all computers see one folder, under one path")])
+            raise InputError.of(path, what, "let all computers see one folder, under one path")
 
 
 Done = tuple[FleetFound, "dict[str, object]", "dict[str, bytes]"]

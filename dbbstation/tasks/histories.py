@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.computing.processes import each
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import json_of, read_json
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
@@ -87,7 +87,7 @@ def histories_in(
     if not dated:
         first = f": {left_out[0][0]}: {left_out[0][1]}" if left_out else ""
         what = f"none of its {len(found.sessions)} sessions can be used{first}"
-        raise InputError([Problem(str(folder), 0, 0, what, "`dbbstation check SESSION` names every fault")])
+        raise InputError.of(folder, what, "`dbbstation check SESSION` names every fault")
     _check_tests(folder, dated, asked)
     by_session, unlike = _of_one_session(models, dated)
     notes = [*unlike, *notes, *alike]
@@ -291,7 +291,7 @@ def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: TrendO
     unknown = [name for name in (*asked.tests, *asked.exclude) if name not in known]
     if unknown:
         what = f"no session has a test {', '.join(unknown)}"
-        raise InputError([Problem(str(folder), 0, 0, what, f"tests are {', '.join(sorted(known))}")])
+        raise InputError.of(folder, what, f"tests are {', '.join(sorted(known))}")
 
 
 def _of_one_session(

@@ -101,7 +101,7 @@ def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequenc
     unknown = [name for name in (*tests, *exclude) if name not in {o.test for o in sessions.observations}]
     if unknown or not left:
         what = f"no session has a test {', '.join(unknown)}" if unknown else "no accepted run is left"
-        raise InputError([Problem(", ".join(sessions.sessions), 0, 0, what, "name others")])
+        raise InputError.of(", ".join(sessions.sessions), what, "name others")
     return replace(sessions, observations=tuple(left))
 
 
@@ -171,7 +171,7 @@ def load_sessions(
         raise InputError(problems)
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
-        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept a run, or exclude fewer tests")])
+        raise InputError.of(places, "no accepted run is left", "accept a run, or exclude fewer tests")
     under_correction = {session.name: session.machine for session in sessions if session.machine.control is not None}
     observations = [_under(under_correction.get(one.setup.session), one) for one in observations]
     warnings += [
@@ -309,4 +309,4 @@ def check_named(sessions: Sequence[SessionFolder], every: set[str], named: Seque
     if unknown:
         what = f"no session has a test {', '.join(unknown)}{why}"
         known = f"tests are {', '.join(sorted(every))}"
-        raise InputError([Problem(str(sessions[0].folder), 0, 0, what, known)])
+        raise InputError.of(sessions[0].folder, what, known)

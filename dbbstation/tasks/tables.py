@@ -244,7 +244,7 @@ class _Reader:
         if len(rows) < FEWEST_ROWS:
             file = self._files[0]
             what = f"{len(rows)} rows with all values are too few to compare, {FEWEST_ROWS} are needed"
-            raise InputError([Problem(file.file, file.header, 0, what, "record more")])
+            raise InputError.of(file.file, what, "record more", line=file.header)
         kept = {name: column[rows] for name, column in values.items()}
         self._refuse_constant(kept[asked.measured], kept[asked.simulated])
         variables = [self._variable(name, kept[name]) for name in chosen]
@@ -334,7 +334,7 @@ class _Reader:
             return
         file, size = self._files[0], f"{float(np.mean(apart)):.6g} {self._unit}".strip()
         what = f"`{self._asked.measured}` less `{self._asked.simulated}` is {size} in every row: no difference is left to explain"
-        raise InputError([Problem(file.file, file.header, 0, what, "check that these are the columns that you mean")])
+        raise InputError.of(file.file, what, "check that these are the columns that you mean", line=file.header)
 
     def _is_numeric(self, name: str, column: NDArray[np.float64]) -> bool:
         bad = sum(len(file.faults_of(name)) for file in self._files)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 
 _PARAMETER = re.compile(r"\s*(\d+)\s+([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*")
 _TOOL_WORD = re.compile(r"([A-Z])\s*([-+]?\d+(?:\.\d*)?|[-+]?\.\d+)")
@@ -20,15 +20,13 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
     for number, line in enumerate(text.splitlines(), 1):
         match = _PARAMETER.fullmatch(line)
         if match is None and line.strip():
-            raise InputError(
-                [Problem(file, number, 1, "no line of a parameter file", "it needs a number and its value")]
+            raise InputError.of(
+                file, "no line of a parameter file", "it needs a number and its value", line=number, column=1
             )
         if match is not None:
             found[int(match[1])] = float(match[2])
     if not found:
-        raise InputError(
-            [Problem(file, 0, 0, "no parameter in it", "name LinuxCNC's parameter file, such as linuxcnc.var")]
-        )
+        raise InputError.of(file, "no parameter in it", "name LinuxCNC's parameter file, such as linuxcnc.var")
     return found
 
 
@@ -45,10 +43,10 @@ def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
         if not said.strip():
             continue
         if "T" not in words or _TOOL_WORD.sub("", said).strip():
-            raise InputError(
-                [Problem(file, number, 1, "no line of a tool table", "it needs T and words such as Z52.1")]
+            raise InputError.of(
+                file, "no line of a tool table", "it needs T and words such as Z52.1", line=number, column=1
             )
         found[int(words["T"])] = words
     if not found:
-        raise InputError([Problem(file, 0, 0, "no tool in it", "name LinuxCNC's tool table, such as tool.tbl")])
+        raise InputError.of(file, "no tool in it", "name LinuxCNC's tool table, such as tool.tbl")
     return found

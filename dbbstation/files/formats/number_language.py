@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError
 
 NUMBER = r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
 """A number as files hold it, as a regular expression. `float` takes digits of every script and `_` as well, NumPy does not."""
@@ -36,9 +36,7 @@ class NumberLanguage:
     def __post_init__(self) -> None:
         if self.decimal == self.separator:
             what = "the decimal sign and the separator of columns are both a comma"
-            raise InputError(
-                [Problem("numbers", 0, 0, what, "give `;` or a tab as the separator, or a dot in numbers")]
-            )
+            raise InputError.of("numbers", what, "give `;` or a tab as the separator, or a dot in numbers")
 
     def number(self, cell: str) -> float:
         """Return the number of a cell, or nan."""

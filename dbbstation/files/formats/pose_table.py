@@ -57,7 +57,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
         if any(sign in name for name in names for sign in SEPARATORS if sign != language.separator):
             remedy += f"; {language.text}: {ELSE}"
-        raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
+        raise InputError.of(path, f"no column {', '.join(missing)}", remedy, line=1, column=1)
     faults: list[Problem] = []
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
@@ -76,7 +76,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     if faults:
         raise InputError(faults[:MOST_FAULTS])
     if not rows:
-        raise InputError([Problem(str(path), 1, 1, "no pose follows the header", "give one pose per line")])
+        raise InputError.of(path, "no pose follows the header", "give one pose per line", line=1, column=1)
     return PoseTable(np.array(rows), others)
 
 

@@ -81,7 +81,7 @@ def amend(
         found += _logged_otherwise(folder, store, session, reason, made)
         if not found:
             what = "nothing differs from what was sealed"
-            raise InputError([Problem(str(folder), 0, 0, what, "give --plan or --machine, or change the file first")])
+            raise InputError.of(folder, what, "give --plan or --machine, or change the file first")
         details = replace(session, seal=sealed_over(now, runs), amendments=(*session.amendments, *found))
         for name, content in new.items():
             write_bytes(folder / copy_name(name, now[name]), content, force=True, rewrites=True)
@@ -125,7 +125,7 @@ def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[Sessi
         raise InputError(faults)
     if session.seal is None:
         what = "the session carries no seal: there is nothing to be amended"
-        raise InputError([Problem(str(folder), 0, 0, what, f"`dbbstation session seal {folder}` seals it as it is")])
+        raise InputError.of(folder, what, f"`dbbstation session seal {folder}` seals it as it is")
     return session, session.seal
 
 

@@ -86,7 +86,7 @@ def read_sheet(
     said = _said_unit(found.get("x", ""), foreign.units)
     if unit is not None and said and said != unit:
         what = f"the sheet says that {found['x']} is in {said}, and --unit says {unit}"
-        raise InputError([Problem(str(path), table.header, 0, what, "leave --unit out, or correct the sheet")])
+        raise InputError.of(path, what, "leave --unit out, or correct the sheet", line=table.header)
     unit = unit or said or "mm"
     missing = [key for key in ("x", "y") if key not in found]
     faults = [

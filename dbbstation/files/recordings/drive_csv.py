@@ -61,7 +61,7 @@ class DriveFile:
             if force_per_ampere_n is None or CURRENT not in self.numbers:
                 what = f"there is `{CURRENT}` and no `{FORCE}`" if force is None else f"there is no `{CURRENT}`"
                 remedy = "say with --force-per-ampere how many newtons an ampere is: 2 pi torque constant / lead"
-                raise InputError([Problem(self.file, self.line, 0, what, remedy if force is None else "")])
+                raise InputError.of(self.file, what, remedy if force is None else "", line=self.line)
             force = force_per_ampere_n * self.numbers[CURRENT]
         return DriveRecording(self.file, self.numbers[TIME], self.numbers[POSITION], force)
 
@@ -94,7 +94,7 @@ def parse_drive(text: str, file: str) -> DriveFile:
     lines = numbered_lines(text)
     if not lines:
         what, remedy = "there is no line that names the columns", f"begin with `{TIME},{POSITION},{FORCE}`"
-        raise InputError([Problem(file, 0, 0, what, remedy)])
+        raise InputError.of(file, what, remedy)
     header, head = lines[0]
     names = [name.strip() for name in head.split(",")]
     faults: list[Problem] = []

@@ -70,10 +70,10 @@ def files_of(folder: Path) -> FolderFiles:
 
     if not folder.is_dir():
         what = "there is no such folder" if not folder.exists() else "this is no folder"
-        raise InputError([Problem(str(folder), 0, 0, what, "name a folder that holds session folders")])
+        raise InputError.of(folder, what, "name a folder that holds session folders")
     if (folder / SESSION_FILE).is_file():
         what = "this folder is one session, a history is of a folder that holds several"
-        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {real_path(folder).parent}")])
+        raise InputError.of(folder, what, f"name the folder around it: {real_path(folder).parent}")
     look(folder, 1)
     if not sessions:
         raise InputError([_no_sessions(folder)])

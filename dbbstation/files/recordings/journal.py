@@ -13,7 +13,7 @@ import zlib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import set_read_only
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import PART, RunFile, parse_run
@@ -211,7 +211,7 @@ class RunWriter:
             data = self._content()
         except OSError as error:
             why, remedy = refusal(error)
-            raise InputError([Problem(str(self.path), 0, 0, f"cannot be read: {why}", remedy)]) from error
+            raise InputError.of(self.path, f"cannot be read: {why}", remedy) from error
         return parse_run(data, str(self.path))
 
     def seal(self, counts: Counts | None = None) -> str:

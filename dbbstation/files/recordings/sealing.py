@@ -211,10 +211,10 @@ def _runs(text: str, path: Path) -> Sequence[MappingNode]:
     runs = _entry(root, "runs")
     if not isinstance(runs, SequenceNode) or not runs.value:
         what = "the session file lists no runs"
-        raise InputError([Problem(str(path), 0, 0, what, "name each recording under `runs`")])
+        raise InputError.of(path, what, "name each recording under `runs`")
     if root.flow_style:
         what = "the whole session file stands in brackets"
-        raise InputError([Problem(str(path), 1, 1, what, "write one key a line")])
+        raise InputError.of(path, what, "write one key a line", line=1, column=1)
     return list(runs.value)
 
 

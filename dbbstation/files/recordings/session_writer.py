@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
-from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import remove_leftovers, write_bytes
 from dbbstation.files.recordings.entries import CommandedProgram, Note, RunEntry, RunState
 from dbbstation.files.recordings.event_log import EVENTS_FILE
@@ -158,7 +158,7 @@ class SessionWriter:
         """
         if test not in self._session.plan.tests or direction not in self._session.plan.tests[test].directions:
             what = f"the plan has no run {test} {direction}"
-            raise InputError([Problem(str(self._session.plan_path), 0, 0, what, "choose a test of the plan")])
+            raise InputError.of(self._session.plan_path, what, "choose a test of the plan")
         if self._session.seal is None:
             self._seal()
         repeat = self.next_repeat(test, direction)
@@ -233,12 +233,12 @@ class SessionWriter:
             (name, direction) for name, test in self._session.plan.tests.items() for direction in test.directions
         }:
             what = "the file does not say which run of this plan it is"
-            raise InputError([Problem(file, 1, 0, what, "its first lines name test, direction and repeat")])
+            raise InputError.of(file, what, "its first lines name test, direction and repeat", line=1)
         if any(
             (run.test, run.direction, run.repeat) == (found.test, found.direction, found.repeat) for run in self.runs
         ):
             what = f"the session lists another run {found.label}"
-            raise InputError([Problem(file, 1, 0, what, "give one of them another repeat")])
+            raise InputError.of(file, what, "give one of them another repeat", line=1)
         digest = sha256_of(path)
         entry = replace(found, state=RunState.COMPLETE, sha256=digest)
         self._session.load(entry)

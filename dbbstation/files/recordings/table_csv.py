@@ -98,7 +98,7 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
     """
     lines = numbered_lines(text)
     if not lines:
-        raise InputError([Problem(file, 0, 0, "the file has no columns and no rows", "begin with a line of names")])
+        raise InputError.of(file, "the file has no columns and no rows", "begin with a line of names")
     header, head = lines[0]
     separator = numbers.separator if numbers else max(SEPARATORS, key=head.count)
     names = [name.strip() for name in next(csv_rows([head], separator, file, first_line=header))[1]]

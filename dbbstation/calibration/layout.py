@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Motion
@@ -44,7 +45,7 @@ class ParameterSet:
         """Return whether a run takes its values from this set."""
         return self.source.shared_by(motion) == self.shared and not self.source.of_currents
 
-    def fitted(self, x: NDArray[np.float64]) -> Fitted:
+    def fitted(self, x: Floats) -> Fitted:
         """Return the source with its values of x, shape (k,)."""
         return Fitted(self.source, x[self.columns], self.shared)
 
@@ -61,7 +62,7 @@ class Layout:
     machine: Machine
     terms: tuple[ParameterSet, ...]
     known: Columns
-    nominal: NDArray[np.float64]
+    nominal: Floats
 
     @property
     def names(self) -> tuple[tuple[str, str, str], ...]:
@@ -80,12 +81,12 @@ class Layout:
         return amplitudes, np.array([number for number, shape in numbered if shape], dtype=np.int64)
 
     @property
-    def limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def limits(self) -> tuple[Floats, Floats]:
         """Return limits of every column, shape (k,) each: shapes keep to their grid and one step beyond."""
         each = [p.limits for term in self.terms for p in term.parameters]
         return np.array([low for low, _ in each]), np.array([high for _, high in each])
 
-    def held_at(self, x: NDArray[np.float64], columns: NDArray[np.int64]) -> Layout:
+    def held_at(self, x: Floats, columns: NDArray[np.int64]) -> Layout:
         """Return the layout with some columns known as in x, shape (k,)."""
         nominal, prior = self.nominal.copy(), self.known.prior.copy()
         nominal[columns], prior[columns] = x[columns], HELD * self.known.scale[columns]
@@ -96,7 +97,7 @@ class Layout:
         """Return which columns tolerances bound, shape (k,)."""
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 
-    def formula_variance(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def formula_variance(self, x: Floats) -> Floats:
         """Return every column's variance by its formula's inaccuracy, shape (k,)."""
         share = [
             0.0 if parameter.grid or term.source.name in GEOMETRY else term.source.form_uncertainty
@@ -110,7 +111,7 @@ class Layout:
         """Return what all sources of the reading need."""
         return frozenset[Need]().union(*(term.source.needs for term in self.terms if not term.source.of_currents))
 
-    def model(self, x: NDArray[np.float64]) -> MachineModel:
+    def model(self, x: Floats) -> MachineModel:
         """Return the machine model at x, shape (k,)."""
         return MachineModel(
             self.machine,
@@ -147,7 +148,7 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
     return Layout(machine, tuple(terms), Columns(np.array(prior), scale, np.array(random, dtype=bool)), nominal)
 
 
-_Stated: TypeAlias = "NDArray[np.float64] | ModelError | None"
+_Stated: TypeAlias = "Floats | ModelError | None"
 """Size that is stated of a set of parameters, shape (p,), None where there is none; or why its source cannot be there."""
 
 

@@ -19,10 +19,9 @@ from dbbstation.trace.loss import lost_samples
 from dbbstation.trace.passes import passes_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.circles.noise import CircleNoise
     from dbbstation.circles.reversals import Harmonic, ReversalStep
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.passes import Passes
@@ -71,7 +70,7 @@ class CircleAnalysis:
     feed_mm_min: tuple[float, float] | None
     noise: CircleNoise
     lost: int
-    residual_um: NDArray[np.float64]
+    residual_um: Floats
 
     @cached_property
     def g_um(self) -> float:
@@ -138,12 +137,12 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
     )
 
 
-def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
+def _without_drift(raw: RawCircle, residual_um: Floats) -> Floats:
     apart = closure_of(raw, residual_um, 0.0)
     return residual_um if apart is None else residual_um - apart.height_um * raw.phi_deg / FULL_TURN_DEG
 
 
-def _extremes(deviation_um: NDArray[np.float64]) -> Deviations:
+def _extremes(deviation_um: Floats) -> Deviations:
     return Deviations(float(deviation_um.max()), float(deviation_um.min()))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from dbbstation.inference.harmonics import continuations, first_order
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 CORNERS = np.geomspace(1.0, 240.0, 33)
 """Corners of the spectrum that are tried, in undulations, from a memory of a sixth of a turn to none that shows."""
@@ -51,21 +51,21 @@ class ContinuedNoise:
         freedoms: degrees of freedom of each, shape (memories,).
     """
 
-    powers: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    freedoms: NDArray[np.float64]
+    powers: Floats
+    weights: Floats
+    freedoms: Floats
 
     @property
-    def usual(self) -> NDArray[np.float64]:
+    def usual(self) -> Floats:
         """Return the geometric mean over memories, shape (low + 1,) [µm²]."""
         return np.asarray(np.exp(self.weights @ np.log(self.powers)))
 
     @property
-    def mean(self) -> NDArray[np.float64]:
+    def mean(self) -> Floats:
         """Return the mean over memories, the variance of slow figures, shape (low + 1,) [µm²]."""
         return np.asarray(self.weights @ self.powers)
 
-    def drawn(self, rng: np.random.Generator, draws: int) -> NDArray[np.float64]:
+    def drawn(self, rng: np.random.Generator, draws: int) -> Floats:
         """Return drawn powers, shape (draws, low + 1) [µm²].
 
         Each draw has one memory and a strength of flat log prior [scaled inverse chi-square; Gelman et al., Bayesian Data
@@ -76,7 +76,7 @@ class ContinuedNoise:
         return np.asarray(self.powers[which] * strength[:, None])
 
 
-def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], freedom: float = 2.0) -> ContinuedNoise:
+def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> ContinuedNoise:
     """Extrapolate the noise of one turn.
 
     Args:
@@ -99,7 +99,7 @@ def continued_noise(below: NDArray[np.float64], above: NDArray[np.float64], free
     return ContinuedNoise(powers, weights / weights.sum(), 2.0 / np.clip(found.variances, least, 1.0))
 
 
-def _processes(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
+def _processes(harmonic: Floats) -> Floats:
     """Return the power of memories and power laws, shape (corners + exponents, h).
 
     At lines 0 and 1 a power law is filtered by the window of one turn.
@@ -110,7 +110,7 @@ def _processes(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.vstack([first_order(harmonic, CORNERS), laws])
 
 
-def _through_a_turn(line: int) -> NDArray[np.float64]:
+def _through_a_turn(line: int) -> Floats:
     """Return the power of laws f^-a from `SLOWEST` at a line, shape (exponents,).
 
     Mean of both rotations, each through sinc², the window of one turn [Priestley, Spectral Analysis and Time Series,

@@ -25,11 +25,10 @@ from dbbstation.circles.strip import strip_widths
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
     from dbbstation.circles.form import FormAndNoise
     from dbbstation.circles.path import Filter
+    from dbbstation.computing.arrays import Floats
 
 CLEAR = 2.0
 """Standard uncertainties from which a drift over the turn counts as form: less is noise."""
@@ -103,7 +102,7 @@ OF_A_CIRCLE = 2
 class _Drawn:
     """Form by samples, shape (n,) [µm], and noise draws about its own and the common least-squares circle."""
 
-    form_um: NDArray[np.float64]
+    form_um: Floats
     alone: DrawnPath
     beside: DrawnPath
 
@@ -152,7 +151,7 @@ def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
     return estimated(paths, range_of, pair.g_least_squares_um)
 
 
-def _filtered(form_um: NDArray[np.float64], chosen: Filter) -> NDArray[np.float64]:
+def _filtered(form_um: Floats, chosen: Filter) -> Floats:
     if not chosen:
         return form_um
     passed = chosen.passed(np.arange(len(form_um) // 2 + 1.0))

@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.form import FormAndNoise
+    from dbbstation.computing.arrays import Floats
 
-    Statistic = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+    Statistic = Callable[[Floats, Floats, Floats], Floats]
 
 DRAWS = 256
 """Paths that are drawn. Their standard deviation is known to 4.5 %."""
@@ -79,24 +80,24 @@ class DrawnPath:
         starts: of sectors among them, shape (s,).
     """
 
-    form_um: NDArray[np.float64]
-    highest_um: NDArray[np.float64]
-    lowest_um: NDArray[np.float64]
-    theta_deg: NDArray[np.float64]
+    form_um: Floats
+    highest_um: Floats
+    lowest_um: Floats
+    theta_deg: Floats
     sigma_um: float
     least: float
     order: NDArray[np.int64]
     starts: NDArray[np.int64]
 
-    def with_form(self, form_um: NDArray[np.float64]) -> DrawnPath:
+    def with_form(self, form_um: Floats) -> DrawnPath:
         """Return the noise with another form in time order, shape (n,) [µm]."""
         return replace(self, form_um=_means(form_um, self.order, self.starts))
 
 
 def drawn_paths(
     apart: FormAndNoise,
-    theta_deg: NDArray[np.float64],
-    passed: NDArray[np.float64],
+    theta_deg: Floats,
+    passed: Floats,
     seed: int,
     taken: Sequence[int] = (0,),
 ) -> tuple[DrawnPath, ...]:
@@ -138,9 +139,7 @@ def drawn_paths(
     return tuple(found)
 
 
-def _sectors(
-    theta_deg: NDArray[np.float64], passed: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _sectors(theta_deg: Floats, passed: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     count = len(theta_deg)
     # Undulations up to which the filter passes a hundredth of the noise's power.
     points = POINTS_PER_UNDULATION * int(np.flatnonzero(passed > PASSED).max(initial=1))
@@ -156,7 +155,7 @@ def _sectors(
     return order, starts, (sector[starts] + 0.5) * (FULL_TURN_DEG / sectors)
 
 
-def _waves(lines: int, at: NDArray[np.int64], count: int) -> NDArray[np.float64]:
+def _waves(lines: int, at: NDArray[np.int64], count: int) -> Floats:
     undulations = np.arange(lines)[:, None]
     angles = undulations * at * (2.0 * np.pi / count)
     share = np.where(undulations > 0, 2.0, 1.0) / count
@@ -165,13 +164,13 @@ def _waves(lines: int, at: NDArray[np.int64], count: int) -> NDArray[np.float64]
 
 @compiled
 def _extremes(
-    noise: NDArray[np.float64],
-    sizes: NDArray[np.float64],
-    waves: NDArray[np.float64],
+    noise: Floats,
+    sizes: Floats,
+    waves: Floats,
     order: NDArray[np.int64],
     edges: NDArray[np.int64],
-    highest: NDArray[np.float64],
-    lowest: NDArray[np.float64],
+    highest: Floats,
+    lowest: Floats,
 ) -> None:
     left = np.empty(len(order))
     for draw in range(len(noise)):
@@ -187,11 +186,11 @@ def _extremes(
             highest[draw, sector], lowest[draw, sector] = high, low
 
 
-def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
+def _means(values: Floats, order: NDArray[np.int64], starts: NDArray[np.int64]) -> Floats:
     return np.asarray(np.add.reduceat(values[order], starts) / np.diff(np.append(starts, len(order))))
 
 
-def _least_share(power_um2: NDArray[np.float64], passed: NDArray[np.float64]) -> float:
+def _least_share(power_um2: Floats, passed: Floats) -> float:
     end = float(np.mean(power_um2[-max(len(power_um2) // 3, 1) :]))
     whole = float(np.sum(power_um2 * passed**2))
     return float(np.sqrt(np.sum(np.minimum(power_um2, end) * passed**2) / whole)) if whole > 0.0 else 1.0
@@ -255,7 +254,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     highest = [_at(angles, path.theta_deg, path.highest_um, -np.inf) for path in paths]
     lowest = [_at(angles, path.theta_deg, path.lowest_um, np.inf) for path in paths]
 
-    def at(size: float, *, noisy: bool) -> NDArray[np.float64]:
+    def at(size: float, *, noisy: bool) -> Floats:
         each = [
             (size * form + (high if noisy else 0.0), size * form + (low if noisy else 0.0))
             for form, high, low in zip(forms, highest, lowest, strict=True)
@@ -269,7 +268,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     if not of_form > 0.0:
         return _Interval(as_read_um, as_read_um, as_read_um, 0.0)
     sigma_um = max(path.sigma_um for path in paths)
-    tried: dict[float, NDArray[np.float64]] = {}
+    tried: dict[float, Floats] = {}
     # Upwards until no draw worth counting shows less than what was read, downwards until none shows more.
     for steps, side in ((STEPS[STEPS > 0.0], -1.0), (STEPS[STEPS < 0.0][::-1], 1.0)):
         for step in steps:
@@ -288,9 +287,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     return _Interval(value, low, high, 0.5 * float(np.interp(value, sizes, spread)))
 
 
-def _at(
-    angles: NDArray[np.float64], theta_deg: NDArray[np.float64], values: NDArray[np.float64], elsewhere: float
-) -> NDArray[np.float64]:
+def _at(angles: Floats, theta_deg: Floats, values: Floats, elsewhere: float) -> Floats:
     if len(angles) == len(theta_deg):
         return values
     spread = np.full((len(values), len(angles)), elsewhere)
@@ -298,29 +295,21 @@ def _at(
     return spread
 
 
-def range_of(
-    outer: NDArray[np.float64], inner: NDArray[np.float64], _theta_deg: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def range_of(outer: Floats, inner: Floats, _theta_deg: Floats) -> Floats:
     """Return the range, shape (draws,)."""
     return np.asarray(outer.max(axis=1) - inner.min(axis=1))
 
 
-def greatest_of(
-    outer: NDArray[np.float64], _inner: NDArray[np.float64], _theta: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def greatest_of(outer: Floats, _inner: Floats, _theta: Floats) -> Floats:
     """Return the greatest outward deviation, shape (draws,)."""
     return np.asarray(outer.max(axis=1))
 
 
-def least_of(
-    _outer: NDArray[np.float64], inner: NDArray[np.float64], _theta: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def least_of(_outer: Floats, inner: Floats, _theta: Floats) -> Floats:
     """Return the greatest inward deviation, shape (draws,)."""
     return np.asarray(-inner.min(axis=1))
 
 
-def farthest_of(
-    outer: NDArray[np.float64], inner: NDArray[np.float64], _theta: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def farthest_of(outer: Floats, inner: Floats, _theta: Floats) -> Floats:
     """Return the greatest deviation, shape (draws,)."""
     return np.asarray(np.maximum(outer.max(axis=1), -inner.min(axis=1)))

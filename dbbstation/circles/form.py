@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.circles.continued import ContinuedNoise
     from dbbstation.circles.pushes import Pushes
+    from dbbstation.computing.arrays import Floats
 
 CHANCE = 0.01
 """Chance at which noise alone has one line anywhere in its spectrum that counts as form."""
@@ -34,13 +35,13 @@ class FormAndNoise:
         continued: the first of these lines, under form, by memory.
     """
 
-    form_um: NDArray[np.float64]
-    power_um2: NDArray[np.float64]
+    form_um: Floats
+    power_um2: Floats
     continued: ContinuedNoise
     pushes: Pushes = NO_TAILS
 
 
-def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
+def form_and_noise(deviation_um: Floats) -> FormAndNoise:
     """Separate a series of deviations.
 
     Noise is measured above 30 undulations per revolution and extrapolated below (`dbbstation.inference.harmonics`),
@@ -76,7 +77,7 @@ STANDS_OUT = 3.0
 alone, as what noise leaves in the form would be counted twice."""
 
 
-def _sharp(quick_um: NDArray[np.float64], low: int) -> NDArray[np.float64]:
+def _sharp(quick_um: Floats, low: int) -> Floats:
     """Return short local form, such as a reversal spike, shape (n,).
 
     A Gaussian filter of four times the low undulations is applied; exceedances of even noise are form. Medians of three
@@ -101,7 +102,7 @@ MEDIAN_OF_NORMAL = 0.6745
 """Median of the size of a standard normal value."""
 
 
-def _floor(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _floor(power: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     standing = np.zeros(len(power), dtype=bool)
     limit = np.log(max(len(power), 1) / CHANCE)  # the power of a line of noise is exponentially distributed
     floor = power
@@ -118,7 +119,7 @@ def _floor(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
 _ROUNDS = 20
 
 
-def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
+def _averaged(power: Floats) -> Floats:
     known = np.isfinite(power)
     window = np.ones(min(2 * NEIGHBOURS + 1, len(power)))
     total = np.convolve(np.where(known, power, 0.0), window, mode="same")
@@ -127,9 +128,7 @@ def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(of > 0.0, total / np.maximum(of, 1.0), everywhere)
 
 
-def drawn_lines(
-    apart: FormAndNoise, passed: NDArray[np.float64], draws: int, rng: np.random.Generator
-) -> NDArray[np.complex128]:
+def drawn_lines(apart: FormAndNoise, passed: Floats, draws: int, rng: np.random.Generator) -> NDArray[np.complex128]:
     """Return drawn noise spectra, as of `numpy.fft.rfft`, shape (draws, n // 2 + 1) [µm].
 
     Args:

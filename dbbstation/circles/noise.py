@@ -11,7 +11,7 @@ from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
 from dbbstation.trace.cut import SMALLEST_SHAPE_MM
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 FEWEST_SAMPLES = 100
 """Samples of a turn below which its spectrum holds no noise apart from its form."""
@@ -56,9 +56,7 @@ class CircleNoise:
         return float(np.hypot(np.nan_to_num(self.slow_um), self.least_um))
 
 
-def noise_of(
-    deviation_um: NDArray[np.float64], phi_deg: NDArray[np.float64], reading_mm: NDArray[np.float64]
-) -> CircleNoise:
+def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> CircleNoise:
     """Return a circle's noise.
 
     Floor and first-order process above 30 undulations per revolution are extrapolated below
@@ -87,7 +85,7 @@ def noise_of(
     )
 
 
-def _step_mm(reading_mm: NDArray[np.float64]) -> float:
+def _step_mm(reading_mm: Floats) -> float:
     values = np.unique(np.round(reading_mm / _FINEST_MM).astype(np.int64))
     if len(values) < 2 or len(values) > len(reading_mm) / _VISITS:  # noqa: PLR2004 - one value has no step
         return 0.0

@@ -15,8 +15,7 @@ from dbbstation.trace.gaussian import gaussian, transmission
 from dbbstation.trace.minimum_zone import MinimumZone, minimum_zone
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.circle import RawCircle
 
 
@@ -41,7 +40,7 @@ class Filter(IntEnum):
             return "30 UPR, cut off sharply"
         return f"Gaussian, {self.value} UPR" if self else "none"
 
-    def passed(self, undulations: NDArray[np.float64]) -> NDArray[np.float64]:
+    def passed(self, undulations: Floats) -> Floats:
         """Return the transmitted amplitude of undulations, shape (k,)."""
         if not self:
             return np.ones(len(undulations))
@@ -49,7 +48,7 @@ class Filter(IntEnum):
             return np.where(undulations <= self.value, 1.0, 0.0)
         return transmission(undulations, self.value)
 
-    def through(self, theta_deg: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def through(self, theta_deg: Floats, values: Floats) -> Floats:
         """Return filtered deviations of a full turn, shape (n,)."""
         if not self:
             return values
@@ -74,12 +73,12 @@ class CirclePath:
     """
 
     radius_mm: float
-    theta_deg: NDArray[np.float64]
-    about_ball_mm: NDArray[np.float64]
+    theta_deg: Floats
+    about_ball_mm: Floats
     least_squares: BallPath
 
     @property
-    def points_mm(self) -> NDArray[np.float64]:
+    def points_mm(self) -> Floats:
         """Return the path's points from the ball, shape (n, 2) [mm]."""
         theta = np.radians(self.theta_deg)
         return np.column_stack([self.about_ball_mm * np.cos(theta), self.about_ball_mm * np.sin(theta)])

@@ -18,6 +18,8 @@ from dbbstation.inference.uneven import TAILS, student_likelihood
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 NORMAL = 0.5
 """Chance beforehand that pushes are normal; the rest is shared out among the tails that are tried. A wrong choice is as bad in both
 directions, hence one half."""
@@ -42,10 +44,10 @@ class Pushes:
         excess: kurtosis less 3 if below; else zero.
     """
 
-    weights: NDArray[np.float64]
+    weights: Floats
     excess: float = 0.0
 
-    def drawn(self, rng: np.random.Generator, draws: int, count: int) -> NDArray[np.float64]:
+    def drawn(self, rng: np.random.Generator, draws: int, count: int) -> Floats:
         """Return drawn innovations, each series with own tails, shape (draws, count).
 
         Shorter tails are symmetrical beta, whose kurtosis less 3 is -6 / (2 a + 3) [Pearson's type II].
@@ -100,7 +102,7 @@ def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
     return Pushes(weights / weights.sum())
 
 
-def _exponential_likelihood(new: NDArray[np.float64], exponent: float) -> float:
+def _exponential_likelihood(new: Floats, exponent: float) -> float:
     """Return the log likelihood of exp(-|x|^b) at its best scale, over the normal density's height."""
     scale = float(exponent * np.mean(np.abs(new) ** exponent)) ** (1.0 / exponent)
     height = np.log(exponent) - np.log(2.0 * scale) - float(gammaln(1.0 / exponent)) + 0.5 * np.log(2.0 * np.pi)

@@ -21,9 +21,8 @@ from dbbstation.trace.average import means, sector_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.computing.arrays import Floats
 
 SECTORS = 2880
 """Means over an eighth of a degree replace the samples of a longer recording: the shortest shape here, a cyclic error of 40
@@ -99,17 +98,17 @@ class QuickLook:
 @dataclass(frozen=True, eq=False)
 class _Turn:
     one: CircleAnalysis
-    theta_deg: NDArray[np.float64]
-    deviation_um: NDArray[np.float64]
+    theta_deg: Floats
+    deviation_um: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
     shapes: tuple[SignatureColumn, ...]
-    value: NDArray[np.float64]
-    unit_covariance: NDArray[np.float64]
-    left_um: NDArray[np.float64]
-    basis: NDArray[np.float64]
+    value: Floats
+    unit_covariance: Floats
+    left_um: Floats
+    basis: Floats
     spike_deg: float
 
 
@@ -162,7 +161,7 @@ def _turn(one: CircleAnalysis) -> _Turn:
     return _Turn(one, theta_deg[inside], deviation[inside])
 
 
-def _fits(turns: Sequence[_Turn], waves: Sequence[NDArray[np.float64]] = ()) -> list[_Fit]:
+def _fits(turns: Sequence[_Turn], waves: Sequence[Floats] = ()) -> list[_Fit]:
     found = [_fitted(turns, spike_deg, waves) for spike_deg in SPIKES_DEG]
     for finer in FINER:
         middle = _best(found).spike_deg
@@ -175,7 +174,7 @@ def _best(fits: Sequence[_Fit]) -> _Fit:
     return min(fits, key=lambda one: float(one.left_um @ one.left_um))
 
 
-def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[Floats, Floats]:
     """Return values and standard uncertainties averaged over spike lengths, shapes (k,).
 
     Weights are marginal likelihoods exp(-squares / 2 s²) times the root of the covariance determinant [law of total
@@ -194,7 +193,7 @@ def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[NDArray[np.flo
     return mean, np.sqrt(weight @ (variances + (values - mean) ** 2))
 
 
-def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[NDArray[np.float64]] = ()) -> _Fit:
+def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[Floats] = ()) -> _Fit:
     each = [shapes_of(turn.theta_deg, turn.one.raw.circle, spike_deg) for turn in turns]
     shapes = [shape for shape in each[0] if len(turns) > 1 or shape.signature is not Signature.SERVO]
     sizes = np.column_stack([np.concatenate([of[shape] for of in each]) for shape in shapes])
@@ -214,7 +213,7 @@ def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[NDArray[np
     )
 
 
-def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
+def _beside(turns: Sequence[_Turn]) -> Floats:
     waves = [basis(np.radians(turn.theta_deg), FREE) for turn in turns]
     circle = [0, 1, FREE + 1]
     form = [k for k in range(2 * FREE + 1) if k not in {*circle, 2, FREE + 2}]
@@ -261,7 +260,7 @@ def _with_length(one: Symptom, fit: _Fit) -> Symptom:
 @dataclass(frozen=True, eq=False)
 class _Wave:
     symptom: Symptom
-    columns: NDArray[np.float64]
+    columns: Floats
     gained: float
 
 
@@ -306,10 +305,10 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
 class _Trial:
     gained: float
     period_mm: float
-    size: NDArray[np.float64]
-    waves: NDArray[np.float64]
-    beside: NDArray[np.float64]
+    size: Floats
+    waves: Floats
+    beside: Floats
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))

@@ -11,9 +11,8 @@ from dbbstation.inference.harmonics import amplitudes
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.circles.path import CirclePath
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.circle import RawCircle
 
 AXES_DEG = (0.0, 90.0, 180.0, 270.0)
@@ -56,9 +55,7 @@ class Harmonic:
     peak_deg: float
 
 
-def step_at(
-    raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float, sigma_um: float
-) -> ReversalStep | None:
+def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: float) -> ReversalStep | None:
     """Return the step at a place by lines on both sides; None for few samples or at the turn's ends, where it is closure.
 
     Args:
@@ -74,7 +71,7 @@ def step_at(
     return ReversalStep(theta_deg, behind - before, float(np.hypot(u_before, u_behind)))
 
 
-def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: float) -> ReversalStep | None:
+def closure_of(raw: RawCircle, deviation_um: Floats, sigma_um: float) -> ReversalStep | None:
     """Return the turn's end less its begin; None for too few samples."""
     beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
@@ -84,8 +81,8 @@ def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: floa
 
 
 def _line_at(
-    away_deg: NDArray[np.float64],
-    values: NDArray[np.float64],
+    away_deg: Floats,
+    values: Floats,
     side: float,
     sigma: float,
     near_deg: float = NEAR_DEG,

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
 
 
@@ -46,9 +45,7 @@ class SignatureColumn:
     unit: str
 
 
-def shapes_of(
-    theta_deg: NDArray[np.float64], circle: Circle, spike_deg: float
-) -> dict[SignatureColumn, NDArray[np.float64]]:
+def shapes_of(theta_deg: Floats, circle: Circle, spike_deg: float) -> dict[SignatureColumn, Floats]:
     """Return the deviations that unit sizes cause [µm], shape (n,) each; docs/circles.md has the formulas.
 
     Args:
@@ -77,7 +74,7 @@ def shapes_of(
     return found
 
 
-def cyclic_shapes(theta_deg: NDArray[np.float64], circle: Circle, axis: str, period_mm: float) -> NDArray[np.float64]:
+def cyclic_shapes(theta_deg: Floats, circle: Circle, axis: str, period_mm: float) -> Floats:
     """Return sine and cosine of a unit error periodic in an axis's position from the centre, shape (n, 2) [µm].
 
     Args:

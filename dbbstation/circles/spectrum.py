@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.computing.arrays import Floats
 
 HIGHEST = 60
 """Undulations per revolution up to which amplitudes are given: twice as many as a machine's form usually reaches."""
@@ -29,7 +30,7 @@ class FormSpectrum:
     """
 
     undulations: NDArray[np.int64]
-    amplitude_um: NDArray[np.float64]
+    amplitude_um: Floats
     noise_um: float
 
 

@@ -11,6 +11,8 @@ from dbbstation.machine.compiled import compiled, inlined
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 MOST_ROUNDS = 40
 """Rounds of the exchange; traces with noise need five to ten."""
 
@@ -18,9 +20,7 @@ REACHED = 1e-3
 """Share of the width by which bounds may be apart."""
 
 
-def strip_widths(
-    outer: NDArray[np.float64], inner: NDArray[np.float64], theta_deg: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def strip_widths(outer: Floats, inner: Floats, theta_deg: Floats) -> Floats:
     """Return minimum-zone widths of nearly round paths, shape (draws,), in their unit.
 
     A centre offset (a, b) changes radii by a cos θ + b sin θ; second order is below a nanometre at 0.4 mm. Four
@@ -41,12 +41,12 @@ def strip_widths(
 
 @compiled
 def _exchange(
-    outer: NDArray[np.float64],
-    inner: NDArray[np.float64],
-    cosine: NDArray[np.float64],
-    sine: NDArray[np.float64],
+    outer: Floats,
+    inner: Floats,
+    cosine: Floats,
+    sine: Floats,
     points: NDArray[np.int64],
-    width: NDArray[np.float64],
+    width: Floats,
 ) -> None:
     above, below = np.empty(len(cosine)), np.empty(len(cosine))
     rows = np.empty((4, 5))
@@ -70,7 +70,7 @@ def _exchange(
 
 
 @inlined
-def _solve(rows: NDArray[np.float64]) -> None:
+def _solve(rows: Floats) -> None:
     for column in range(4):
         best = column
         for row in range(column + 1, 4):
@@ -101,9 +101,7 @@ def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
     four[(2 if is_inside else 0) if kind == 0 else (1 if is_inside else 3)] = new
 
 
-def _first_points(
-    outer: NDArray[np.float64], inner: NDArray[np.float64], theta_deg: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _first_points(outer: Floats, inner: Floats, theta_deg: Floats) -> NDArray[np.int64]:
     edges = np.searchsorted(theta_deg, [0.0, 90.0, 180.0, 270.0, 360.0])
     return np.column_stack(
         [

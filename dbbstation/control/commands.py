@@ -15,8 +15,7 @@ from dbbstation.sources.contract import Fitted, Motion, Need
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource
 
@@ -48,9 +47,7 @@ def refuse_second_correction(machine: Machine) -> None:
         )
 
 
-def nominal_commands(
-    machine: Machine, poses: NDArray[np.float64], known: Mapping[str, ErrorSource]
-) -> NDArray[np.float64]:
+def nominal_commands(machine: Machine, poses: Floats, known: Mapping[str, ErrorSource]) -> Floats:
     """Return the poses at which a nominal control drives the struts as this one does, shape (n, 6) [mm, deg].
 
     Raises:

@@ -24,8 +24,7 @@ from dbbstation.sources.contract import Fitted, Motion
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 FITTED, TRIED = 400, 2000
@@ -67,13 +66,13 @@ class Values:
         table_mm: added to joints there, shape (6, k); zeros for no tables.
     """
 
-    base_mm: NDArray[np.float64]
-    platform_mm: NDArray[np.float64]
-    longer_mm: NDArray[np.float64]
-    points_mm: NDArray[np.float64]
-    table_mm: NDArray[np.float64]
+    base_mm: Floats
+    platform_mm: Floats
+    longer_mm: Floats
+    points_mm: Floats
+    table_mm: Floats
 
-    def joints(self, machine: Machine, frames: Frames) -> NDArray[np.float64]:
+    def joints(self, machine: Machine, frames: Frames) -> Floats:
         """Return the driven lengths at frames, shape (n, 6) [mm]."""
         joint = inverse(machine.hexapod.moved(self.base_mm, self.platform_mm), frames).length_mm
         added = [np.interp(joint[:, i], self.points_mm, self.table_mm[i]) for i in range(STRUTS)]
@@ -117,12 +116,12 @@ class Refitted:
     sources: tuple[SourceLeft, ...]
 
 
-def drawn_poses(low: NDArray[np.float64], high: NDArray[np.float64], count: int, seed: int) -> NDArray[np.float64]:
+def drawn_poses(low: Floats, high: Floats, count: int, seed: int) -> Floats:
     """Return poses evenly drawn between limits of shape (6,), shape (count, 6) [mm, deg]."""
     return np.random.default_rng(seed).uniform(low, high, (count, 6))
 
 
-def refitted(model: MachineModel, poses: NDArray[np.float64], others: NDArray[np.float64]) -> Refitted:
+def refitted(model: MachineModel, poses: Floats, others: Floats) -> Refitted:
     """Refit genhexkins to a model's sources that depend on the pose alone.
 
     Args:
@@ -153,13 +152,13 @@ def refitted(model: MachineModel, poses: NDArray[np.float64], others: NDArray[np
     return Refitted(all_joints, {**left, "program or kinematics": exact}, sources)
 
 
-def exact_joints(model: MachineModel, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def exact_joints(model: MachineModel, poses: Floats) -> Floats:
     """Return the driven lengths that take the model to poses, shape (n, 6) [mm]."""
     commands = compensated(model, Motion(poses))
     return model.driven_mm(Frames.from_poses(commands, model.machine.hexapod.rotation))
 
 
-def tool_errors(model: MachineModel, joints: NDArray[np.float64], wanted: Frames) -> NDArray[np.float64]:
+def tool_errors(model: MachineModel, joints: Floats, wanted: Frames) -> Floats:
     """Return the tool's errors at driven lengths: X, Y, Z [mm] and turn [rad], shape (n, 6)."""
     machine = model.machine
     command = forward(machine.hexapod, joints + machine.reference_length_error_mm, wanted)
@@ -172,14 +171,14 @@ def tool_errors(model: MachineModel, joints: NDArray[np.float64], wanted: Frames
     return np.hstack([actual.position_mm - wanted.position_mm, turn.T / 2.0])
 
 
-def _left(errors: NDArray[np.float64]) -> LeftOfModel:
+def _left(errors: Floats) -> LeftOfModel:
     off_um = 1e3 * np.linalg.norm(errors[:, :3], axis=1)
     tilt = np.degrees(np.linalg.norm(errors[:, 3:], axis=1))
     rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (off_um, tilt)]
     return LeftOfModel(rms[0], float(off_um.max()), rms[1], float(tilt.max()))
 
 
-def _typed(own: MachineModel, points: NDArray[np.float64]) -> Values:
+def _typed(own: MachineModel, points: Floats) -> Values:
     of = {f.source.name: f.values for f in own.sources}
     return Values(
         of.get(BaseJoints.name, np.zeros(JOINTS)).reshape(STRUTS, 3),
@@ -194,14 +193,14 @@ def _typed(own: MachineModel, points: NDArray[np.float64]) -> Values:
 class _AtLengths(Motion):
     """Rows that are known by their strut lengths alone, shape (n, 6)."""
 
-    length_mm: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, STRUTS)))
+    length_mm: Floats = field(default_factory=lambda: np.zeros((0, STRUTS)))
 
     def struts(self, machine: Machine) -> Struts:  # noqa: ARG002 - lengths are given
         nowhere = np.full((*self.length_mm.shape, 3), np.nan)
         return Struts(self.length_mm, nowhere, nowhere)
 
 
-def _by_length(fitted: Fitted, machine: Machine, length_mm: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _by_length(fitted: Fitted, machine: Machine, length_mm: Floats) -> Floats | None:
     """Return a source's strut errors at lengths, shape (n, 6) [mm]; None if it is not a curve of strut length."""
     form = fitted.source.c_form(machine, fitted.values)
     if form is None or form.by_pose:
@@ -211,7 +210,7 @@ def _by_length(fitted: Fitted, machine: Machine, length_mm: NDArray[np.float64])
     return None if strut is None or strut.ndim == 1 else strut
 
 
-def _in_table(fitted: Fitted, machine: Machine, points: NDArray[np.float64]) -> bool:
+def _in_table(fitted: Fitted, machine: Machine, points: Floats) -> bool:
     """Return whether a table corrects a source: it follows strut length, in waves long enough."""
     fine = fitted.source.shortest_period_mm(machine, fitted.values) < PER_WAVE * float(points[1] - points[0])
     return not fine and _by_length(fitted, machine, np.full((2, STRUTS), points[0])) is not None
@@ -227,7 +226,7 @@ def _with_tables(values: Values, in_table: Sequence[Fitted], machine: Machine) -
     return replace(values, table_mm=table)
 
 
-def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[Floats, Floats]:
     """Return joints' derivatives by all 42 parameters, and the tool's by the joints, turns at the lever, shapes (n, 6, 42), (n, 6, 6)."""
     struts = inverse(machine.hexapod.moved(values.base_mm, values.platform_mm), frames)
     own = np.eye(STRUTS)[:, :, None]
@@ -240,7 +239,7 @@ def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[NDArray[
     return by_values, np.asarray(tool, dtype=np.float64)
 
 
-def _fit(machine: Machine, start: Values, frames: Frames, wanted: NDArray[np.float64], *, platform: bool) -> Values:
+def _fit(machine: Machine, start: Values, frames: Frames, wanted: Floats, *, platform: bool) -> Values:
     """Return the values with the least squares of position and lever times tilt, by Gauss-Newton."""
     values, used = start, slice(None if platform else STRUTS + JOINTS)
     for _ in range(ROUNDS):
@@ -262,8 +261,8 @@ def _fit(machine: Machine, start: Values, frames: Frames, wanted: NDArray[np.flo
 def _by_source(
     own: MachineModel,
     in_table: Sequence[Fitted],
-    poses: NDArray[np.float64],
-    driven: NDArray[np.float64],
+    poses: Floats,
+    driven: Floats,
     values: Values,
 ) -> tuple[SourceLeft, ...]:
     machine = own.as_found
@@ -285,7 +284,7 @@ def _by_source(
     return tuple(found)
 
 
-def _rms_um(errors: NDArray[np.float64]) -> float:
+def _rms_um(errors: Floats) -> float:
     return float(1e3 * np.sqrt(np.mean(np.sum(np.square(errors.reshape(-1, 6)[:, :3]), axis=1))))
 
 
@@ -301,12 +300,12 @@ def hal_lines(values: Values, machine: Machine) -> tuple[str, ...]:
     )
 
 
-def home_mm(values: Values, machine: Machine) -> NDArray[np.float64]:
+def home_mm(values: Values, machine: Machine) -> Floats:
     """Return the addition to HOME and HOME_OFFSET of each joint, shape (6,) [mm]."""
     return values.longer_mm - machine.reference_length_error_mm
 
 
-def tables(values: Values, play_mm: NDArray[np.float64]) -> tuple[str, ...]:
+def tables(values: Values, play_mm: Floats) -> tuple[str, ...]:
     """Return each joint's `COMP_FILE` of `COMP_FILE_TYPE` 1: position, trim upwards and trim downwards [mm]; none if all are zero."""
     if not values.table_mm.any() and not play_mm.any():
         return ()

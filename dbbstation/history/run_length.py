@@ -19,7 +19,7 @@ from scipy.special import ndtr, ndtri
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 STATES = 201
 """Values of S that the chain tells apart. With twice as many the average run length changes by less than a thousandth."""
@@ -48,7 +48,7 @@ class Chart:
     single: float = np.inf
 
 
-def transitions(chart: Chart, mean: float = 0.0) -> NDArray[np.float64]:
+def transitions(chart: Chart, mean: float = 0.0) -> Floats:
     """Return transition probabilities of the upward sum, shape (STATES, STATES); the rest to one signals."""
     width = 2.0 * chart.interval / (2.0 * STATES - 1.0)  # the last state's upper edge is h
     state = np.arange(STATES)
@@ -71,12 +71,12 @@ def _one_sided(chart: Chart, mean: float) -> float:
     return float(lengths[0])
 
 
-def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64]:
+def signalled_within(chart: Chart, means: Iterable[float]) -> Floats:
     """Return the probability that the upward chart has signalled by each value, shape (n,)."""
     state = np.zeros(STATES)
     state[0] = 1.0
     within = []
-    moves: dict[float, NDArray[np.float64]] = {}
+    moves: dict[float, Floats] = {}
     for mean in means:
         if mean not in moves:
             moves[mean] = transitions(chart, mean)

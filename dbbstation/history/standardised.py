@@ -17,6 +17,8 @@ from scipy.special import chdtrc, ndtri, stdtr
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 BASELINE = 10
 """Values from which level and scatter are known well enough to stand for the stated uncertainty: the level to u / 3, the scatter
 to 24 %. `python -m studies history` shows what 5 and 20 would bring."""
@@ -50,7 +52,7 @@ class ScatterRatio:
         """Return whether it contradicts the stated uncertainties."""
         return self.freedom > 0 and bool(chdtrc(self.freedom, self.square) < CONTRADICTS)
 
-    def with_residuals(self, residual: NDArray[np.float64]) -> ScatterRatio:
+    def with_residuals(self, residual: Floats) -> ScatterRatio:
         """Return it with further recursive residuals, in their standard uncertainties."""
         return ScatterRatio(self.freedom + len(residual), self.square + float(residual @ residual))
 
@@ -66,17 +68,17 @@ class Standardised:
         scatter: standard deviation of the values before, in stated uncertainties; NaN if not known.
     """
 
-    z: NDArray[np.float64]
+    z: Floats
     by_stated: NDArray[np.bool_]
-    residual: NDArray[np.float64]
-    level: NDArray[np.float64]
-    u_level: NDArray[np.float64]
-    scatter: NDArray[np.float64]
+    residual: Floats
+    level: Floats
+    u_level: Floats
+    scatter: Floats
 
 
 def standardised(
-    values: NDArray[np.float64],
-    u: NDArray[np.float64],
+    values: Floats,
+    u: Floats,
     baseline: int = BASELINE,
     before: ScatterRatio = ScatterRatio(),
     hindsight: ScatterRatio | None = None,
@@ -118,9 +120,7 @@ def standardised(
     return Standardised(z, early & (hindsight is None), residual, level, u_level, scatter)
 
 
-def _normal(
-    residual: NDArray[np.float64], scatter: NDArray[np.float64], freedom: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _normal(residual: Floats, scatter: Floats, freedom: NDArray[np.int64]) -> Floats:
     # Values that are all alike have no scatter: the smallest departure is then beyond it, and none is none.
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(residual == 0.0, 0.0, residual / scatter)

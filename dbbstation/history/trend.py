@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.history.record import Figure, ModelFigures, SessionFigures
     from dbbstation.history.run_length import Chart
     from dbbstation.history.watch import Watched
@@ -81,8 +82,8 @@ class Trend:
     subject: Subject
     label: str
     at: NDArray[np.intp]
-    values: NDArray[np.float64]
-    u: NDArray[np.float64]
+    values: Floats
+    u: Floats
     limit: float | None
     watched: Watched | None
     why_not: str = ""
@@ -173,7 +174,7 @@ def _history(
     )
 
 
-def _why_not(subject: Subject, u: NDArray[np.float64]) -> str:
+def _why_not(subject: Subject, u: Floats) -> str:
     if subject.figure in NOT_WATCHED and not subject.is_parameter:
         return "watched by X and Y"
     if not np.all(u > 0.0):

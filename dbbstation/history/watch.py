@@ -13,6 +13,7 @@ from dbbstation.history.standardised import BASELINE, ScatterRatio, standardised
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.history.run_length import Chart
     from dbbstation.history.standardised import Standardised
 
@@ -63,11 +64,11 @@ class Watched:
     """
 
     events: tuple[TrendEvent, ...]
-    z: NDArray[np.float64]
-    high: NDArray[np.float64]
-    low: NDArray[np.float64]
-    level: NDArray[np.float64]
-    u_level: NDArray[np.float64]
+    z: Floats
+    high: Floats
+    low: Floats
+    level: Floats
+    u_level: Floats
     scatter: float
     lacking: int
     by_stated: bool = False
@@ -87,8 +88,8 @@ class Watched:
 
 
 def watch(
-    values: NDArray[np.float64],
-    u: NDArray[np.float64],
+    values: Floats,
+    u: Floats,
     chart: Chart,
     coverage_factor: float,
     baseline: int = BASELINE,
@@ -118,8 +119,8 @@ AT_FIRST = 32
 
 
 def _look(
-    values: NDArray[np.float64],
-    u: NDArray[np.float64],
+    values: Floats,
+    u: Floats,
     chart: Chart,
     coverage_factor: float,
     baseline: int,
@@ -174,7 +175,7 @@ def _look(
     return Watched(tuple(events), z, high, low, level, u_level, scatter, max(1 - len(at), 0), stated), pooled
 
 
-def _settled(event: TrendEvent, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> TrendEvent:
+def _settled(event: TrendEvent, level: Floats, u_level: Floats, start: int) -> TrendEvent:
     before = event.since - 1
     difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
     return replace(event, difference=difference, u_difference=u)
@@ -195,9 +196,7 @@ def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[T
     ]
 
 
-def _change(
-    since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]
-) -> TrendEvent:
+def _change(since: int, found: int, at: NDArray[np.intp], values: Floats, u: Floats) -> TrendEvent:
     before, these = at[at < since], slice(since, found + 1)
     level, u_level = _mean(values[before], u[before])
     after, u_after = _mean(values[these], u[these])
@@ -205,7 +204,7 @@ def _change(
     return TrendEvent(TrendVerdict.CHANGED, since, found, after - level, spread * float(np.hypot(u_after, u_level)))
 
 
-def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+def _scatter(values: Floats, u: Floats) -> float:
     if len(values) < 2:  # noqa: PLR2004 - one value does not scatter
         return np.nan
     mean = np.average(values, weights=1.0 / u**2)
@@ -218,17 +217,17 @@ class _Stretch:
 
     at: NDArray[np.intp]
     of: Standardised
-    values: NDArray[np.float64]
-    u: NDArray[np.float64]
+    values: Floats
+    u: Floats
     chart: Chart
     coverage_factor: float
 
     @property
-    def sums(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def sums(self) -> tuple[Floats, Floats]:
         """Return CUSUM upwards and downwards; NaN for the first value."""
         return tuple(self._sum(side) for side in (1.0, -1.0))  # type: ignore[return-value]  # two of them
 
-    def _sum(self, side: float) -> NDArray[np.float64]:
+    def _sum(self, side: float) -> Floats:
         out = np.full(len(self.at), np.nan)
         steps = np.cumsum(side * self.of.z[np.isfinite(self.of.z)] - self.chart.reference)
         out[np.isfinite(self.of.z)] = steps - np.minimum(np.minimum.accumulate(steps), 0.0)
@@ -279,6 +278,6 @@ class _Stretch:
         return max(1.0, float(self.of.scatter[k]))
 
 
-def _mean(values: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float]:
+def _mean(values: Floats, u: Floats) -> tuple[float, float]:
     weight = 1.0 / u**2
     return float(np.average(values, weights=weight)), float(1.0 / np.sqrt(weight.sum()))

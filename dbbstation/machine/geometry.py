@@ -12,7 +12,7 @@ from dbbstation.machine.rotation import Rotation
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 STRUTS = 6
 
@@ -38,11 +38,11 @@ class Hexapod:
         rotation: convention of tilt angles.
     """
 
-    base_joints_mm: NDArray[np.float64]
-    platform_joints_mm: NDArray[np.float64]
+    base_joints_mm: Floats
+    platform_joints_mm: Floats
     rotation: Rotation = Rotation.XYZ
 
-    def moved(self, base_mm: NDArray[np.float64], platform_mm: NDArray[np.float64]) -> Hexapod:
+    def moved(self, base_mm: Floats, platform_mm: Floats) -> Hexapod:
         """Return the hexapod with shifted joints, shapes (6, 3) or (n, 6, 3) [mm]."""
         return replace(
             self,
@@ -120,8 +120,8 @@ class JointAxes:
         platform: platform frame, shape (6, 3) [1].
     """
 
-    base: NDArray[np.float64]
-    platform: NDArray[np.float64]
+    base: Floats
+    platform: Floats
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Machine:
     name: str
     hexapod: Hexapod
     travel: Travel
-    reference_length_error_mm: NDArray[np.float64] = field(default_factory=lambda: np.zeros(STRUTS))
+    reference_length_error_mm: Floats = field(default_factory=lambda: np.zeros(STRUTS))
     screw_lead_mm: float | None = None
     masses: Masses | None = None
     joint_tolerance_mm: float | None = None

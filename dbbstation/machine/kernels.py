@@ -20,6 +20,8 @@ from dbbstation.machine.compiled import compiled, inlined
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 CONVERGED = 0
 SINGULAR = 1
 TOO_MANY_STEPS = 2
@@ -41,7 +43,7 @@ def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> 
 
 
 @inlined
-def _gather(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.float64]) -> None:
+def _gather(first: int, stop: int, rows: Floats, lanes: Floats) -> None:
     """Gather rows from `first`, shape (n, k), into lanes, shape (k, LANES); a single row goes to all."""
     for lane in range(LANES):
         n = min(first + lane, stop - 1, rows.shape[0] - 1)
@@ -50,7 +52,7 @@ def _gather(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.
 
 
 @inlined
-def _gather_matrices(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.float64]) -> None:
+def _gather_matrices(first: int, stop: int, rows: Floats, lanes: Floats) -> None:
     """Gather rows of shape (n, i, k) into lanes of shape (i, k, LANES)."""
     for lane in range(LANES):
         n = min(first + lane, stop - 1, rows.shape[0] - 1)
@@ -64,14 +66,14 @@ def _gather_machine(
     start: int,
     first: int,
     stop: int,
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    base: NDArray[np.float64],
-    platform: NDArray[np.float64],
-    t: NDArray[np.float64],
-    r: NDArray[np.float64],
-    q: NDArray[np.float64],
-    p: NDArray[np.float64],
+    position: Floats,
+    rotation: Floats,
+    base: Floats,
+    platform: Floats,
+    t: Floats,
+    r: Floats,
+    q: Floats,
+    p: Floats,
 ) -> None:
     _gather(first, stop, position, t)
     _gather_matrices(first, stop, rotation, r)
@@ -85,10 +87,10 @@ def _gather_machine(
 def _arm_and_span(
     i: int,
     lane: int,
-    t: NDArray[np.float64],
-    r: NDArray[np.float64],
-    q: NDArray[np.float64],
-    p: NDArray[np.float64],
+    t: Floats,
+    r: Floats,
+    q: Floats,
+    p: Floats,
 ) -> tuple[float, float, float, float, float, float]:
     """Return arm R P and vector R P + t - Q of strut i [CAL eq 1]."""
     px, py, pz = p[i, 0, lane], p[i, 1, lane], p[i, 2, lane]
@@ -100,11 +102,11 @@ def _arm_and_span(
 
 @inlined
 def _lengths(
-    t: NDArray[np.float64],
-    r: NDArray[np.float64],
-    q: NDArray[np.float64],
-    p: NDArray[np.float64],
-    length: NDArray[np.float64],
+    t: Floats,
+    r: Floats,
+    q: Floats,
+    p: Floats,
+    length: Floats,
 ) -> None:
     """Lengths of the struts, shape (6, LANES)."""
     for i in range(6):
@@ -115,13 +117,13 @@ def _lengths(
 
 @inlined
 def _struts(
-    t: NDArray[np.float64],
-    r: NDArray[np.float64],
-    q: NDArray[np.float64],
-    p: NDArray[np.float64],
-    length: NDArray[np.float64],
-    arm: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
+    t: Floats,
+    r: Floats,
+    q: Floats,
+    p: Floats,
+    length: Floats,
+    arm: Floats,
+    jacobian: Floats,
 ) -> None:
     """Lengths (6, LANES), arms (6, 3, LANES) and Jacobian (6, 6, LANES) of the struts."""
     for i in range(6):
@@ -137,7 +139,7 @@ def _struts(
 
 
 @inlined
-def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], sound: NDArray[np.float64]) -> None:
+def _orthogonalise(matrix: Floats, triangle: Floats, sound: Floats) -> None:
     """Orthogonalise columns of a matrix, shape (6, 6, LANES), in place by modified Gram-Schmidt.
 
     With the right-hand side as a further column (`_substitute`) this is as stable as pivoted elimination without
@@ -164,10 +166,10 @@ def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], s
 
 @inlined
 def _substitute(
-    matrix: NDArray[np.float64],
-    triangle: NDArray[np.float64],
-    right: NDArray[np.float64],
-    solution: NDArray[np.float64],
+    matrix: Floats,
+    triangle: Floats,
+    right: Floats,
+    solution: Floats,
 ) -> None:
     """Solve after `_orthogonalise`; the right-hand side, shape (6, LANES), is overwritten."""
     for k in range(6):
@@ -187,11 +189,11 @@ def _substitute(
 
 @inlined
 def _compare(
-    wanted: NDArray[np.float64],
-    length: NDArray[np.float64],
+    wanted: Floats,
+    length: Floats,
     tolerance: float,
-    residual: NDArray[np.float64],
-    square: NDArray[np.float64],
+    residual: Floats,
+    square: Floats,
     state: NDArray[np.int64],
 ) -> int:
     """Set the residual to wanted less present lengths, (6, LANES); return the number of searching lanes."""
@@ -213,11 +215,11 @@ def _compare(
 @inlined
 def _newton(
     reuse: bool,  # noqa: FBT001 - compiled kernels take no keywords
-    matrix: NDArray[np.float64],
-    triangle: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    step: NDArray[np.float64],
-    sound: NDArray[np.float64],
+    matrix: Floats,
+    triangle: Floats,
+    residual: Floats,
+    step: Floats,
+    sound: Floats,
     state: NDArray[np.int64],
 ) -> None:
     if not reuse:
@@ -229,7 +231,7 @@ def _newton(
 
 
 @inlined
-def _move(t: NDArray[np.float64], r: NDArray[np.float64], step: NDArray[np.float64], state: NDArray[np.int64]) -> None:
+def _move(t: Floats, r: Floats, step: Floats, state: NDArray[np.int64]) -> None:
     """Move searching platforms by (dt, w), shape (6, LANES) [mm, rad].
 
     Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4) is an exact rotation without sine; its angle is |w| less |w|³/12.
@@ -257,15 +259,15 @@ def _move(t: NDArray[np.float64], r: NDArray[np.float64], step: NDArray[np.float
 def forward(
     start: int,
     stop: int,
-    target: NDArray[np.float64],
-    base: NDArray[np.float64],
-    platform: NDArray[np.float64],
+    target: Floats,
+    base: Floats,
+    platform: Floats,
     tolerance: float,
     most_steps: int,
-    near_position: NDArray[np.float64],
-    near_rotation: NDArray[np.float64],
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
+    near_position: Floats,
+    near_rotation: Floats,
+    position: Floats,
+    rotation: Floats,
     outcome: NDArray[np.int64],
 ) -> None:
     """Newton-Raphson on strut lengths [CAL eq 2], from near poses to lengths `target` (n, 6).
@@ -305,11 +307,11 @@ def forward(
 def adjoint(
     start: int,
     stop: int,
-    units: NDArray[np.float64],
-    arms: NDArray[np.float64],
-    direction: NDArray[np.float64],
-    moment: NDArray[np.float64],
-    gain: NDArray[np.float64],
+    units: Floats,
+    arms: Floats,
+    direction: Floats,
+    moment: Floats,
+    gain: Floats,
     outcome: NDArray[np.int64],
 ) -> None:
     """Solve J^T g = [direction, moment] per pose: g (n, 6) is the effect of one unit of strut error.
@@ -345,14 +347,14 @@ def adjoint(
 
 @inlined
 def _bar_system(
-    t: NDArray[np.float64],
-    r: NDArray[np.float64],
-    ball: NDArray[np.float64],
-    tool: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-    span: NDArray[np.float64],
-    matrix: NDArray[np.float64],
-    right: NDArray[np.float64],
+    t: Floats,
+    r: Floats,
+    ball: Floats,
+    tool: Floats,
+    jacobian: Floats,
+    span: Floats,
+    matrix: Floats,
+    right: Floats,
 ) -> None:
     """Return the bar's length, shape (LANES,), and the system J^T g = [n, (R o) x n], n its direction, o the tool ball."""
     for i in range(6):
@@ -378,15 +380,15 @@ def _bar_system(
 def bar(
     start: int,
     stop: int,
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    base: NDArray[np.float64],
-    platform: NDArray[np.float64],
-    fixed_ball: NDArray[np.float64],
-    tool_ball: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-    directions: NDArray[np.float64],
-    gain: NDArray[np.float64],
+    position: Floats,
+    rotation: Floats,
+    base: Floats,
+    platform: Floats,
+    fixed_ball: Floats,
+    tool_ball: Floats,
+    lengths: Floats,
+    directions: Floats,
+    gain: Floats,
     outcome: NDArray[np.int64],
 ) -> None:
     """Return a bar's length and sensitivities by the adjoint: one solution per pose.

@@ -14,7 +14,7 @@ from dbbstation.machine.geometry import STRUTS, Hexapod
 from dbbstation.machine.rotation import Frames
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 TOLERANCE_MM = 1e-11
 """Strut length residual at which the forward kinematics is content: it puts the pose itself within 1e-9 mm."""
@@ -35,9 +35,9 @@ class Struts:
         arm_mm: R P, tool tip to platform joint in machine axes, shape (n, 6, 3).
     """
 
-    length_mm: NDArray[np.float64]
-    unit: NDArray[np.float64]
-    arm_mm: NDArray[np.float64]
+    length_mm: Floats
+    unit: Floats
+    arm_mm: Floats
 
 
 def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
@@ -51,7 +51,7 @@ def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
     return Struts(length, span / length[..., np.newaxis], arm)
 
 
-def strut_lengths(hexapod: Hexapod, frames: Frames) -> NDArray[np.float64]:
+def strut_lengths(hexapod: Hexapod, frames: Frames) -> Floats:
     """Return strut lengths at `frames`, shape (n, 6) [mm] [CAL eq 1].
 
     Raises:
@@ -60,7 +60,7 @@ def strut_lengths(hexapod: Hexapod, frames: Frames) -> NDArray[np.float64]:
     return _lengths(_spans(hexapod, frames)[0])
 
 
-def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> Frames:
+def forward(hexapod: Hexapod, length_mm: Floats, near: Frames) -> Frames:
     """Return the poses of these strut lengths within 1e-11 mm [CAL eq 2].
 
     Args:
@@ -101,7 +101,7 @@ def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> F
     return found
 
 
-def strut_jacobian(struts: Struts) -> NDArray[np.float64]:
+def strut_jacobian(struts: Struts) -> Floats:
     """Return J = dL / d(t, w) = [u, (R P) x u], shape (n, 6, 6): three columns [mm/mm], three [mm/rad]."""
     return np.concatenate([struts.unit, np.cross(struts.arm_mm, struts.unit)], axis=2)
 
@@ -116,29 +116,29 @@ class Response:
         rotation: of the platform, shape (n, 3, 3).
     """
 
-    per_parameter: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    rotation: NDArray[np.float64]
+    per_parameter: Floats
+    direction: Floats
+    rotation: Floats
 
     @property
-    def per_strut(self) -> NDArray[np.float64]:
+    def per_strut(self) -> Floats:
         """Return the sensitivity per strut length, shape (n, 6) [unit/mm]."""
         return self.per_parameter[:, :STRUTS]
 
     @property
-    def per_base_joint(self) -> NDArray[np.float64]:
+    def per_base_joint(self) -> Floats:
         """Return the sensitivity per base joint, machine axes, shape (n, 6, 3) [unit/mm]."""
         return self.per_parameter[:, STRUTS:].reshape(-1, STRUTS, 3)
 
     @property
-    def per_platform_joint(self) -> NDArray[np.float64]:
+    def per_platform_joint(self) -> Floats:
         """Return the sensitivity to platform joints, platform axes, shape (n, 6, 3) [unit/mm]: dP acts as -R dP on the base."""
         return -self.per_base_joint @ self.rotation
 
     @property
-    def per_tool_ball(self) -> NDArray[np.float64]:
+    def per_tool_ball(self) -> Floats:
         """Return the sensitivity to tool tip and ball, platform axes, shape (n, 3) [unit/mm]."""
-        turned: NDArray[np.float64] = np.einsum("nji,nj->ni", self.rotation, self.direction)
+        turned: Floats = np.einsum("nji,nj->ni", self.rotation, self.direction)
         return turned
 
 
@@ -152,16 +152,16 @@ class BarSensitivity:
         response: of the length [mm/mm].
     """
 
-    length_mm: NDArray[np.float64]
-    direction: NDArray[np.float64]
+    length_mm: Floats
+    direction: Floats
     response: Response
 
 
 def bar_sensitivity(
     hexapod: Hexapod,
     frames: Frames,
-    fixed_ball_mm: NDArray[np.float64],
-    tool_ball_mm: NDArray[np.float64] | None = None,
+    fixed_ball_mm: Floats,
+    tool_ball_mm: Floats | None = None,
 ) -> BarSensitivity:
     """Return a bar's length and analytic derivatives by the adjoint: one 6x6 solve per pose.
 
@@ -221,7 +221,7 @@ def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Resp
     return response(0), response(1), response(2)
 
 
-def _spans(hexapod: Hexapod, frames: Frames) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _spans(hexapod: Hexapod, frames: Frames) -> tuple[Floats, Floats]:
     """Return T + R P - Q and R P, both (n, 6, 3) [mm].
 
     NumPy avoids half a second of compiler start.
@@ -231,11 +231,11 @@ def _spans(hexapod: Hexapod, frames: Frames) -> tuple[NDArray[np.float64], NDArr
     return frames.position_mm[:, np.newaxis, :] + arm - base, arm
 
 
-def _lengths(span: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lengths(span: Floats) -> Floats:
     return np.sqrt(np.einsum("nik,nik->ni", span, span))
 
 
-def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _joints(hexapod: Hexapod, count: int) -> tuple[Floats, Floats]:
     """Return joints for kernels: shape (1, 6, 3) or (n, 6, 3), contiguous."""
     base, platform = (
         np.ascontiguousarray(joints if joints.ndim > 2 else joints[None], dtype=np.float64)  # noqa: PLR2004
@@ -247,7 +247,7 @@ def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[
     return base, platform
 
 
-def _balls(centre_mm: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _balls(centre_mm: Floats, count: int) -> Floats:
     """Return ball centres for kernels: shape (1, 3) or (n, 3), contiguous."""
     balls = np.ascontiguousarray(np.atleast_2d(centre_mm), dtype=np.float64)
     if balls.shape not in {(1, 3), (count, 3)}:
@@ -259,7 +259,7 @@ def _refuse(
     where: int,
     frames: Frames,
     hexapod: Hexapod,
-    length_mm: NDArray[np.float64],
+    length_mm: Floats,
     *,
     singular: bool,
 ) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.errors import ModelError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 REGULAR_MM = 0.05
@@ -42,7 +41,7 @@ def check_joints(machine: Machine) -> None:
                 )
 
 
-def _which(joints: NDArray[np.float64], regular: tuple[int, ...], other: tuple[int, ...]) -> str:
+def _which(joints: Floats, regular: tuple[int, ...], other: tuple[int, ...]) -> str:
     centre = joints[list(regular)].mean(axis=0)
     first, second = joints[regular[1]] - joints[regular[0]], joints[regular[2]] - joints[regular[0]]
     axis = np.cross(first, second)
@@ -59,15 +58,15 @@ def _which(joints: NDArray[np.float64], regular: tuple[int, ...], other: tuple[i
     return f"the joints of struts {', '.join(str(strut + 1) for strut in other)} are {sides} mm apart"
 
 
-def _sides_mm(triangle: NDArray[np.float64]) -> NDArray[np.float64]:
-    sides: NDArray[np.float64] = np.linalg.norm(triangle - np.roll(triangle, 1, axis=0), axis=1)
+def _sides_mm(triangle: Floats) -> Floats:
+    sides: Floats = np.linalg.norm(triangle - np.roll(triangle, 1, axis=0), axis=1)
     return sides
 
 
-def _turned(vector: NDArray[np.float64], axis: NDArray[np.float64], turn: float) -> NDArray[np.float64]:
+def _turned(vector: Floats, axis: Floats, turn: float) -> Floats:
     """Return a vector turned by a third about an axis [Rodrigues]."""
     angle = turn * 2.0 * np.pi / 3.0
-    turned: NDArray[np.float64] = (
+    turned: Floats = (
         vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1.0 - np.cos(angle))
     )
     return turned

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 class Rotation(StrEnum):
@@ -29,23 +29,23 @@ class Frames:
         rotation: platform axes in the machine frame, shape (n, 3, 3) [1].
     """
 
-    position_mm: NDArray[np.float64]
-    rotation: NDArray[np.float64]
+    position_mm: Floats
+    rotation: Floats
 
     def __len__(self) -> int:
         return len(self.position_mm)
 
     @classmethod
-    def from_poses(cls, poses: NDArray[np.float64], convention: Rotation) -> Frames:
+    def from_poses(cls, poses: Floats, convention: Rotation) -> Frames:
         """Return frames of poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]."""
         return cls(np.ascontiguousarray(poses[:, :3]), rotation_matrices(poses[:, 3:], convention))
 
-    def to_poses(self, convention: Rotation) -> NDArray[np.float64]:
+    def to_poses(self, convention: Rotation) -> Floats:
         """Return poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]; A and C within ±180, B within ±90 degrees."""
         return np.hstack([self.position_mm, tilt_angles(self.rotation, convention)])
 
 
-def rotation_matrices(tilt_deg: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
+def rotation_matrices(tilt_deg: Floats, convention: Rotation) -> Floats:
     """Return rotation matrices, shape (n, 3, 3), of A, B, C, shape (n, 3) [deg]."""
     # Rz(C) Ry(B) Rx(A) is the transpose of Rx(-A) Ry(-B) Rz(-C), so one product serves both conventions.
     sign = 1.0 if convention is Rotation.XYZ else -1.0
@@ -66,7 +66,7 @@ def rotation_matrices(tilt_deg: NDArray[np.float64], convention: Rotation) -> ND
     return matrix
 
 
-def tilt_angles(rotation: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
+def tilt_angles(rotation: Floats, convention: Rotation) -> Floats:
     """Return A, B, C, shape (n, 3) [deg], of rotation matrices, shape (n, 3, 3)."""
     # Rx Ry Rz is the transpose of Rz(-C) Ry(-B) Rx(-A), so one extraction serves both conventions.
     sign = -1.0 if convention is Rotation.XYZ else 1.0

@@ -18,8 +18,7 @@ from dbbstation.machine.compiled import in_blocks
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Compliance, Masses, StrutMasses
     from dbbstation.machine.kinematics import Struts
     from dbbstation.machine.rotation import Frames
@@ -40,8 +39,8 @@ class Load:
         moment_n_mm: about the tool tip, machine axes, shape (n, 3).
     """
 
-    force_n: NDArray[np.float64]
-    moment_n_mm: NDArray[np.float64]
+    force_n: Floats
+    moment_n_mm: Floats
 
     def __add__(self, other: Load) -> Load:
         return Load(self.force_n + other.force_n, self.moment_n_mm + other.moment_n_mm)
@@ -57,18 +56,18 @@ def platform_weight(frames: Frames, masses: Masses) -> Load:
     return Load(np.broadcast_to(weight, lever.shape), np.cross(lever, weight))
 
 
-def transverse_pull(struts: Struts, masses: StrutMasses) -> NDArray[np.float64]:
+def transverse_pull(struts: Struts, masses: StrutMasses) -> Floats:
     """Return each strut's transverse pull by its weight, shape (n, 6, 3) [N].
 
     A rod about its base joint with masses m_k at s_k along u weighs sum m_k s_k (u x g). The reaction on the platform is
     f = sum m_k s_k / L * g_across, g_across = g - u (u g). [GRAV eq 2] prints the opposite sign.
     """
     across = GRAVITY_M_S2 * (DOWN - struts.unit * (struts.unit @ DOWN)[:, :, None])
-    pull: NDArray[np.float64] = (_first_moment_kg_mm(struts, masses) / struts.length_mm)[:, :, None] * across
+    pull: Floats = (_first_moment_kg_mm(struts, masses) / struts.length_mm)[:, :, None] * across
     return pull
 
 
-def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> NDArray[np.float64]:
+def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> Floats:
     """Return the first moment of a strut's masses about its base joint, shape (n, 6) [kg mm]."""
     length = struts.length_mm
     return (
@@ -78,7 +77,7 @@ def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> NDArray[np.float
     )
 
 
-def transverse_load(struts: Struts, pull_n: NDArray[np.float64]) -> Load:
+def transverse_load(struts: Struts, pull_n: Floats) -> Load:
     """Return the struts' transverse load: [sum f, sum (R P) x f].
 
     [GRAV eq 3 and 6] have the moment; [GRAV eq 1] omits the force.
@@ -86,7 +85,7 @@ def transverse_load(struts: Struts, pull_n: NDArray[np.float64]) -> Load:
     return Load(pull_n.sum(axis=1), np.cross(struts.arm_mm, pull_n).sum(axis=1))
 
 
-def strut_tensions(struts: Struts, load: Load) -> NDArray[np.float64]:
+def strut_tensions(struts: Struts, load: Load) -> Floats:
     """Return axial forces at platform joints, tension positive, shape (n, 6) [N].
 
     Solves J^T T = [F, M]: [GRAV eq 1 and 6], signed, where eq 7 prints the magnitude.
@@ -112,9 +111,7 @@ def strut_tensions(struts: Struts, load: Load) -> NDArray[np.float64]:
     return tension
 
 
-def compliance_mm_per_n(
-    length_mm: NDArray[np.float64], compliance: Compliance
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def compliance_mm_per_n(length_mm: Floats, compliance: Compliance) -> tuple[Floats, Floats]:
     """Return a strut's compliance: constant part and growing part.
 
     [GRAV eq 7] K (alpha L + C_B) as c at 1000 mm with growing share s: c (1 - s) and c s L / 1000 mm. (alpha, printed
@@ -124,9 +121,7 @@ def compliance_mm_per_n(
     return np.full(length_mm.shape, at_1000mm * (1.0 - share)), at_1000mm * share * length_mm / 1000.0
 
 
-def stretch_mm(
-    struts: Struts, compliance: Compliance, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
-) -> NDArray[np.float64]:
+def stretch_mm(struts: Struts, compliance: Compliance, tension_n: Floats, masses: StrutMasses | None = None) -> Floats:
     """Return elastic elongation, shape (n, 6) [mm] [GRAV eq 7].
 
     The strut's own axial weight, omitted in [GRAV eq 7], stretches sections above it. The constant part sees
@@ -142,9 +137,7 @@ def stretch_mm(
     return stretch + along_n_per_kg * (fixed * _moving_kg(masses) + growing * (masses.strut_kg + hanging) / 2.0)
 
 
-def motor_loads(
-    struts: Struts, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
-) -> NDArray[np.float64]:
+def motor_loads(struts: Struts, tension_n: Floats, masses: StrutMasses | None = None) -> Floats:
     """Return the motors' axial forces, positive if the platform pulls, shape (n, 6) [N].
 
     Tension plus the axial weight of the moving part, by virtual work.
@@ -158,9 +151,7 @@ def _moving_kg(masses: StrutMasses) -> float:
     return masses.screw_kg + masses.strut_kg / 2.0
 
 
-def base_loads(
-    struts: Struts, tension_n: NDArray[np.float64], masses: StrutMasses | None = None
-) -> NDArray[np.float64]:
+def base_loads(struts: Struts, tension_n: Floats, masses: StrutMasses | None = None) -> Floats:
     """Return strut forces on the base joints, machine axes, shape (n, 6, 3) [N]: T u - f and own weight."""
     load = tension_n[:, :, None] * struts.unit
     if masses is None:

@@ -12,8 +12,7 @@ from dbbstation.machine.kinematics import inverse, strut_jacobian
 from dbbstation.machine.rotation import Frames
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.machine.kinematics import Struts
 
@@ -31,7 +30,7 @@ SMALLER = "move the circle, make it smaller or tilt it less"
 """What helps against a pose outside the travel."""
 
 
-def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str, remedy: str = SMALLER) -> None:
+def check_travel(machine: Machine, poses: Floats, *, where: str, remedy: str = SMALLER) -> None:
     """Refuse poses, shape (n, 6) [mm, deg], outside the nominal travel.
 
     Raises:
@@ -62,8 +61,8 @@ def middle(machine: Machine) -> Frames:
 
 def _limited_quantities(
     machine: Machine,
-    poses: NDArray[np.float64],
-) -> list[tuple[str, str, NDArray[np.float64], float, float]]:
+    poses: Floats,
+) -> list[tuple[str, str, Floats, float, float]]:
     travel = machine.travel
     radius = np.hypot(poses[:, 0], poses[:, 1])
     struts = inverse(machine.hexapod, Frames.from_poses(poses, machine.hexapod.rotation))
@@ -81,7 +80,7 @@ def _limited_quantities(
     ]
 
 
-def _hold(machine: Machine, struts: Struts) -> NDArray[np.float64]:
+def _hold(machine: Machine, struts: Struts) -> Floats:
     there = inverse(machine.hexapod, middle(machine))
     with np.errstate(invalid="ignore"):  # a pose that is no number has no hold, and is refused for it
         return np.asarray(np.linalg.det(strut_jacobian(struts)) / np.linalg.det(strut_jacobian(there)))

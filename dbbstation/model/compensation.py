@@ -18,8 +18,7 @@ from dbbstation.model.root_search import MOST_MM, RootSearch
 from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.sources.contract import Fitted, Motion, State
 
 MOST_ROUNDS = 50
@@ -58,10 +57,10 @@ class Passed:
 
     model: MachineModel
     states: tuple[State, ...]
-    held_back_mm: NDArray[np.float64]
+    held_back_mm: Floats
 
 
-def compensated(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
+def compensated(model: MachineModel, wanted: Motion) -> Floats:
     """Return commands for wanted poses in six degrees of freedom, shape (n, 6) [mm, deg], for all rows.
 
     Args:
@@ -99,7 +98,7 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
     return Passed(own, states, np.zeros(6))
 
 
-def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
+def compensated_on(passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
     """Return commands along one stretch, shape (n, 6) [mm, deg], and the memory behind it.
 
     The command is the pose at which nominal lengths equal F(T wanted; actual) minus the sources' errors. Weights act at
@@ -117,7 +116,7 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64],
     return stretch.commanded(stretch.with_history()), stretch.passed()
 
 
-def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
+def shifted(model: MachineModel, wanted: Motion) -> Floats:
     """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
 
     Kept for comparison: it is first order, with wrong orientation.
@@ -137,9 +136,9 @@ class _Slope:
     """Each strut's secant of what is lacking over its command."""
 
     def __init__(self) -> None:
-        self._before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._before: tuple[Floats, Floats] | None = None
 
-    def step(self, driven: NDArray[np.float64], lacking: NDArray[np.float64]) -> NDArray[np.float64]:
+    def step(self, driven: Floats, lacking: Floats) -> Floats:
         """Return the addition to a command, shape (k, 6) [mm]."""
         slope = np.full(driven.shape, -1.0)
         if self._before is not None:
@@ -147,7 +146,7 @@ class _Slope:
             seen = np.abs(moved) > AGREED_MM
             slope = np.where(seen, (lacking - self._before[1]) / np.where(seen, moved, 1.0), slope)
         self._before = driven, lacking
-        found: NDArray[np.float64] = -lacking / np.clip(slope, STEEPEST, FLATTEST)
+        found: Floats = -lacking / np.clip(slope, STEEPEST, FLATTEST)
         return found
 
 
@@ -167,7 +166,7 @@ class _Stretch:
         self._built_up, self._states = passed.states[: len(self._building_up)], passed.states[len(self._building_up) :]
         self._smooth, self._known = self._without_search()
 
-    def commanded(self, driven: NDArray[np.float64]) -> NDArray[np.float64]:
+    def commanded(self, driven: Floats) -> Floats:
         """Return poses of nominal lengths, shape (n, 6) [mm, deg]."""
         return forward(self._nominal, driven, self._target).to_poses(self._convention)
 
@@ -175,7 +174,7 @@ class _Stretch:
         """Return the memory behind the last row."""
         return Passed(self._own, (*self._built_up, *self._states), self._held_back)
 
-    def _without_search(self) -> tuple[NDArray[np.float64], Effect]:
+    def _without_search(self) -> tuple[Floats, Effect]:
         """Return driven lengths without search, shape (n, 6) [mm], and the effect's part that does not jump with the command."""
         motion, last, bent = self._wanted, np.full((len(self._wanted), 6), np.inf), Effect()
         built_up = [np.zeros((len(self._wanted), 6)) for _ in self._building_up]
@@ -207,7 +206,7 @@ class _Stretch:
         )
         return driven, bent + Effect(strut_mm=sum(built_up, np.zeros_like(driven)))
 
-    def with_history(self) -> NDArray[np.float64]:
+    def with_history(self) -> Floats:
         """Return driven lengths, shape (n, 6) [mm], row by row with memory."""
         if not self._searched:
             return self._smooth
@@ -231,12 +230,12 @@ class _Stretch:
                 self._go_on(states, driven, row)
         return driven
 
-    def _go_on(self, states: tuple[State, ...], driven: NDArray[np.float64], row: int) -> None:
+    def _go_on(self, states: tuple[State, ...], driven: Floats, row: int) -> None:
         self._states = states
         if row:
             self._held_back = driven[row - 1] - self._smooth[row - 1]
 
-    def _tried(self, rows: slice) -> tuple[NDArray[np.float64], int, tuple[State, ...]]:
+    def _tried(self, rows: slice) -> tuple[Floats, int, tuple[State, ...]]:
         """Try rows together; return driven lengths, shape (k, 6) [mm], the number of met rows, and the states behind all."""
         smooth = self._smooth[rows]
         driven = smooth + self._held_back
@@ -257,7 +256,7 @@ class _Stretch:
             driven = last
         return driven, met, states
 
-    def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
+    def _alone(self, row: int) -> tuple[Floats, tuple[State, ...]]:
         """Search one row; return driven lengths, shape (1, 6) [mm], and the states behind it."""
         rows = slice(row, row + 1)
         search = RootSearch((self._smooth[row] + self._held_back), MET_MM)
@@ -273,7 +272,7 @@ class _Stretch:
             )
         return search.at[None], self._lacking(rows, search.at[None])[1]
 
-    def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[State, ...]]:
+    def _lacking(self, rows: slice, driven: Floats) -> tuple[Floats, tuple[State, ...]]:
         """Return the shortfall of driven lengths for wanted poses, shape (k, 6) [mm], and the states."""
         target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
         motion = self._driven_to(driven, rows, target)
@@ -284,7 +283,7 @@ class _Stretch:
             states.append(behind)
         return self._needed(effect, self._platform(effect, target)) - driven, tuple(states)
 
-    def _driven_to(self, driven: NDArray[np.float64], rows: slice, near: Frames) -> Motion:
+    def _driven_to(self, driven: Floats, rows: slice, near: Frames) -> Motion:
         return self._wanted.stretch(rows).commanded(forward(self._nominal, driven, near), self._own.machine)
 
     def _platform(self, effect: Effect, target: Frames) -> Frames:
@@ -293,8 +292,8 @@ class _Stretch:
         tip = np.broadcast_to(effect.tool_tip_mm, (len(target), 3))
         return replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
 
-    def _needed(self, effect: Effect, platform: Frames) -> NDArray[np.float64]:
+    def _needed(self, effect: Effect, platform: Frames) -> Floats:
         strut = 0.0 if effect.strut_mm is None else effect.strut_mm
         needed = strut_lengths(actual_hexapod(self._nominal, effect), platform)
-        lengths: NDArray[np.float64] = needed - strut + self._own.machine.reference_length_error_mm
+        lengths: Floats = needed - strut + self._own.machine.reference_length_error_mm
         return lengths

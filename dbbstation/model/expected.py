@@ -18,8 +18,7 @@ from dbbstation.trace.average import averaged
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import BarReading, MachineModel
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
@@ -59,8 +58,8 @@ def expected_circle(
     off = fit @ long_mm
     covariance = np.zeros((3, 3))
     again = np.zeros((COEFFICIENTS, COEFFICIENTS))
-    effects: dict[tuple[str, str], NDArray[np.float64]] = {}
-    local: dict[tuple[str, str], NDArray[np.float64]] = {}
+    effects: dict[tuple[str, str], Floats] = {}
+    local: dict[tuple[str, str], Floats] = {}
     moving: set[tuple[str, str]] = set()
     shapes = form_columns(theta - start)[:, HIGHER]
     for cause in _acting(reading, motion, model, identified, causes, shapes, observation.test):
@@ -104,7 +103,7 @@ class _Acting:
     """
 
     key: tuple[str, str]
-    columns_mm: NDArray[np.float64]
+    columns_mm: Floats
     at_a_pose: bool
     scatters: float = 0.0
     moving: bool = False
@@ -116,7 +115,7 @@ def _acting(
     model: MachineModel,
     identified: IdentifiedModel | None,
     causes: Iterable[ErrorSource],
-    shapes: NDArray[np.float64],
+    shapes: Floats,
     test: str,
 ) -> Iterator[_Acting]:
     """Return causes along a run; `shapes` are undulations beyond shift and length, shape (n, 4)."""
@@ -151,7 +150,7 @@ def _acting(
             yield _Acting(key, columns, at_a_pose=at_a_pose, scatters=scatters, moving=Need.PATH in source.needs)
 
 
-def _as_circle(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _as_circle(motion: Motion) -> tuple[Floats, Floats, Floats]:
     """Return the readings of shifts along X and Y and of a longer bar, shape (n,) each."""
     assert motion.setup is not None  # noqa: S101 - observations have one
     off = motion.poses[motion.kept, :3] - motion.setup.fixed_ball_mm

@@ -10,8 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import MachineModel
 
 Row = tuple[str, str, str]
@@ -34,15 +33,15 @@ class IdentifiedModel:
 
     model: MachineModel
     covariance_rows: tuple[Row, ...]
-    covariance: NDArray[np.float64]
+    covariance: Floats
     directions_lost: tuple[str, ...] = ()
     report: Mapping[str, Any] = field(default_factory=dict)
     sessions: Mapping[str, str] = field(default_factory=dict)
-    null_space: NDArray[np.float64] | None = None
-    formula_variance: NDArray[np.float64] | None = None
+    null_space: Floats | None = None
+    formula_variance: Floats | None = None
 
     @property
-    def unseen(self) -> NDArray[np.float64] | None:
+    def unseen(self) -> Floats | None:
         """Return the null space, shape (h, k); None if unknown."""
         if self.null_space is None and not self.directions_lost:
             return np.zeros((0, len(self.covariance_rows)))
@@ -83,7 +82,7 @@ class IdentifiedModel:
         return f"the recordings do not determine: {lost}"
 
 
-def known_u(variance: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+def known_u(variance: Floats, along: Floats) -> Floats:
     """Return standard uncertainties; NaN if mostly guessed."""
     return np.sqrt(np.where(along > variance, np.nan, variance + along))
 

@@ -25,8 +25,7 @@ from dbbstation.sources.contract import Effect, Fitted, Motion, Need, Owner
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Hexapod, Machine
     from dbbstation.sources.contract import ErrorSource
 
@@ -93,7 +92,7 @@ class MachineModel:
         own = (f for f in self.sources if f.source.belongs_to is Owner.MACHINE and f.values.any())
         return min((f.source.shortest_period_mm(self.machine, f.values) for f in own), default=math.inf)
 
-    def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
+    def driven_mm(self, frames: Frames) -> Floats:
         """Return the controller's strut lengths for commanded poses, shape (n, 6) [mm]."""
         return strut_lengths(self.machine.hexapod, frames) - self.machine.reference_length_error_mm
 
@@ -133,7 +132,7 @@ class MachineModel:
             remedy="check the masses and compliances of the machine file and of the model, and the commanded pose",
         )
 
-    def actual_poses(self, motion: Motion) -> NDArray[np.float64]:
+    def actual_poses(self, motion: Motion) -> Floats:
         """Return actual tool tip poses of kept rows, shape (n, 6) [mm, deg]."""
         return self.actual(motion).tool_frames().to_poses(self.machine.hexapod.rotation)[motion.kept]
 
@@ -241,23 +240,23 @@ class BarReading:
     """
 
     actual: Actual
-    length_mm: NDArray[np.float64]
+    length_mm: Floats
     sensitivity: BarSensitivity
     standing: Actual | None = None
     ball_response: tuple[Response, ...] = ()
 
-    def by_source(self, source: ErrorSource, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def by_source(self, source: ErrorSource, machine: Machine, values: Floats) -> Floats:
         """Return the reading's derivative by a source's parameters at values of shape (p,): shape (n, p).
 
         The source need not be in the model.
         """
         return self._by(lambda actual: source.derivative(*actual.seen_by(source, machine), values))
 
-    def by_fitted(self, fitted: Fitted) -> NDArray[np.float64]:
+    def by_fitted(self, fitted: Fitted) -> Floats:
         """Return the derivative by a model source's parameters, with its effect through others, (n, p)."""
         return self._by(lambda actual: actual.derivative(fitted))
 
-    def _by(self, derivative: Callable[[Actual], Effect]) -> NDArray[np.float64]:
+    def _by(self, derivative: Callable[[Actual], Effect]) -> Floats:
         total = self.by_parameters(derivative(self.actual))
         if self.standing is None:
             return total
@@ -266,7 +265,7 @@ class BarReading:
         moved = [np.broadcast_to(by_parameters(then, r, last), (1, total.shape[1])) for r in self.ball_response]
         return total - self.sensitivity.direction[self.actual.motion.kept] @ np.vstack(moved)
 
-    def by_parameters(self, derivative: Effect) -> NDArray[np.float64]:
+    def by_parameters(self, derivative: Effect) -> Floats:
         """Return the reading's derivative, shape (n, p), from an effect's; kept rows."""
         kept = self.actual.motion.kept
         total = by_parameters(derivative, self.sensitivity.response, kept)
@@ -278,9 +277,9 @@ class BarReading:
         return np.ascontiguousarray(np.broadcast_to(total, (len(self.length_mm), parameters)))
 
 
-def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArray[np.float64] | float:
+def by_parameters(derivative: Effect, response: Response, kept: slice) -> Floats | float:
     """Return any quantity's derivative through struts, joints and tool, shape (n, p); 0.0 if none."""
-    total: NDArray[np.float64] | float = 0.0
+    total: Floats | float = 0.0
     if derivative.strut_mm is not None:
         total = total + _contract(response.per_strut[kept], _rows(derivative.strut_mm, 1, kept), 1)
     if derivative.base_joint_mm is not None:
@@ -292,11 +291,11 @@ def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArra
     return total
 
 
-def _rows(array: NDArray[np.float64], axes: int, kept: slice) -> NDArray[np.float64]:
+def _rows(array: Floats, axes: int, kept: slice) -> Floats:
     return array if array.ndim == axes + 1 else array[kept]
 
 
-def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+def _contract(gain: Floats, array: Floats, axes: int) -> Floats:
     count, parameters = len(gain), array.shape[-1]
     flat = gain.reshape(count, -1)
     if array.ndim == axes + 1:
@@ -304,7 +303,7 @@ def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) 
         if np.array_equal(matrix, np.eye(parameters)):  # joints and struts: each coordinate its own parameter
             return flat
         return flat @ matrix
-    per_sample: NDArray[np.float64] = np.einsum("ni,nip->np", flat, array.reshape(count, -1, parameters))
+    per_sample: Floats = np.einsum("ni,nip->np", flat, array.reshape(count, -1, parameters))
     return per_sample
 
 
@@ -317,13 +316,13 @@ def actual_hexapod(nominal: Hexapod, effect: Effect) -> Hexapod:
     )
 
 
-def _strut_errors(effect: Effect) -> NDArray[np.float64]:
+def _strut_errors(effect: Effect) -> Floats:
     return np.zeros(STRUTS) if effect.strut_mm is None else effect.strut_mm
 
 
-def _change_mm(bent: Effect, last: Effect) -> NDArray[np.float64]:
+def _change_mm(bent: Effect, last: Effect) -> Floats:
     """Return the greatest change of a strut or joint between two weight effects, shape (n,) [mm]."""
     pairs = ((bent.strut_mm, last.strut_mm), (bent.base_joint_mm, last.base_joint_mm))
     changes = [np.abs(new - old) for new, old in pairs if new is not None and old is not None]
-    greatest: NDArray[np.float64] = np.max([np.max(c.reshape(len(c), -1), axis=1) for c in changes], axis=0)
+    greatest: Floats = np.max([np.max(c.reshape(len(c), -1), axis=1) for c in changes], axis=0)
     return greatest

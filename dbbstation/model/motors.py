@@ -12,8 +12,7 @@ from dbbstation.sources.contract import Effect, Fitted, Motion
 from dbbstation.sources.laws.weights import stated_loads
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import Actual, MachineModel
 
 
@@ -29,9 +28,9 @@ class MotorCurrents:
     model: MachineModel
     driven: Motion
     there: Actual
-    current_a: NDArray[np.float64]
+    current_a: Floats
 
-    def by_parameters(self, fitted: Fitted) -> NDArray[np.float64] | None:
+    def by_parameters(self, fitted: Fitted) -> Floats | None:
         """Return currents' derivative by a source's parameters, shape (n, 6, p), kept rows."""
         kept = self.driven.kept
         if fitted.source.of_currents:

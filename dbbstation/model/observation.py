@@ -13,8 +13,7 @@ from dbbstation.trace.columns import each, temperatures
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.circle import RawCircle
 
 STANDING = 3
@@ -39,8 +38,8 @@ class Observation:
     raw: RawCircle
     setup: Setup
     started_s: float | None = None
-    commanded: NDArray[np.float64] | None = None
-    stood: NDArray[np.float64] | None = None
+    commanded: Floats | None = None
+    stood: Floats | None = None
 
     @property
     def label(self) -> str:
@@ -48,7 +47,7 @@ class Observation:
         return f"{self.test} {self.raw.circle.direction} {self.repeat}"
 
     @property
-    def lead_in_deg(self) -> NDArray[np.float64]:
+    def lead_in_deg(self) -> Floats:
         """Return the lead-in's progress, ending one step before the turn [deg]."""
         return np.arange(-self.raw.circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
 
@@ -82,7 +81,7 @@ class Observation:
         )
 
     @property
-    def standing_pose(self) -> NDArray[np.float64]:
+    def standing_pose(self) -> Floats:
         """Return the commanded pose while the ball was put up, shape (6,) [mm, deg]."""
         return np.array([*self.setup.fixed_ball_mm, *self.raw.circle.tilt_deg]) if self.stood is None else self.stood
 
@@ -110,5 +109,5 @@ class Motions:
         return (observation.motion() for observation in self.observations)
 
 
-def _held_back(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _held_back(values: Floats, count: int) -> Floats:
     return np.concatenate([np.repeat(values[:1], count, axis=0), values])

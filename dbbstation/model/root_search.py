@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002 - attributes are declared with it
+
+if TYPE_CHECKING:
+    from dbbstation.computing.arrays import Floats
 
 FIRST_STEP = 1.5
 """Times what is missing: the first step to the other side of a zero."""
@@ -32,14 +36,14 @@ class RootSearch:
         lost: first function, from 1, without zero near the guess; 0 for none.
     """
 
-    def __init__(self, guess: NDArray[np.float64], met: float) -> None:
+    def __init__(self, guess: Floats, met: float) -> None:
         self.at, self.done, self.lost = guess.copy(), False, 0
         self._guess, self._met = guess, met
         self._steps = self._anew = 0
         nothing = np.full(len(guess), np.nan)
         self._low, self._low_value, self._high, self._high_value, self._step = (nothing.copy() for _ in range(5))
 
-    def tell(self, value: NDArray[np.float64]) -> None:
+    def tell(self, value: Floats) -> None:
         """Take f at `at`, shape (k,), and set the next argument."""
         open_ = np.abs(value) > self._met
         if not open_.any():
@@ -73,7 +77,7 @@ class RootSearch:
         if away.any() or self._steps > MOST_STEPS:
             self.done, self.lost = True, 1 + int(np.argmax(away if away.any() else open_))
 
-    def _between(self, width: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _between(self, width: Floats) -> Floats:
         """Return by turns the middle, limited by |f|, and false position.
 
         False position is exact at slope -1, as behind a play.

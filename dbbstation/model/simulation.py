@@ -14,8 +14,7 @@ from dbbstation.sources.contract import Motion, Setup
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import PlannedTest
@@ -29,10 +28,10 @@ class SimulatedCircle:
         commanded: lead-in and turn, shape (m + n, 6) [mm, deg].
     """
 
-    t_s: NDArray[np.float64]
-    theta_deg: NDArray[np.float64]
-    length_mm: NDArray[np.float64]
-    commanded: NDArray[np.float64]
+    t_s: Floats
+    theta_deg: Floats
+    length_mm: Floats
+    commanded: Floats
 
 
 def simulate_circle(
@@ -41,7 +40,7 @@ def simulate_circle(
     setup: Setup,
     samples: int,
     started_s: float | None = None,
-    command: Callable[[Motion], NDArray[np.float64]] | None = None,
+    command: Callable[[Motion], Floats] | None = None,
 ) -> SimulatedCircle:
     """Predict the reading along one turn with lead-in.
 

@@ -17,15 +17,14 @@ from dbbstation.sources.contract import Motion
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.identified import IdentifiedModel
 
 
 @with_one_thread
-def position_uncertainty_mm(
-    identified: IdentifiedModel, motion: Motion, *, about_mean: bool = False
-) -> NDArray[np.float64]:
+def position_uncertainty_mm(identified: IdentifiedModel, motion: Motion, *, about_mean: bool = False) -> Floats:
     """Return standard uncertainties of predicted X, Y and Z, kept rows, shape (n, 3) [mm]; NaN if unknown.
 
     First-order propagation. Unknown if an acting source has no uncertainty or undetermined combinations dominate
@@ -71,7 +70,7 @@ ROUNDING_MM = 1e-9
 """Movements of the tool per unit of a parameter that are rounding [mm]."""
 
 
-def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[Floats, Floats]:
     """Return sensitivities of X, Y and Z to covariance rows, shape (3, n, k), and to unknown sources."""
     model = identified.model.of_the_machine()
     actual = model.actual(motion)
@@ -104,7 +103,7 @@ def predicted_poses(
     identified: IdentifiedModel,
     poses: ArrayLike,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Return actual poses for independent commanded ones, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm], NaN if unknown.
 
     Args:
@@ -156,9 +155,7 @@ class PoseErrors:
     greatest_uncertainty_by_axis_um: Mapping[str, float | None]
 
 
-def pose_errors(
-    commanded: NDArray[np.float64], actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
-) -> PoseErrors:
+def pose_errors(commanded: Floats, actual: Floats, uncertainty_mm: Floats) -> PoseErrors:
     """Return position errors of predicted poses."""
     off_um = 1e3 * (actual[:, :3] - commanded[:, :3])
     shift_um = off_um.mean(axis=0)
@@ -176,6 +173,6 @@ def pose_errors(
     )
 
 
-def rms_length(vectors: NDArray[np.float64]) -> float:
+def rms_length(vectors: Floats) -> float:
     """Return the rms length of vectors, shape (n, 3), in their unit."""
     return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 FULL_TURN_DEG = 360.0
 
@@ -71,15 +71,15 @@ class Circle:
         """Return the arc between feed-in and feed-out [deg]."""
         return FULL_TURN_DEG + 2.0 * self.overshoot_deg
 
-    def theta_deg(self, phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    def theta_deg(self, phi_deg: Floats) -> Floats:
         """Return the angle from +X towards +Y at progress `phi_deg`, 0 at the start [deg]."""
         return self.start_deg + self.direction.sign * phi_deg
 
-    def phi_deg(self, theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    def phi_deg(self, theta_deg: Floats) -> Floats:
         """Return progress at an angle, 0 to 360 [deg], the inverse of `theta_deg`."""
         return np.mod(self.direction.sign * (theta_deg - self.start_deg), FULL_TURN_DEG)
 
-    def poses(self, theta_deg: NDArray[np.float64], outside_mm: float = 0.0) -> NDArray[np.float64]:
+    def poses(self, theta_deg: Floats, outside_mm: float = 0.0) -> Floats:
         """Return commanded poses at angles, shape (n, 6) [mm, deg]."""
         theta, elevation = np.radians(theta_deg), np.radians(self.elevation_deg)
         radius = self.radius_mm + outside_mm * np.cos(elevation)
@@ -88,7 +88,7 @@ class Circle:
         tilt = np.broadcast_to(self.tilt_deg, (len(theta), 3))
         return np.column_stack([x + radius * np.cos(theta), y + radius * np.sin(theta), height, tilt])
 
-    def envelope(self, step_deg: float = 1.0) -> NDArray[np.float64]:
+    def envelope(self, step_deg: float = 1.0) -> Floats:
         """Return poses of the whole path, feed-in and feed-out included, shape (n, 6) [mm, deg]."""
         count = int(np.ceil(self.swept_deg / step_deg)) + 1
         arc = self.poses(self.theta_deg(np.linspace(-self.overshoot_deg, FULL_TURN_DEG + self.overshoot_deg, count)))

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.plan import Plan
 
 LARGEST_LEAK = 0.05
@@ -74,7 +75,7 @@ def mountings(plan: Plan, names: Sequence[str]) -> int:
 
 
 def _improved(
-    order: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
+    order: NDArray[np.intp], heights: Floats, balls: NDArray[np.intp], holders: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     at = _costs(order[None, :], heights, balls, holders)[0]
     while True:
@@ -99,20 +100,18 @@ def _neighbours(order: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.array(near)
 
 
-def _costs(
-    orders: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
-) -> NDArray[np.float64]:
+def _costs(orders: NDArray[np.intp], heights: Floats, balls: NDArray[np.intp], holders: NDArray[np.intp]) -> Floats:
     in_order = heights[orders]
     leaks = [np.maximum(_correlations(in_order, degree) - LARGEST_LEAK, 0.0) for degree in (1, 2)]
     changes = [np.count_nonzero(np.diff(each[orders], axis=1), axis=1) for each in (balls, holders)]
     return np.stack([*(np.round(leak / _TINY) * _TINY for leak in leaks), *changes], axis=1)
 
 
-def _least(costs: NDArray[np.float64]) -> int:
+def _least(costs: Floats) -> int:
     return int(np.lexsort(costs.T[::-1])[0])
 
 
-def _correlations(heights: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+def _correlations(heights: Floats, degree: int) -> Floats:
     """Return multiple correlations of rows of heights, shape (m, n), with polynomials of place, shape (m,)."""
     n = heights.shape[1]
     off = heights - heights.mean(axis=1, keepdims=True)

@@ -18,7 +18,7 @@ from scipy.stats import f as f_distribution
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 LEVEL = 0.95
 """Probability of the intervals, as that of U (k = 2)."""
@@ -69,7 +69,7 @@ class HolderResult:
     of_cmm_um: float
 
 
-def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0, level: float = LEVEL) -> HolderResult:
+def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float = LEVEL) -> HolderResult:
     """Return a holder's repeatability.
 
     Args:
@@ -115,7 +115,7 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
     return HolderScatter(s_um, low_um, high_um, s_um / math.sqrt(2.0 * freedom), freedom)
 
 
-def _axes_differ(squares: NDArray[np.float64], freedom: int) -> float:
+def _axes_differ(squares: Floats, freedom: int) -> float:
     """Return the probability of the greatest variance ratio, times the number of pairs [Bonferroni]."""
     if squares.min() <= 0.0:
         return 1.0 if squares.max() <= 0.0 else 0.0

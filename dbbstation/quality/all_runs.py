@@ -22,8 +22,7 @@ from dbbstation.quality.together import expected_um, read_um
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.forms import FormsBesides, RunForm
     from dbbstation.quality.knowledge import Seen
@@ -93,7 +92,7 @@ def _as_turned(runs: tuple[Seen, ...]) -> RunForm:
     return form_of(as_other, _off(one, as_other, REVERSING))
 
 
-def _off(one: Seen, judged_as: Seen, ways: Sequence[Way]) -> NDArray[np.float64]:
+def _off(one: Seen, judged_as: Seen, ways: Sequence[Way]) -> Floats:
     """Return a form's difference from expectation, one column per way, shape (7, k) [µm]."""
     read, run = read_um(one), judged_as.run
     return np.column_stack([_begun(read, run.circle, way) - expected_um(run) for way in ways])
@@ -183,7 +182,7 @@ def _pairs(runs: Sequence[Seen]) -> list[tuple[Seen, Seen]]:
     return [(runs[k], runs[other]) for k, other in sorted(found, key=max)]
 
 
-def _begun(read: NDArray[np.float64], circle: Circle, way: Way) -> NDArray[np.float64]:
+def _begun(read: Floats, circle: Circle, way: Way) -> Floats:
     ahead = np.radians(circle.direction.sign * (way.begin_deg(circle.start_deg) - circle.start_deg))
     angles = ahead * np.arange(1, HIGHEST_HARMONIC + 1)
     mean, cosines, sines = np.split(read, [1, HIGHEST_HARMONIC + 1])

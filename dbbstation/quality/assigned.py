@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Planned, Seen
 
 MISTAKE = LOG_ODDS_LIMIT
@@ -51,7 +52,7 @@ class FormerSitting:
 
     session: str
     measured: date
-    read_um: Mapping[tuple[str, str], NDArray[np.float64]]
+    read_um: Mapping[tuple[str, str], Floats]
 
     def moved(self, circles: Sequence[Planned]) -> tuple[Planned, ...]:
         """Return circles expected as this session read them."""
@@ -264,7 +265,7 @@ class Assigned:
     def _same_way(self, run: int, label: int) -> bool:
         return label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
 
-    def information(self, labels: Sequence[int]) -> NDArray[np.float64]:
+    def information(self, labels: Sequence[int]) -> Floats:
         """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1)."""
         return np.sum([one.product(label) for one, label in zip(self.read, labels, strict=True)], axis=0)
 
@@ -314,7 +315,7 @@ class _Beside:
         self._mean = np.reshape(means, (len(SIZES), count, COEFFICIENTS))
         self.log = float(_mean_of(self._logs)[0])
 
-    def changed(self, runs: Sequence[int], instead: Sequence[Sequence[int]]) -> NDArray[np.float64]:
+    def changed(self, runs: Sequence[int], instead: Sequence[Sequence[int]]) -> Floats:
         """Return the same with other labels of some runs, one by each of `instead`."""
         circles, off, scatter = self._of(runs, np.array([[self._labels[run] for run in runs]]))
         shared = self._between(circles, circles)
@@ -329,9 +330,7 @@ class _Beside:
         white = np.linalg.solve(root, apart)
         return _mean_of(logs - 0.5 * np.sum(white**2, axis=(2, 3)) - log_diagonal(root))
 
-    def _of(
-        self, runs: Sequence[int], labels: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def _of(self, runs: Sequence[int], labels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats, Floats]:
         """Return circles, shape (m, k), readings minus expectation, (m, 7 k), and their own covariance, (m, 7 k, 7 k)."""
         circles = np.column_stack([self._read[run].shows(labels[:, k]) for k, run in enumerate(runs)])
         off = np.hstack([self._read[run].off[labels[:, k]] for k, run in enumerate(runs)])
@@ -341,13 +340,13 @@ class _Beside:
             scatter[:, rows, rows] = self._read[run].scatter[labels[:, k]]
         return circles, off, scatter
 
-    def _between(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _between(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> Floats:
         """Return covariances of circles, shape (9, m, 7 k, 7 k) [µm²]."""
         found = self._covariance[:, one[:, :, None], :, other[:, None, :], :]
         wide = COEFFICIENTS * one.shape[1]
         return found.transpose(3, 0, 1, 4, 2, 5).reshape(len(SIZES), -1, wide, wide)
 
-    def _means(self, circles: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _means(self, circles: NDArray[np.int64]) -> Floats:
         return self._mean[:, circles].reshape(len(SIZES), len(circles), -1)
 
 
@@ -358,6 +357,6 @@ _OTHERWISE = {
 }
 
 
-def _mean_of(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mean_of(logs: Floats) -> Floats:
     """Return the log of the mean density over SIZES, shape (m,)."""
     return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(SIZES)))

@@ -14,8 +14,7 @@ from dbbstation.quality.stated import covariance_apart, drifted_um, limit_along,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Expected
 
 
@@ -51,7 +50,7 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
 
 
 def _across_limits(
-    one: Seen, against: Seen, others: Others, off: NDArray[np.float64], mirrored: NDArray[np.float64]
+    one: Seen, against: Seen, others: Others, off: Floats, mirrored: Floats
 ) -> tuple[float, float] | None:
     covariance = covariance_apart(one, against)
     rows = np.ix_(ACROSS, ACROSS)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.computing.arrays import Floats
 
 FORM_UPR = 30.0
 """Undulations per revolution that count as form, as in `evaluate`: a bump is shorter, below 12 degrees."""
@@ -67,7 +68,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 
 
 def near_reversals(
-    theta_deg: NDArray[np.float64], reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG
+    theta_deg: Floats, reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG
 ) -> NDArray[np.int64]:
     """Return the reversal near each sample, -1 for none, shape (n,)."""
     near = np.full(len(theta_deg), -1, dtype=np.int64)
@@ -77,7 +78,7 @@ def near_reversals(
     return near
 
 
-def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int64], width_deg: float) -> list[_Peak]:
+def _peaks(one: CircleAnalysis, rest: Floats, near: NDArray[np.int64], width_deg: float) -> list[_Peak]:
     samples = max(round(width_deg / FULL_TURN_DEG * len(rest)), 1)
     if samples < FEWEST and width_deg < WIDTHS_DEG[-1]:
         return []
@@ -111,5 +112,5 @@ def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int6
     return found_peaks
 
 
-def _top(means: NDArray[np.float64], among: NDArray[np.int64]) -> int:
+def _top(means: Floats, among: NDArray[np.int64]) -> int:
     return int(among[int(np.argmax(np.abs(means[among])))])

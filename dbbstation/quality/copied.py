@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Seen
 
 PROBABILITY = 1e-9
@@ -93,7 +94,7 @@ def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
     return bool(np.any(at[1:] & at[:-1]))
 
 
-def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int) -> int:
+def _shared(own_mm: Floats, other_mm: Floats, row: int) -> int:
     """Return the number of readings in common stretches.
 
     Blocks of half the length that chance allows suffice, because a common stretch contains a whole one.
@@ -109,6 +110,6 @@ def _shared(own_mm: NDArray[np.float64], other_mm: NDArray[np.float64], row: int
     return block * int(np.count_nonzero(counted))
 
 
-def _stretches(length_mm: NDArray[np.float64], block: int) -> NDArray[np.uint64]:
+def _stretches(length_mm: Floats, block: int) -> NDArray[np.uint64]:
     weights = np.array([pow(BASE, k, 2**64) for k in range(block)], dtype=np.uint64)
     return np.convolve(np.ascontiguousarray(length_mm).view(np.uint64), weights, mode="valid")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Seen
 
 SIZES = np.geomspace(0.03, 3.0, 9)
@@ -51,14 +52,14 @@ class RunForm:
         drift_um_s: growth of one place's reading on its turn [µm/s].
     """
 
-    effects_um: Mapping[tuple[str, str], NDArray[np.float64]]
-    own_um: NDArray[np.float64]
-    off_um: NDArray[np.float64]
+    effects_um: Mapping[tuple[str, str], Floats]
+    own_um: Floats
+    off_um: Floats
     started_s: float
     drift_um_s: float
 
 
-def form_of(one: Seen, off_um: NDArray[np.float64]) -> RunForm:
+def form_of(one: Seen, off_um: Floats) -> RunForm:
     """Return the form of a run with known expectation; columns as of `RunForm.off_um`."""
     signs = along_travel(one.run.circle)[:, None]
     effects = {} if one.run.expected is None else one.run.expected.effects_um
@@ -66,7 +67,7 @@ def form_of(one: Seen, off_um: NDArray[np.float64]) -> RunForm:
     return RunForm(along, np.sqrt(own_um2(one)), off_um, one.run.started_s or 0.0, one.drift_um_s)
 
 
-def own_um2(one: Seen) -> NDArray[np.float64]:
+def own_um2(one: Seen) -> Floats:
     """Return each coefficient's own variance, shape (7,) [µm²]."""
     own = np.full(COEFFICIENTS, max(0.5 * unseen_um2(one, one), LEAST_UM2))
     if one.run.expected is not None and not one.run.expected.place_known:
@@ -87,7 +88,7 @@ class Forms:
         self._machine, self._rest = _Columns(), _Columns()
         self._whitening = np.zeros((len(SIZES), 0, 0))
         self._white = np.zeros((len(SIZES), 0, 0))
-        self._log_determinants: list[NDArray[np.float64]] = []
+        self._log_determinants: list[Floats] = []
 
     def hold(self, runs: Sequence[Held]) -> None:
         """Hold these runs; those behind the first difference are discarded."""
@@ -145,12 +146,12 @@ class Forms:
         wanted = {_key(one) for one in runs}
         return rows_of([k for k, (held, _) in enumerate(self._held) if _key(held) in wanted])
 
-    def all(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def all(self) -> tuple[Floats, Floats, Floats]:
         """Return whitening of all forms, shape (9, n, n), their whitened columns and drift, (9, n, k + 1), and log determinants."""
         n = COEFFICIENTS * len(self._held)
         return self._whitening[:, :n, :n], self._white[:, :n], np.sum(self._log_determinants, axis=0)
 
-    def place(self, one: Held) -> tuple[int, NDArray[np.float64]]:
+    def place(self, one: Held) -> tuple[int, Floats]:
         """Return the place of a run among all held runs, and its own part, shape (7,) [µm]."""
         return next((k, form.own_um) for k, (held, form) in enumerate(self._held) if _key(held) == _key(one))
 
@@ -181,11 +182,11 @@ class FormsBesides:
         self.white = off - self._share * self._drift @ (_turned(self._drift) @ off)
         self.log_determinant = log_determinant + 2.0 * np.sum(np.log(sizes), axis=1) + np.log(grown)
 
-    def log_likelihoods(self) -> NDArray[np.float64]:
+    def log_likelihoods(self) -> Floats:
         """Return each column's log density, by each of SIZES, shape (9, k), without a constant."""
         return -0.5 * (np.sum(self.white**2, axis=1) + self.log_determinant[:, None])
 
-    def beside(self, one: Held) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def beside(self, one: Held) -> tuple[Floats, Floats]:
         """Return an omitted run's columns minus prediction, shape (9, 7, k) [µm], and their covariance, (9, 7, 7) [µm²]."""
         place, own_um = self._forms.place(one)
         rows = rows_of([self._left_out.index(place)])
@@ -211,7 +212,7 @@ class _Columns:
         self._of: dict[tuple[str, str], slice] = {}
         self._effects = np.zeros((0, 0))
 
-    def add(self, n: int, effects: Mapping[tuple[str, str], NDArray[np.float64]]) -> NDArray[np.float64]:
+    def add(self, n: int, effects: Mapping[tuple[str, str], Floats]) -> Floats:
         """Add the rows of one form behind n others; return covariances with them and itself, shape (7, n + 7)."""
         wide = max((place.stop for place in self._of.values()), default=0)
         for cause, effect in effects.items():
@@ -241,5 +242,5 @@ def _key(one: Held) -> tuple[int, ...]:
     return tuple(map(id, one))
 
 
-def _turned(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turned(matrices: Floats) -> Floats:
     return np.swapaxes(matrices, -1, -2)

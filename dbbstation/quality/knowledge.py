@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.recording import Recording
@@ -34,7 +35,7 @@ LOCAL_COEFFICIENTS = 2 * LOCAL_HARMONIC + 1
 """Numbers of a form of so many undulations, as of `local_columns`."""
 
 
-def local_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def local_columns(theta_rad: Floats) -> Floats:
     """Return readings per orthonormal coefficient with `LOCAL_HARMONIC` undulations, shape (n, 59)."""
     angles = np.outer(theta_rad, np.arange(1, LOCAL_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
@@ -47,13 +48,13 @@ HIGHER = (2, 3, 5, 6)
 """Those of two and three undulations, which no shift of a ball and no length of a bar makes."""
 
 
-def form_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def form_columns(theta_rad: Floats) -> Floats:
     """Return readings per orthonormal coefficient of a form, shape (n, 7)."""
     angles = np.outer(theta_rad, np.arange(1, HIGHEST_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
 
-def along_travel(circle: Circle) -> NDArray[np.float64]:
+def along_travel(circle: Circle) -> Floats:
     """Return the signs of coefficients counted along the travel, shape (7,)."""
     return np.concatenate([np.ones(HIGHEST_HARMONIC + 1), np.full(HIGHEST_HARMONIC, circle.direction.sign)])
 
@@ -79,19 +80,19 @@ class Expected:
         known_um2: covariance of a sound form with noise, given other tests, shape (7, 7); None without.
     """
 
-    centre_mm: NDArray[np.float64]
+    centre_mm: Floats
     radial_mm: float
-    covariance_mm2: NDArray[np.float64]
+    covariance_mm2: Floats
     place_known: bool = True
     mounting_mm: float = 0.0
     reversals_deg: tuple[float, ...] = ()
-    form_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
-    effects_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
-    local_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
+    form_um: Floats = field(default_factory=lambda: np.zeros(COEFFICIENTS))
+    effects_um: Mapping[tuple[str, str], Floats] = field(default_factory=dict)
+    local_um: Mapping[tuple[str, str], Floats] = field(default_factory=dict)
     moving: frozenset[tuple[str, str]] = frozenset()
-    again_um2: NDArray[np.float64] = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
+    again_um2: Floats = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
     place_um: float = 0.0
-    known_um2: NDArray[np.float64] | None = None
+    known_um2: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +159,9 @@ class Seen:
     lost: tuple[int, int]
     feed_mm_min: tuple[float, float] | None = None
     longer_s: float | None = None
-    coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
+    coefficients_um: Floats = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     unusable: int = 0
-    local_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(LOCAL_COEFFICIENTS))
+    local_um: Floats = field(default_factory=lambda: np.zeros(LOCAL_COEFFICIENTS))
     ways: tuple[FeedingWay, FeedingWay] | None = None
 
     @cached_property
@@ -213,13 +214,13 @@ def seen(run: Run) -> Seen:
     return Seen(run, analysis, "", lost, analysis.feed_mm_min, _longer_s(run), form, unusable, local, _ways(run))
 
 
-def coefficients_um(raw: RawCircle) -> NDArray[np.float64]:
+def coefficients_um(raw: RawCircle) -> Floats:
     """Return a circle's form as of `Seen.coefficients_um`."""
     theta = np.radians(raw.theta_deg - raw.circle.start_deg)
     return _orthonormal(amplitudes(1e3 * (raw.length_mm - raw.circle.bar_mm), theta, HIGHEST_HARMONIC))
 
 
-def _orthonormal(found: NDArray[np.complex128]) -> NDArray[np.float64]:
+def _orthonormal(found: NDArray[np.complex128]) -> Floats:
     waves = found[1:] / np.sqrt(2.0)
     return np.concatenate([found[:1].real, waves.real, -waves.imag])
 
@@ -291,6 +292,6 @@ ACROSS = (HIGHEST_HARMONIC + 1, HIGHEST_HARMONIC + 3)
 """Odd coefficients that change sign when a circle is mirrored about the axis through its start: sines of one and three undulations."""
 
 
-def across(one: Seen) -> NDArray[np.float64]:
+def across(one: Seen) -> Floats:
     """Return the coefficients off the axis, shape (2,) [µm]."""
     return one.coefficients_um[list(ACROSS)]

@@ -18,6 +18,7 @@ from dbbstation.quality.stated import apart_by, limit_along
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Others, Seen
 
 LOWEST = 3
@@ -84,7 +85,7 @@ def _compared(one: Seen, against: Seen) -> NDArray[np.bool_]:
     return (ORDERS >= LOWEST) & (alike | (ORDERS % 2 == 1))
 
 
-def _peak(differs_um: NDArray[np.float64]) -> tuple[float, float]:
+def _peak(differs_um: Floats) -> tuple[float, float]:
     theta_deg = np.arange(0.0, 360.0, 1.0)
     path = local_columns(np.radians(theta_deg)) @ differs_um
     top = int(np.argmax(np.abs(path)))

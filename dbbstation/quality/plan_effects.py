@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Planned, Seen
 
 ELSEWHERE_UM = 1e3
@@ -55,22 +56,22 @@ class PlanEffects:
         return next(k for k, one in enumerate(self.circles) if key_of(one) == (test, direction))
 
     @cached_property
-    def shared(self) -> NDArray[np.float64]:
+    def shared(self) -> Floats:
         """Return effects of shared causes on all circles and on none, shape (l + 1, 7, p) [µm]."""
         columns = np.concatenate([self.of_machine, self.of_session], axis=2)
         return np.concatenate([columns, np.zeros_like(columns[:1])])
 
-    def scale(self, size: float) -> NDArray[np.float64]:
+    def scale(self, size: float) -> Floats:
         """Return the standard deviations of shared causes with machine errors of a size, shape (p,)."""
         return np.repeat([size, 1.0], [self.of_machine.shape[2], self.of_session.shape[2]])
 
     @cached_property
-    def of_machine(self) -> NDArray[np.float64]:
+    def of_machine(self) -> Floats:
         """Return effects of the machine's causes on all circles, shape (l, 7, p) [µm]."""
         return self._effects({key for key in self._keys if not key[1]})
 
     @cached_property
-    def of_session(self) -> NDArray[np.float64]:
+    def of_session(self) -> Floats:
         """Return the same of causes common to all circles: the bar, the tool's ball, the plate."""
         return self._effects({key for key in self._of_all if key[1]})
 
@@ -83,7 +84,7 @@ class PlanEffects:
         keys = [set(one.expected.effects_um) for one in self.circles]
         return frozenset(set.intersection(*keys))
 
-    def _effects(self, wanted: set[tuple[str, str]]) -> NDArray[np.float64]:
+    def _effects(self, wanted: set[tuple[str, str]]) -> Floats:
         """Return effects of causes on all circles, shape (l, 7, p) [µm]."""
         columns = [np.zeros((COEFFICIENTS * len(self.circles), 0))]
         for key in (key for key in self._keys if key in wanted):
@@ -100,7 +101,7 @@ class PlanEffects:
         return (u[:, kept] * sizes[kept]).reshape(len(self.circles), COEFFICIENTS, -1)
 
     @cached_property
-    def own(self) -> list[NDArray[np.float64]]:
+    def own(self) -> list[Floats]:
         """Return the covariance of a circle's own part, ball and mounting, shape (7, 7) each [µm²]."""
         found = []
         for one in self.circles:
@@ -125,7 +126,7 @@ class RunEffects:
     def __init__(self, plan: PlanEffects, one: Seen) -> None:
         self._plan, self._one = plan, one
         self.planned = plan.label(one.run.test, one.run.circle.direction)
-        self._products: dict[int, NDArray[np.float64]] = {}
+        self._products: dict[int, Floats] = {}
 
     def shows(self, labels: ArrayLike) -> NDArray[np.int64]:
         """Return the circles whose effects a run has under labels, the last for no circle."""
@@ -133,7 +134,7 @@ class RunEffects:
         own = np.where(labels == ELSEWHERE, len(self._plan.circles), self.planned)
         return np.where(labels >= 0, labels, own)
 
-    def product(self, label: int) -> NDArray[np.float64]:
+    def product(self, label: int) -> Floats:
         """Return products of whitened effects and readings, shape (p + 1, p + 1)."""
         if label not in self._products:
             root = np.linalg.cholesky(self.scatter[label])
@@ -144,13 +145,13 @@ class RunEffects:
         return self._products[label]
 
     @cached_property
-    def off(self) -> NDArray[np.float64]:
+    def off(self) -> Floats:
         """Return the reading minus expectation by label, shape (l + 3, 7) [µm]."""
         expected = np.array([expected_um(one) for one in self._plan.circles])
         return read_um(self._one) - expected[[*range(len(expected)), *[self.planned] * 3]]
 
     @cached_property
-    def scatter(self) -> NDArray[np.float64]:
+    def scatter(self) -> Floats:
         """Return the covariance of the reading's own part by label, shape (l + 3, 7, 7) [µm²]."""
         own = self._plan.own
         by_label = np.array([*own, *[own[self.planned]] * 3]) + self._one.u_um**2 * np.eye(COEFFICIENTS)
@@ -161,12 +162,12 @@ class RunEffects:
         return by_label
 
     @cached_property
-    def half_log_determinants(self) -> NDArray[np.float64]:
+    def half_log_determinants(self) -> Floats:
         """Return half the log determinants of `scatter`, shape (l + 3,)."""
         return log_diagonal(np.linalg.cholesky(self.scatter))
 
 
-def log_diagonal(roots: NDArray[np.floating]) -> NDArray[np.float64]:
+def log_diagonal(roots: NDArray[np.floating]) -> Floats:
     """Return half the log determinants of matrices with these Cholesky factors."""
     return np.asarray(np.sum(np.log(np.diagonal(roots, axis1=-2, axis2=-1)), axis=-1))
 

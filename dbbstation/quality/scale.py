@@ -11,8 +11,7 @@ from dbbstation.quality.knowledge import form_columns
 from dbbstation.quality.limits import quantile
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Expected, Others, Seen
 
 
@@ -58,7 +57,7 @@ def _excess_um(one: Seen) -> float:
 
 
 def _u_um(runs: list[tuple[Seen, Expected]]) -> float:
-    noise, effects = 0.0, dict[tuple[str, str], "NDArray[np.float64]"]()
+    noise, effects = 0.0, dict[tuple[str, str], "Floats"]()
     for one, expected in runs:
         assert one.ways is not None  # noqa: S101 - asked before
         noise += sum(way.u_um**2 for way in one.ways) / (len(one.ways) * len(runs)) ** 2

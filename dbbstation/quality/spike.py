@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.computing.arrays import Floats
 
 BESIDE = 2
 """Readings on either side whose median a reading is held against: a spike of one or two readings does not move it, and what is
@@ -82,9 +83,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     )
 
 
-def _apart(
-    values_um: NDArray[np.float64], phi_deg: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     count = len(values_um)
     apart, sound = np.zeros(count), np.zeros(count, dtype=np.bool_)
     if count <= 2 * BESIDE:
@@ -99,7 +98,7 @@ def _apart(
     return apart, sound
 
 
-def _scales(apart: NDArray[np.float64], among: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
+def _scales(apart: Floats, among: NDArray[np.bool_]) -> tuple[Floats, float]:
     """Return the standard deviation about each reading, shape (n,) [µm], and its freedom."""
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))
@@ -119,5 +118,5 @@ def _scales(apart: NDArray[np.float64], among: NDArray[np.bool_]) -> tuple[NDArr
     return np.maximum(each, LEAST_UM), ROBUST_SHARE * float(among.sum()) / 2.0
 
 
-def _top(apart: NDArray[np.float64], among: NDArray[np.int64]) -> int:
+def _top(apart: Floats, among: NDArray[np.int64]) -> int:
     return int(among[int(np.argmax(np.abs(apart[among])))])

@@ -15,19 +15,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from typing import TypeAlias
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.quality.knowledge import Expected, Seen
 
-    Effects: TypeAlias = Mapping[tuple[str, str], NDArray[np.float64]]
+    Effects: TypeAlias = Mapping[tuple[str, str], Floats]
 
 
-def apart_by_causes(one: Expected, other: Expected) -> NDArray[np.float64]:
+def apart_by_causes(one: Expected, other: Expected) -> Floats:
     """Return the covariance of two forms' difference by all known causes, shape (7, 7) [µm²]."""
     return apart_by(one.effects_um, other.effects_um, len(one.form_um))
 
 
-def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float64]:
+def apart_by(one_um: Effects, other_um: Effects, count: int) -> Floats:
     """Return the covariance of two forms' difference by causes, shape (n, n) [µm²]."""
     covariance = np.zeros((count, count))
     for key in dict.fromkeys([*one_um, *other_um]):
@@ -41,7 +40,7 @@ def apart_by(one_um: Effects, other_um: Effects, count: int) -> NDArray[np.float
     return covariance
 
 
-def covariance_apart(one: Seen, other: Seen) -> NDArray[np.float64] | None:
+def covariance_apart(one: Seen, other: Seen) -> Floats | None:
     """Return the covariance of the difference of two runs of one circle with noise, shape (7, 7) [µm²]; None if one is unknown.
 
     Moves below the ball's stated uncertainty do not count.
@@ -79,14 +78,14 @@ def unseen_um2(one: Seen, other: Seen) -> float:
     return one.u_um**2 + other.u_um**2 + 0.5 * place_um**2
 
 
-def limit_along(covariance: NDArray[np.float64], off: NDArray[np.float64]) -> float:
+def limit_along(covariance: Floats, off: Floats) -> float:
     """Return the limit of a sound vector in the direction of `off`: its ellipsoid with probability SHARE."""
     size = float(np.linalg.norm(off))
     along = off / size if size > 0.0 else np.eye(len(off))[0]
     return length_quantile(len(off)) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
 
 
-def limit_of_length(covariance: NDArray[np.float64]) -> float:
+def limit_of_length(covariance: Floats) -> float:
     """Return the limit of a sound vector's length [Box, Ann. Math. Stat. 25 (1954) 290].
 
     Its square is taken as a scaled chi-square variable of equal mean and variance.

@@ -23,8 +23,7 @@ from dbbstation.quality.together import expected_um, read_um
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.knowledge import Expected, Seen
     from dbbstation.quality.together import Together
@@ -82,7 +81,7 @@ def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:
         yield _Explained(common + float(likelihood), _near(float(square)), f"run {other.run.label}")
 
 
-def _again_um2(other: Seen) -> NDArray[np.float64]:
+def _again_um2(other: Seen) -> Floats:
     assert other.run.expected is not None  # noqa: S101 - chosen so
     signs = along_travel(other.run.circle)
     return signs[:, None] * other.run.expected.again_um2 * signs
@@ -106,11 +105,9 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
         yield _Explained(float(as_likely - likelihood), _near(float(square)), f"test {planned.label}")
 
 
-def _density(
-    off: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _density(off: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """Return log normal densities without the common constant, and squared distances."""
-    squares: NDArray[np.float64] = np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1)
+    squares: Floats = np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1)
     return -0.5 * (np.linalg.slogdet(covariance)[1] + squares), squares
 
 
@@ -118,7 +115,7 @@ def _near(square: float) -> bool:
     return square <= length_quantile(COEFFICIENTS) ** 2
 
 
-def _whole(expected: Expected, circle: Circle) -> NDArray[np.float64]:
+def _whole(expected: Expected, circle: Circle) -> Floats:
     effects = np.hstack([np.zeros((COEFFICIENTS, 1)), *expected.effects_um.values()])
     effects = along_travel(circle)[:, None] * effects
     return effects @ effects.T

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.forms import Forms, FormsBesides
     from dbbstation.quality.knowledge import Expected, Planned, Run, Seen
@@ -40,10 +41,10 @@ class Together:
     runs: tuple[Seen, ...]
     others: FormsBesides
     rows: Mapping[str, NDArray[np.int64]]
-    apart_um: NDArray[np.float64]
-    covariance_um2: NDArray[np.float64]
+    apart_um: Floats
+    covariance_um2: Floats
 
-    def log_likelihoods(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def log_likelihoods(self) -> tuple[Floats, Floats]:
         """Return the log likelihoods of all runs, and of all but the first, for each of SIZES, shape (9,) each."""
         of_others = self.others.log_likelihoods()[:, 0]
         pulls = np.linalg.solve(self.covariance_um2, self.apart_um[:, :, None])[:, :, 0]
@@ -93,7 +94,7 @@ def expected_beside(both: Together | None) -> Expected | None:
     return _placed(own, one.run.circle, read_um(one) - expected_um(one.run) - apart, covariance)
 
 
-def _tail(weights: NDArray[np.float64], covariances_um2: NDArray[np.float64]) -> float:
+def _tail(weights: Floats, covariances_um2: Floats) -> float:
     """Return the factor on the mean covariance for the longer tails of a mixture of sizes.
 
     Its squared radius is exceeded with probability SHARE; covariances of different sizes are assumed alike in shape.
@@ -113,9 +114,7 @@ def _straying(both: Together, size: int) -> float:
     return max(float(np.median(lengths)), 1.0)
 
 
-def _placed(
-    own: Expected, circle: Circle, more_um: NDArray[np.float64], covariance_um2: NDArray[np.float64]
-) -> Expected:
+def _placed(own: Expected, circle: Circle, more_um: Floats, covariance_um2: Floats) -> Expected:
     """Return an expectation with form, centre and mean moved by a form along the travel [µm]."""
     start = np.radians(circle.start_deg)
     # A shift d along the bar at the start is sqrt 2 of a cosine's coefficient; a raised bar sees cos e of it.
@@ -137,23 +136,23 @@ def _placed(
     )
 
 
-def read_um(one: Seen) -> NDArray[np.float64]:
+def read_um(one: Seen) -> Floats:
     """Return coefficients of the readings along the travel; their mean shows other lengths."""
     return read_along_um(one.run.circle, one.coefficients_um)
 
 
-def read_along_um(circle: Circle, form_um: NDArray[np.float64]) -> NDArray[np.float64]:
+def read_along_um(circle: Circle, form_um: Floats) -> Floats:
     """Return the same of a form on a circle, shape (7,) [µm]."""
     return along_travel(circle) * form_um + _length_um(circle)
 
 
-def expected_um(one: Run | Planned) -> NDArray[np.float64]:
+def expected_um(one: Run | Planned) -> Floats:
     """Return the same expectation without other runs."""
     form = np.zeros(COEFFICIENTS) if one.expected is None else one.expected.form_um
     return along_travel(one.circle) * form + _length_um(one.circle)
 
 
-def _length_um(circle: Circle) -> NDArray[np.float64]:
+def _length_um(circle: Circle) -> Floats:
     length = np.zeros(COEFFICIENTS)
     length[0] = 1e3 * circle.bar_mm
     return length

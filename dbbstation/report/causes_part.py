@@ -10,9 +10,7 @@ from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.trace.analysis import horizontal_radius_mm, path_about_ball
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.effects import CuredCircle
     from dbbstation.report.polar import Polar
     from dbbstation.results.ranked import Ranked
@@ -100,6 +98,6 @@ def _drawn(one: CuredCircle) -> Polar:
     )
 
 
-def _path(one: CuredCircle, length_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _path(one: CuredCircle, length_mm: Floats) -> tuple[Floats, Floats]:
     path = path_about_ball(one.raw.theta_deg, horizontal_radius_mm(one.raw, smooth_lengths_mm(one.raw, length_mm)))
     return path.theta_deg, 1e3 * path.deviation_mm

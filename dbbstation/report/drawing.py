@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
-    from numpy.typing import NDArray
 
     from dbbstation.calibration.reporting.residual_map import ResidualMap
+    from dbbstation.computing.arrays import Floats
 
 
 class ShownFigure(Figure):
@@ -80,7 +80,7 @@ def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[Resi
     return meshes[0]
 
 
-def _map(axes: Axes, tests: Sequence[str], values: NDArray[np.float64], reach: float) -> QuadMesh:
+def _map(axes: Axes, tests: Sequence[str], values: Floats, reach: float) -> QuadMesh:
     edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
     mesh = axes.pcolormesh(
         edges, np.arange(len(tests) + 1), np.ma.masked_invalid(values), cmap=DIVERGING, vmin=-reach, vmax=reach

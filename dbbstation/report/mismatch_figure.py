@@ -13,8 +13,8 @@ from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.inference.variables import Variable
 
@@ -51,13 +51,13 @@ def mismatch_figure(found: Mismatch, wanted: Wanted = FigureFormat.SVG) -> Any: 
         return in_format(figure, wanted)
 
 
-def _residuals(found: Mismatch) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _residuals(found: Mismatch) -> tuple[Floats, Floats]:
     channel = found.settled.channel
     base = channel.base.samples @ np.array([f.before.value for f in found.fitted])
     return channel.residual - base, channel.residual - found.explained
 
 
-def _over(axes: Axes, variable: Variable, before: NDArray[np.float64], after: NDArray[np.float64], unit: str) -> None:
+def _over(axes: Axes, variable: Variable, before: Floats, after: Floats, unit: str) -> None:
     step = max(len(before) // MOST_POINTS, 1)
     axes.plot(variable.values[::step], before[::step], ".", color=MEASURED, markersize=1.2, alpha=0.5)
     for values, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
@@ -68,7 +68,7 @@ def _over(axes: Axes, variable: Variable, before: NDArray[np.float64], after: ND
     axes.legend(loc="upper right")
 
 
-def _means(at: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _means(at: Floats, values: Floats) -> tuple[Floats, Floats]:
     edges = np.linspace(at.min(), at.max(), BINS + 1)
     place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, BINS - 1)
     counts = np.bincount(place, minlength=BINS)
@@ -76,14 +76,14 @@ def _means(at: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArra
     return 0.5 * (edges[1:] + edges[:-1]), np.where(counts >= FEWEST_IN_BIN, means, np.nan)
 
 
-def _histogram(axes: Axes, before: NDArray[np.float64], unit: str) -> None:
+def _histogram(axes: Axes, before: Floats, unit: str) -> None:
     axes.hist(before, BINS, color=MEASURED)
     axes.set_xlabel(f"measured less simulated{f', {unit}' if unit else ''}")
     axes.set_ylabel("rows")
     axes.set_title("nothing was found that it follows")
 
 
-def _over_rows(axes: Axes, before: NDArray[np.float64], after: NDArray[np.float64], found: Mismatch) -> None:
+def _over_rows(axes: Axes, before: Floats, after: Floats, found: Mismatch) -> None:
     step = max(len(before) // MOST_POINTS, 1)
     rows = np.arange(len(before))[::step]
     axes.plot(rows, before[::step], color=BEFORE, linewidth=0.5, label="before")

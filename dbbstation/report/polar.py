@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.results.circles import MeasuredCircle
 
@@ -57,8 +58,8 @@ class Drawn:
         deviation_um: from the least-squares circle, shape (n,).
     """
 
-    theta_deg: NDArray[np.float64]
-    deviation_um: NDArray[np.float64]
+    theta_deg: Floats
+    deviation_um: Floats
     direction: str
     name: str
     title: str
@@ -160,7 +161,7 @@ def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple
     return drawn
 
 
-def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], scale: float) -> str:
+def _points(theta_deg: Floats, deviation_um: Floats, scale: float) -> str:
     angle_deg, deviation = thinned(theta_deg, deviation_um)
     theta, radius = np.radians(angle_deg), CIRCLE + scale * deviation
     middle = SIZE / 2
@@ -168,9 +169,7 @@ def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], s
     return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x, y, strict=True))
 
 
-def thinned(
-    theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def thinned(theta_deg: Floats, deviation_um: Floats) -> tuple[Floats, Floats]:
     """Return each stretch's extremes, in order of angle."""
     order = np.argsort(theta_deg, kind="stable")
     theta, deviation = theta_deg[order], deviation_um[order]
@@ -178,7 +177,7 @@ def thinned(
     return theta[kept], deviation[kept]
 
 
-def _extremes(theta: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.intp]:
+def _extremes(theta: Floats, deviation: Floats) -> NDArray[np.intp]:
     stretch = np.minimum((theta / (2.0 * np.pi) * BINS).astype(np.intp), BINS - 1)
     by_size = np.lexsort((deviation, stretch))
     first = np.flatnonzero(np.diff(stretch[by_size], prepend=-1))

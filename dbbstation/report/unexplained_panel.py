@@ -12,8 +12,8 @@ from dbbstation.report.drawing import AFTER
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
-    from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.findings import Curve
 
 PER_WAVE = 24
@@ -53,7 +53,7 @@ WHOSE = {EVERY: EVERY, SIGNED: EVERY, PULL: "every strut by a pull", TOWARDS: "e
 """What moves, as a title says it; bodies have their own names."""
 
 
-def _between(curve: Curve) -> tuple[NDArray[np.float64], ...]:
+def _between(curve: Curve) -> tuple[Floats, ...]:
     """Return places, values and uncertainties, shape (n,) each, interpolated for waves [µm]."""
     at, value, sigma = np.array([(p.at, p.value_um, p.uncertainty_um) for p in curve.points]).T
     if curve.period_mm is None or len(at) < 3:  # noqa: PLR2004 (amplitudes need as many points)
@@ -67,5 +67,5 @@ def _between(curve: Curve) -> tuple[NDArray[np.float64], ...]:
     return fine, wave, np.sqrt(np.maximum(variance, 0.0))
 
 
-def _cosine_and_sine(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cosine_and_sine(angle_rad: Floats) -> Floats:
     return np.column_stack([np.cos(angle_rad), np.sin(angle_rad)])

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, write_poses
 from dbbstation.files.provenance import Provenance
@@ -45,9 +45,9 @@ class PredictionResult(Framed):
     directions_lost: tuple[str, ...]
     unknown_causes: tuple[str, ...]
     model_warnings: tuple[str, ...]
-    commanded: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
-    actual: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
-    uncertainty_mm: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
+    commanded: Annotated[Floats, AsItIs, Kept] = field(repr=False)
+    actual: Annotated[Floats, AsItIs, Kept] = field(repr=False)
+    uncertainty_mm: Annotated[Floats, AsItIs, Kept] = field(repr=False)
     others: Annotated[Mapping[str, Sequence[str]], AsItIs, Kept] = field(default_factory=dict, repr=False)
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
@@ -77,7 +77,7 @@ class PredictionResult(Framed):
 
 
 def prediction_result(
-    identified: IdentifiedModel, table: PoseTable, actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
+    identified: IdentifiedModel, table: PoseTable, actual: Floats, uncertainty_mm: Floats
 ) -> PredictionResult:
     """Return the result of a prediction."""
     figures = pose_errors(table.poses, actual, uncertainty_mm)

@@ -14,8 +14,7 @@ from dbbstation.trace.analysis import best_circle
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.station.events import RunId, Sample
     from dbbstation.trace.circle import RawCircle
@@ -63,12 +62,12 @@ class LiveTrace:
         return self._count
 
     @property
-    def theta_deg(self) -> NDArray[np.float64]:
+    def theta_deg(self) -> Floats:
         """Return angles from +X towards +Y, shape (n,) [deg]."""
         return self._data[0, : self._count]
 
     @property
-    def deviation_um(self) -> NDArray[np.float64]:
+    def deviation_um(self) -> Floats:
         """Return bar length minus nominal, shape (n,) [µm]; NaN breaks the line."""
         return self._data[1, : self._count]
 
@@ -110,7 +109,7 @@ class LiveTrace:
         if usable.any():
             self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
 
-    def _take(self, step: int, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
+    def _take(self, step: int, theta_deg: Floats, deviation_um: Floats) -> None:
         if step == self._step:
             kept = self._data[:, self._step_from : self._count]
             theta_deg = np.concatenate([kept[0], theta_deg])
@@ -124,7 +123,7 @@ class LiveTrace:
         chosen = sorted(telling)
         self._append(theta_deg[chosen], deviation_um[chosen])
 
-    def _append(self, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
+    def _append(self, theta_deg: Floats, deviation_um: Floats) -> None:
         end = self._count + len(theta_deg)
         if end > self._data.shape[1]:
             wider = np.empty((2, max(2 * self._data.shape[1], end)))
@@ -144,7 +143,7 @@ class Derived:
 
     view: View
     measured: LiveTrace
-    deviation_um: NDArray[np.float64]
+    deviation_um: Floats
     largest_um: float
 
     def __len__(self) -> int:
@@ -161,7 +160,7 @@ class Derived:
         return self.measured.circle
 
     @property
-    def theta_deg(self) -> NDArray[np.float64]:
+    def theta_deg(self) -> Floats:
         """Return angles from +X towards +Y, shape (n,) [deg]."""
         return self.measured.theta_deg[: len(self)]
 

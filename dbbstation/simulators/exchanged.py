@@ -13,8 +13,7 @@ from dbbstation.diagnosis.simulator.ports import SimulationFault
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.ports import Ports
 
 MOST_EXCHANGES = 100
@@ -42,15 +41,15 @@ class ExchangedSimulator(Simulator):
     @abstractmethod
     def simulate_once(
         self,
-        inputs: Mapping[str, NDArray[np.float64]],
+        inputs: Mapping[str, Floats],
         parameters: Mapping[str, float],
-        acting: Mapping[str, NDArray[np.float64]],
-    ) -> Mapping[str, NDArray[np.float64]]:
+        acting: Mapping[str, Floats],
+    ) -> Mapping[str, Floats]:
         """Return outputs by name, and signals as `port.signal`, shape (n,), for inputs at the ports, shape (n,)."""
 
     def simulate(
-        self, inputs: Mapping[str, NDArray[np.float64]], parameters: Mapping[str, float], ports: Ports
-    ) -> Mapping[str, NDArray[np.float64]]:
+        self, inputs: Mapping[str, Floats], parameters: Mapping[str, float], ports: Ports
+    ) -> Mapping[str, Floats]:
         """Simulate until port inputs and signals agree."""
         t = inputs["t"]
         acting = {name: np.zeros(len(t)) for name in self._ports}
@@ -69,9 +68,7 @@ class ExchangedSimulator(Simulator):
         what = f"what acts at the ports and the signals there do not agree after {MOST_EXCHANGES} rounds"
         raise SimulationFault(f"{what}; record fewer rows at a time, or write the simulator as a Python class")
 
-    def _acts(
-        self, name: str, t: NDArray[np.float64], found: Mapping[str, NDArray[np.float64]], ports: Ports
-    ) -> NDArray[np.float64]:
+    def _acts(self, name: str, t: Floats, found: Mapping[str, Floats], ports: Ports) -> Floats:
         """Return the input of a port for these signals, shape (n,)."""
         signals = {}
         for signal in self._ports[name]:

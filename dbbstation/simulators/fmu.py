@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 MOST_UNPACKED_MB, MOST_DESCRIBED_MB, MOST_FILES = 2000.0, 50.0, 20_000
@@ -70,10 +70,10 @@ class FmuSimulator(ExchangedSimulator):
 
     def simulate_once(
         self,
-        inputs: Mapping[str, NDArray[np.float64]],
+        inputs: Mapping[str, Floats],
         parameters: Mapping[str, float],
-        acting: Mapping[str, NDArray[np.float64]],
-    ) -> Mapping[str, NDArray[np.float64]]:
+        acting: Mapping[str, Floats],
+    ) -> Mapping[str, Floats]:
         """Simulate the FMU once.
 
         Raises:

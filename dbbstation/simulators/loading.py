@@ -30,8 +30,7 @@ from dbbstation.simulators.program import ProgramSimulator, whole_command
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.formats.simulator import ParameterSchema
     from dbbstation.simulators.exchanged import ExchangedSimulator
@@ -208,7 +207,7 @@ def _tables(
 
 
 def _recorded(file: SimulatorFile, table: TableFile) -> SimulatorRecording:
-    inputs: dict[str, NDArray[np.float64]] = {"t": table.values[file.time]}
+    inputs: dict[str, Floats] = {"t": table.values[file.time]}
     inputs |= {name: table.values[column] for name, column in file.inputs.items()}
     return SimulatorRecording(
         table.file, inputs, {name: table.values[one.column] for name, one in file.outputs.items()}

@@ -19,7 +19,7 @@ from dbbstation.system.children import BoundExceededError, ProgramBounds, run_bo
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 INPUTS, PARAMETERS, OUTPUTS = "inputs.csv", "parameters.json", "outputs.csv"
 """Files in the folder in which the program is run."""
@@ -54,10 +54,10 @@ class ProgramSimulator(ExchangedSimulator):
 
     def simulate_once(
         self,
-        inputs: Mapping[str, NDArray[np.float64]],
+        inputs: Mapping[str, Floats],
         parameters: Mapping[str, float],
-        acting: Mapping[str, NDArray[np.float64]],
-    ) -> Mapping[str, NDArray[np.float64]]:
+        acting: Mapping[str, Floats],
+    ) -> Mapping[str, Floats]:
         """Run the program once.
 
         Raises:
@@ -88,7 +88,7 @@ class ProgramSimulator(ExchangedSimulator):
             raise SimulationFault(f"{said} ended with code {done.code}: {' / '.join(last) or 'it said nothing'}")
 
 
-def _read(path: Path) -> dict[str, NDArray[np.float64]]:
+def _read(path: Path) -> dict[str, Floats]:
     try:
         rows = list(csv.reader(io.StringIO(content_of(path).decode("utf-8"), newline="")))
     except (OSError, UnicodeDecodeError) as error:

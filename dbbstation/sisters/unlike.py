@@ -17,6 +17,8 @@ from scipy.special import ndtri, stdtr, stdtrit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 FALSE_ALARMS = 0.01
 """Probability that a fleet of like machines shows any unlike value."""
 
@@ -50,23 +52,19 @@ class Sisters:
     """
 
     unlike: NDArray[np.bool_]
-    score: NDArray[np.float64]
-    middle: NDArray[np.float64]
-    scatter: NDArray[np.float64]
-    smallest_seen: NDArray[np.float64]
+    score: Floats
+    middle: Floats
+    scatter: Floats
+    smallest_seen: Floats
 
 
-def held_against_sisters(
-    values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
-) -> Sisters:
+def held_against_sisters(values: Floats, u: Floats, false_alarms: float = FALSE_ALARMS) -> Sisters:
     """Compare machines with their sisters: values and standard uncertainties, shape (q, n), NaN if unknown."""
     unlike = unlike_machines(values, u, false_alarms)
     return _scored(values, u, unlike, _share(values, false_alarms))
 
 
-def unlike_machines(
-    values: NDArray[np.float64], u: NDArray[np.float64], false_alarms: float = FALSE_ALARMS
-) -> NDArray[np.bool_]:
+def unlike_machines(values: Floats, u: Floats, false_alarms: float = FALSE_ALARMS) -> NDArray[np.bool_]:
     """Return unlike machines, shape (q, n); arguments as of `held_against_sisters`."""
     known = np.isfinite(values)
     left = known.copy()
@@ -94,15 +92,13 @@ def unlike_machines(
     return (removed_at > 0) & (removed_at <= found[:, None])
 
 
-def _share(values: NDArray[np.float64], false_alarms: float) -> float:
+def _share(values: Floats, false_alarms: float) -> float:
     """Return one quantity's false alarms [Bonferroni]."""
     compared = int((np.isfinite(values).sum(axis=1) >= FEWEST).sum())
     return false_alarms / max(compared, 1)
 
 
-def _middle(
-    values: NDArray[np.float64], variance: NDArray[np.float64], taken: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _middle(values: Floats, variance: Floats, taken: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Return weighted mean and squared scatter, shape (q,) each.
 
     The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero. Newton starts below, with the greatest u
@@ -135,22 +131,20 @@ def _middle(
 class _Departure:
     """One machine of each quantity against others, shape (q,)."""
 
-    off: NDArray[np.float64]
-    spread: NDArray[np.float64]
-    freedom: NDArray[np.float64]
-    middle: NDArray[np.float64]
-    scatter: NDArray[np.float64]
+    off: Floats
+    spread: Floats
+    freedom: Floats
+    middle: Floats
+    scatter: Floats
 
     @property
-    def beyond(self) -> NDArray[np.float64]:
+    def beyond(self) -> Floats:
         """Return the probability beyond, by Student's t; nan gives a half."""
         probability = stdtr(self.freedom, -np.abs(self.off) / self.spread)
         return np.asarray(np.where(np.isfinite(probability), probability, 0.5))
 
 
-def _departure(
-    values: NDArray[np.float64], variance: NDArray[np.float64], others: NDArray[np.bool_], machine: NDArray[np.int64]
-) -> _Departure:
+def _departure(values: Floats, variance: Floats, others: NDArray[np.bool_], machine: NDArray[np.int64]) -> _Departure:
     """Return one machine of each quantity against the others.
 
     Scatter of unequal uncertainties has Satterthwaite's freedom by its Fisher information [Viechtbauer 2005, J. Educ.
@@ -167,7 +161,7 @@ def _departure(
     return _Departure(values[rows, machine] - middle, np.sqrt(of_one + of_middle), freedom, middle, np.sqrt(square))
 
 
-def _scored(values: NDArray[np.float64], u: NDArray[np.float64], unlike: NDArray[np.bool_], share: float) -> Sisters:
+def _scored(values: Floats, u: Floats, unlike: NDArray[np.bool_], share: float) -> Sisters:
     variance = np.where(np.isfinite(u), u, 0.0) ** 2
     alike = np.isfinite(values) & ~unlike
     score, middle, scatter, smallest = (np.full(values.shape, np.nan) for _ in range(4))

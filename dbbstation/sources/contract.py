@@ -26,8 +26,7 @@ from dbbstation.trace.columns import WithLogged
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Compliance, Hexapod, Machine
     from dbbstation.plan.plan import Plate
     from dbbstation.sources.c_form import CForm
@@ -69,8 +68,8 @@ class SetUpErrors:
         moving_ball_mm: moving ball less tool tip, platform frame, shape (3,).
     """
 
-    fixed_ball_mm: NDArray[np.float64]
-    moving_ball_mm: NDArray[np.float64]
+    fixed_ball_mm: Floats
+    moving_ball_mm: Floats
     uncertainty_mm: float
 
 
@@ -82,8 +81,8 @@ class Thermometer:
         degc: without quantisation, shape (q,).
     """
 
-    time_s: NDArray[np.float64]
-    degc: NDArray[np.float64]
+    time_s: Floats
+    degc: Floats
 
 
 @dataclass(frozen=True)
@@ -111,8 +110,8 @@ class Setup:
     mounting: str
     ball: str
     instrument: str
-    fixed_ball_mm: NDArray[np.float64]
-    mounting_repeatability_mm: float | NDArray[np.float64]
+    fixed_ball_mm: Floats
+    mounting_repeatability_mm: float | Floats
     ball_uncertainty_mm: float
     bar_uncertainty_mm: float
     place_known: bool = True
@@ -147,15 +146,15 @@ class Motion(WithLogged):
             place.
     """
 
-    poses: NDArray[np.float64]
+    poses: Floats
     is_path: bool = False
     straight: bool = False
     kept: slice = field(default_factory=lambda: slice(None))
-    time_s: NDArray[np.float64] | None = None
+    time_s: Floats | None = None
     logged: Logged = field(default_factory=dict)
-    load_n: NDArray[np.float64] | None = None
+    load_n: Floats | None = None
     setup: Setup | None = None
-    reading_mm: NDArray[np.float64] | None = None
+    reading_mm: Floats | None = None
     reading_is_measured: bool = False
     put_up: Motion | None = None
     _known: dict[str, tuple[Hexapod | None, object]] = field(default_factory=dict, init=False, repr=False)
@@ -193,11 +192,11 @@ class Motion(WithLogged):
         before = earlier._rows()
         return self._of_rows(lambda values, name: np.concatenate([before[name], values]))
 
-    def _rows(self) -> dict[str, NDArray[np.float64]]:
+    def _rows(self) -> dict[str, Floats]:
         own = {name: getattr(self, name) for name in ("poses", "time_s", "load_n", "reading_mm")}
         return {name: values for name, values in own.items() if values is not None} | dict(self.logged)
 
-    def _of_rows(self, change: Callable[[NDArray[np.float64], str], NDArray[np.float64]]) -> Motion:
+    def _of_rows(self, change: Callable[[Floats, str], Floats]) -> Motion:
         changed = {name: change(values, name) for name, values in self._rows().items()}
         logged = {name: changed.pop(name) for name in self.logged}
         return replace(self, kept=slice(None), logged=logged, put_up=None, **changed)  # type: ignore[arg-type]
@@ -296,14 +295,14 @@ class Effect:
         current_a: added to motor currents, shape (6,) or (n, 6).
     """
 
-    strut_mm: NDArray[np.float64] | None = None
-    base_joint_mm: NDArray[np.float64] | None = None
-    platform_joint_mm: NDArray[np.float64] | None = None
-    tool_tip_mm: NDArray[np.float64] | None = None
-    fixed_ball_mm: NDArray[np.float64] | None = None
-    reading_mm: NDArray[np.float64] | None = None
-    load_n: NDArray[np.float64] | None = None
-    current_a: NDArray[np.float64] | None = None
+    strut_mm: Floats | None = None
+    base_joint_mm: Floats | None = None
+    platform_joint_mm: Floats | None = None
+    tool_tip_mm: Floats | None = None
+    fixed_ball_mm: Floats | None = None
+    reading_mm: Floats | None = None
+    load_n: Floats | None = None
+    current_a: Floats | None = None
 
     def __add__(self, other: Effect) -> Effect:
         """Return the sum of both effects."""
@@ -321,7 +320,7 @@ class Effect:
         """Return the effect in the last rows."""
         return self.rows(slice(-count, None) if count else slice(0, 0))
 
-    def times(self, values: NDArray[np.float64]) -> Effect:
+    def times(self, values: Floats) -> Effect:
         """Return the effect of values, shape (p,), if `self` is a derivative."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         return Effect(**{name: None if array is None else array @ values for name, array in arrays.items()})
@@ -340,7 +339,7 @@ EFFECT_SHAPES: dict[str, tuple[int, ...]] = {
 """Axes of each part of an effect, without those of samples and parameters."""
 
 
-def _sum(a: NDArray[np.float64] | None, b: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+def _sum(a: Floats | None, b: Floats | None) -> Floats | None:
     if a is None or b is None:
         return b if a is None else a
     return a + b
@@ -401,14 +400,14 @@ class ErrorSource(ABC):
         """
 
     @abstractmethod
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return the effect of values, shape (p,), on a motion."""
 
     @abstractmethod
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return the derivative of `effect`, with a last axis of length p."""
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> State:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> State:  # noqa: ARG002
         """Return the memory before a run's first row.
 
         Args:
@@ -416,9 +415,7 @@ class ErrorSource(ABC):
         """
         return None
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: State
-    ) -> tuple[Effect, State]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: State) -> tuple[Effect, State]:
         """Return the effect along one stretch, and the memory behind it.
 
         Stretches of any cut give the effects of the whole. Sources without history have no state. A path source that does
@@ -438,9 +435,9 @@ class ErrorSource(ABC):
         motion: Motion,
         reached: Motion,
         machine: Machine,
-        values: NDArray[np.float64],
+        values: Floats,
         state: State,
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """Return strut errors along a stretch with given reached lengths, shape (n, 6) [mm].
 
         For sources that `builds_up`.
@@ -459,11 +456,11 @@ class ErrorSource(ABC):
             return motion.setup.session
         return motion.setup.mounting if self.belongs_to is Owner.MOUNTING else motion.setup.instrument
 
-    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+    def shortest_period_mm(self, machine: Machine, values: Floats) -> float:  # noqa: ARG002
         """Return the shortest way of one wave of these values [mm]: by default `detail_mm`."""
         return self.detail_mm
 
-    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
+    def stated_mm(self, motion: Motion) -> Floats | None:  # noqa: ARG002
         """Return stated standard deviations of this motion's set, shape (p,), or None.
 
         A stated size makes a random effect.
@@ -495,7 +492,7 @@ class ErrorSource(ABC):
     def c_form(
         self,
         machine: Machine,  # noqa: ARG002
-        values: NDArray[np.float64],  # noqa: ARG002
+        values: Floats,  # noqa: ARG002
         thermometers: Collection[str] = (),  # noqa: ARG002
     ) -> CForm | None:
         """Return the effect as C for a kinematics inside a control; None, the default, if there is none.
@@ -509,7 +506,7 @@ class ErrorSource(ABC):
         """
         return None
 
-    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         """Return changes of the effect by other constants of the law, with a last axis.
 
         For machine-dependent constants that recordings seldom show: a diagnosis allows each change in a share up to about
@@ -537,7 +534,7 @@ class ErrorSource(ABC):
         """Return whether it only affects motor currents."""
         return Need.CURRENT in self.needs
 
-    def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:  # noqa: ARG002
+    def found_compliance(self, machine: Machine, values: Floats) -> Compliance | None:  # noqa: ARG002
         """Return the struts' compliance by these values, scaled by the first, or None."""
         return None
 
@@ -545,8 +542,8 @@ class ErrorSource(ABC):
         self,
         motion: Motion,  # noqa: ARG002
         machine: Machine,  # noqa: ARG002
-        values: NDArray[np.float64],  # noqa: ARG002
-    ) -> NDArray[np.float64] | None:
+        values: Floats,  # noqa: ARG002
+    ) -> Floats | None:
         """Return the derivative of `current_a` by the motor's load, shape (n, 6) [A/N]; None: independent."""
         return None
 
@@ -578,16 +575,14 @@ class SourceWithHistory(ErrorSource):
     """A source with defined memory: `begin` and `advance`."""
 
     @abstractmethod
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> State:
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> State:
         """Return the memory before a run's first row."""
 
     @abstractmethod
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: State
-    ) -> tuple[Effect, State]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: State) -> tuple[Effect, State]:
         """Return the effect along one stretch, and the memory behind it."""
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return the effect of the run as one stretch."""
         return self.advance(motion, machine, values, self.begin(motion, machine, values))[0]
 
@@ -595,7 +590,7 @@ class SourceWithHistory(ErrorSource):
 class LinearSource(ErrorSource):
     """A source proportional to its parameters: only the derivative is written."""
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return derivative times values."""
         return self.derivative(motion, machine, values).times(values)
 
@@ -609,7 +604,7 @@ class Fitted:
     """
 
     source: ErrorSource
-    values: NDArray[np.float64]
+    values: Floats
     shared: str = ""
 
     @classmethod

@@ -19,7 +19,7 @@ from dbbstation.trace.columns import currents, temperatures
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -154,7 +154,7 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
     )
 
 
-def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> list[str]:
+def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: Floats) -> list[str]:
     if source.looks_ahead or not source.has_history:
         return []
     motion = replace(motion, straight=True)
@@ -232,7 +232,7 @@ def _of_proportion(
     motion: Motion,
     machine: Machine,
     parameters: Sequence[Parameter],
-    values: NDArray[np.float64],
+    values: Floats,
 ) -> list[str]:
     """Check that zero gives nothing, and doubled amplitudes doubled effects, unless paths are remembered."""
     zero = np.zeros(len(parameters))
@@ -311,7 +311,7 @@ def _of_derivative(
     motion: Motion,
     machine: Machine,
     parameters: Sequence[Parameter],
-    values: NDArray[np.float64],
+    values: Floats,
 ) -> list[str]:
     derivative = source.derivative(motion, machine, values)
     faults = []

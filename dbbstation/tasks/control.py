@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.control.parameters import SourceLeft
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -198,9 +197,7 @@ def parameters(
 _HELD_IN_INI = re.compile(r"(COMP_FILE|BACKLASH)\s*=\s*(?P<value>[^#;\s]+)")
 
 
-def _volume(
-    machine: Machine, volume_mm: Sequence[float] | None, tilt_deg: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _volume(machine: Machine, volume_mm: Sequence[float] | None, tilt_deg: float) -> tuple[Floats, Floats]:
     middle_mm, half = np.array([0.0, 0.0, sum(machine.travel.z_mm) / 2.0]), SIZE_MM / 2.0
     pairs = np.column_stack([middle_mm - half, middle_mm + half])
     if volume_mm is not None:

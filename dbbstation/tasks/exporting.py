@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.provenance import Provenance
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
@@ -92,7 +91,7 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
     return Exporting(tuple(runs), names)
 
 
-def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
+def angles_deg(recording: Recording, circle: Circle) -> Floats:
     """Return each sample's commanded angle on the full turn, 0 to 360, NaN for others, shape (n,) [deg].
 
     Raises:
@@ -107,7 +106,7 @@ def angles_deg(recording: Recording, circle: Circle) -> NDArray[np.float64]:
 
 def blocks(
     what: Exporting, progress: Callable[[int, int], None], say: Callable[[str], None]
-) -> Iterator[dict[str, NDArray[np.float64] | list[str]]]:
+) -> Iterator[dict[str, Floats | list[str]]]:
     """Yield the columns of each run: numbers with NaN for gaps, texts as lists.
 
     Raises:
@@ -147,7 +146,7 @@ def blocks(
             **recording.logged,
         }
         texts = {columns.STATUS: read.status, **read.unknown_columns}
-        block: dict[str, NDArray[np.float64] | list[str]] = {}
+        block: dict[str, Floats | list[str]] = {}
         for name in what.names:
             if name in said:
                 block[name] = [said[name]] * count
@@ -234,7 +233,7 @@ def _meanings(what: Exporting) -> Mapping[str, str]:
     }
 
 
-def _cells(values: NDArray[np.float64] | list[str], *, whole: bool) -> list[object]:
+def _cells(values: Floats | list[str], *, whole: bool) -> list[object]:
     if isinstance(values, list):
         return list(values)
     if whole:

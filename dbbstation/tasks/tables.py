@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.recordings.table_csv import Columns
 
@@ -299,11 +300,11 @@ class _Reader:
         if faults:
             raise InputError(faults)
 
-    def _derivatives(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
+    def _derivatives(self, values: Mapping[str, Floats]) -> list[str]:
         found = [name for name in self._names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]
         return [name for name in found if self._is_numeric(name, values[name])]
 
-    def _chosen(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
+    def _chosen(self, values: Mapping[str, Floats]) -> list[str]:
         asked = self._asked
         if asked.variables is not None:
             return list(asked.variables)
@@ -326,7 +327,7 @@ class _Reader:
                     return True
         return False
 
-    def _refuse_constant(self, measured: NDArray[np.float64], simulated: NDArray[np.float64]) -> None:
+    def _refuse_constant(self, measured: Floats, simulated: Floats) -> None:
         """Refuse values that differ by one number: what rounding adds to it is no noise."""
         apart = measured - simulated
         rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
@@ -336,7 +337,7 @@ class _Reader:
         what = f"`{self._asked.measured}` less `{self._asked.simulated}` is {size} in every row: no difference is left to explain"
         raise InputError.of(file.file, what, "check that these are the columns that you mean", line=file.header)
 
-    def _is_numeric(self, name: str, column: NDArray[np.float64]) -> bool:
+    def _is_numeric(self, name: str, column: Floats) -> bool:
         bad = sum(len(file.faults_of(name)) for file in self._files)
         if all(file.is_text(name) for file in self._files):
             self._notes.append(f"`{name}` has no numbers and is left out")
@@ -356,7 +357,7 @@ class _Reader:
         return next((name for name in chosen if self._meaning(name).kind is Kind.TIME), None)
 
     def _order(
-        self, values: Mapping[str, NDArray[np.float64]], used: Sequence[str], clock: str | None
+        self, values: Mapping[str, Floats], used: Sequence[str], clock: str | None
     ) -> tuple[NDArray[np.int64], tuple[slice, ...], tuple[str, ...]]:
         """Return complete rows, by block in time order, with the blocks and their names."""
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
@@ -402,7 +403,7 @@ class _Reader:
         found = stated or meaning_of(name)
         return Meaning(found.unit, Kind.TIME) if name == self._asked.time else found
 
-    def _variable(self, name: str, values: NDArray[np.float64], *, quiet: bool = False) -> Variable | None:
+    def _variable(self, name: str, values: Floats, *, quiet: bool = False) -> Variable | None:
         meaning = self._meaning(name)
         if np.ptp(values) == 0.0:
             if not quiet:
@@ -422,7 +423,7 @@ class _Reader:
             self._notes.append(f"`{variable.name}` has the values of `{same.name}` in all rows{scaled} and is left out")
         return kept
 
-    def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
+    def _is_the_difference(self, variable: Variable, kept: Mapping[str, Floats]) -> bool:
         asked = self._asked
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.measured], kept[asked.simulated]])
         values, *_ = np.linalg.lstsq(both, variable.values, rcond=None)
@@ -433,7 +434,7 @@ class _Reader:
         return True
 
 
-def _is_a_line(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+def _is_a_line(one: Floats, other: Floats) -> bool:
     """Return whether columns are equal except for scale and origin, so that no effect separates them."""
     if np.array_equal(one, other):
         return True
@@ -446,7 +447,7 @@ ROUNDED = 1e-9
 """Share of a column's size by which it may depart from a line in another that it is."""
 
 
-def _by_clock(rows: NDArray[np.int64], clock: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+def _by_clock(rows: NDArray[np.int64], clock: Floats) -> list[NDArray[np.int64]]:
     back = np.flatnonzero(np.diff(clock[rows]) < 0.0) + 1
     if len(back) and len(rows) >= MOST_RESETS * (len(back) + 1):
         return np.split(rows, back)

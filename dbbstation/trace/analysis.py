@@ -12,7 +12,7 @@ from dbbstation.errors import TraceError
 from dbbstation.trace.circle import CentredCircle, RawCircle
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 MOST_STEPS = 20
 CENTRE_TOLERANCE_MM = 1e-12
@@ -40,9 +40,7 @@ class CircleFigures:
         return 1e3 * float(np.hypot(*self.centre_mm))
 
 
-def best_circle(
-    theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64], near_mm: NDArray[np.float64] | None = None
-) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = None) -> tuple[Floats, float, Floats]:
     """Return centre, shape (2,) [mm], radius [mm] and deviations, shape (n,) [mm], of the least-squares circle [CAL eq 6].
 
     Args:
@@ -73,7 +71,7 @@ def best_circle(
     )
 
 
-def _step(columns: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _step(columns: Floats, left: Floats) -> Floats | None:
     """Return the least-squares solution of few columns, shape (k,), or None.
 
     Normal equations suffice, since Gauss-Newton corrects rounding; short arcs are solved orthogonally.
@@ -100,13 +98,13 @@ class BallPath:
         deviation_mm: radial, shape (n,).
     """
 
-    theta_deg: NDArray[np.float64]
-    centre_mm: NDArray[np.float64]
+    theta_deg: Floats
+    centre_mm: Floats
     radius_mm: float
-    deviation_mm: NDArray[np.float64]
+    deviation_mm: Floats
 
 
-def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64]) -> BallPath:
+def path_about_ball(theta_deg: Floats, radius_mm: Floats) -> BallPath:
     """Return a path's least-squares circle, each point at its angle about the fixed ball.
 
     Commanded angles refer to the commanded centre. From a ball at distance c a point turns by c/R. At commanded angles
@@ -127,7 +125,7 @@ def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float6
     return BallPath(np.mod(about_ball_deg, 360.0), centre, radius, deviation)
 
 
-def horizontal_radius_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def horizontal_radius_mm(raw: RawCircle, length_mm: Floats) -> Floats:
     """Return the moving ball's distance from the vertical through the fixed ball [mm]."""
     height = raw.circle.bar_mm * np.sin(np.radians(raw.circle.elevation_deg))
     return np.sqrt(length_mm**2 - height**2)
@@ -148,7 +146,7 @@ _PATHS: WeakKeyDictionary[RawCircle, BallPath] = WeakKeyDictionary()
 """Paths of raw circles, which figures and analyses ask for."""
 
 
-def figures(raw: RawCircle, length_mm: NDArray[np.float64] | None = None) -> CircleFigures:
+def figures(raw: RawCircle, length_mm: Floats | None = None) -> CircleFigures:
     """Return figures of a raw circle, cached, or of other lengths at its angles, shape (n,) [mm].
 
     Raises:
@@ -165,7 +163,7 @@ _MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
 """Figures of raw circles as measured, which checks, fits and reports all ask for."""
 
 
-def _figures(raw: RawCircle, length_mm: NDArray[np.float64]) -> CircleFigures:
+def _figures(raw: RawCircle, length_mm: Floats) -> CircleFigures:
     # A path is two numbers a sample: who asks for figures only does not leave it in the memory.
     path = _PATHS.get(raw) if length_mm is raw.length_mm else None
     if path is None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.circle import RawCircle
 
 
@@ -37,7 +38,7 @@ def averaged(raw: RawCircle, sectors: int) -> RawCircle:
     )
 
 
-def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.float64]:
+def means(values: Floats, group: NDArray[np.int64]) -> Floats:
     """Return each group's mean row, shape (groups, ...); groups count from 0 without gaps."""
     count = np.bincount(group)
     if values.ndim == 1:
@@ -45,9 +46,7 @@ def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.f
     return np.column_stack([np.bincount(group, column) / count for column in values.T])
 
 
-def by_angle(
-    raw: RawCircle, curves: Sequence[NDArray[np.float64]], sectors: int
-) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+def by_angle(raw: RawCircle, curves: Sequence[Floats], sectors: int) -> tuple[Floats, list[Floats]]:
     """Return rising angles from +X towards +Y [deg] and sector means of curves, shape (s,) each, for drawing."""
     sector = sector_of(raw, sectors)
     theta = np.mod(raw.circle.theta_deg(means(raw.phi_deg, sector)), FULL_TURN_DEG)

@@ -10,8 +10,7 @@ import numpy as np
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.columns import Logged
 
@@ -28,9 +27,9 @@ class RawCircle(WithLogged):
 
     name: str
     circle: Circle
-    t_s: NDArray[np.float64]
-    phi_deg: NDArray[np.float64]
-    length_mm: NDArray[np.float64]
+    t_s: Floats
+    phi_deg: Floats
+    length_mm: Floats
     logged: Logged = field(default_factory=dict)
     start_uncertainty_deg: float = 0.0
 
@@ -38,7 +37,7 @@ class RawCircle(WithLogged):
         return len(self.t_s)
 
     @property
-    def theta_deg(self) -> NDArray[np.float64]:
+    def theta_deg(self) -> Floats:
         """Return the angle from +X towards +Y, within 0 to 360 [deg]."""
         return np.mod(self.circle.theta_deg(self.phi_deg), 360.0)
 
@@ -54,6 +53,6 @@ class CentredCircle:
 
     name: str
     circle: Circle
-    theta_deg: NDArray[np.float64]
-    deviation_mm: NDArray[np.float64]
+    theta_deg: Floats
+    deviation_mm: Floats
     radius_mm: float

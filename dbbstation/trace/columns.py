@@ -11,9 +11,9 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
-    Logged = Mapping[str, NDArray[np.float64]]
+    Logged = Mapping[str, Floats]
 
 
 class ColumnKind(StrEnum):
@@ -104,12 +104,12 @@ class WithLogged:
     logged: Logged
 
     @property
-    def temperature_degc(self) -> dict[str, NDArray[np.float64]]:
+    def temperature_degc(self) -> dict[str, Floats]:
         """Return temperatures by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`), shape (n,) each [degC]."""
         return {COLUMNS[name].of: values for name, values in self.logged.items() if _is(name, ColumnKind.TEMPERATURE)}
 
     @property
-    def motor_current_a(self) -> NDArray[np.float64] | None:
+    def motor_current_a(self) -> Floats | None:
         """Return the motors' currents, NaN for unlogged ones, shape (n, 6) [A]; None without any."""
         there = next((values for name, values in self.logged.items() if _is(name, ColumnKind.CURRENT)), None)
         if there is None:
@@ -119,7 +119,7 @@ class WithLogged:
         )
 
 
-def each(logged: Logged, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Logged:
+def each(logged: Logged, change: Callable[[Floats], Floats]) -> Logged:
     """Return every column changed alike."""
     return {name: change(values) for name, values in logged.items()}
 
@@ -130,7 +130,7 @@ def temperatures(by_sensor: Logged) -> Logged:
     return {names[sensor]: values for sensor, values in by_sensor.items()}
 
 
-def currents(current_a: NDArray[np.float64]) -> Logged:
+def currents(current_a: Floats) -> Logged:
     """Return six motors' currents, shape (n, 6) [A], as columns."""
     return dict(zip(_named(ColumnKind.CURRENT), np.ascontiguousarray(current_a.T), strict=True))
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.recording import Recording
 
@@ -116,7 +117,7 @@ def unusable_on_turn(recording: Recording, circle: Circle) -> int:
         return 0
 
 
-def _left_out(recording: Recording, t_s: NDArray[np.float64]) -> int:
+def _left_out(recording: Recording, t_s: Floats) -> int:
     if recording.usable is None:
         return 0
     return int(np.count_nonzero(~recording.usable & (recording.t_s >= t_s[0]) & (recording.t_s <= t_s[-1])))
@@ -144,7 +145,7 @@ def _turn(recording: Recording, circle: Circle) -> RawCircle:
     return replace(raw, start_uncertainty_deg=start_uncertainty_deg(recording, circle))
 
 
-def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float]) -> NDArray[np.float64]:
+def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float]) -> Floats:
     """Return each sample's progress by the programmed feed, 0 at the turn's start, shape (n,) [deg]."""
     return FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
 
@@ -211,20 +212,20 @@ COUNTS_BACKWARDS = "the gauge counts the wrong way round: turn its counting dire
 """What a length means that grows where the machine feeds in, and what to do."""
 
 
-def _counts_backwards(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle) -> bool:
+def _counts_backwards(t: Floats, length: Floats, circle: Circle) -> bool:
     """Return whether both ends lie below the middle by a feed-in, as with an inverted gauge."""
     ends = (float(np.median(length[np.abs(t - end) <= STANDING_S])) for end in (t[0], t[-1]))
     return all(abs(float(np.median(length)) - end - circle.feed_in_mm) < 0.5 * circle.feed_in_mm for end in ends)
 
 
-def _first_below(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle) -> int | None:
+def _first_below(t: Floats, length: Floats, circle: Circle) -> int | None:
     """Return the first sample half a feed-in below the start's length, or None."""
     standing = np.abs(t - t[0]) <= STANDING_S
     below = np.flatnonzero(length < float(np.median(length[standing])) - circle.feed_in_mm / 2.0)
     return int(below[0]) if len(below) and below[0] > 0 else None
 
 
-def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, first: int) -> float:
+def _edge(t: Floats, length: Floats, circle: Circle, first: int) -> float:
     """Return an edge's time on the way in, halfway between outside and inside [s]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     after_s = np.abs(t - t[first]) * np.where(np.arange(len(t)) < first, -1.0, 1.0)
@@ -363,7 +364,7 @@ def _match(
     return turn, remaining / float(np.sqrt(spread)), remaining, of_noise
 
 
-def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def _slopes(t_s: Floats, piece: NDArray[np.int64]) -> Callable[[Floats], Floats]:
     middle, half_s = 0.5 * (t_s[0] + t_s[-1]), 0.5 * (t_s[-1] - t_s[0])
     powers = np.polynomial.polynomial.polyvander((t_s - middle) / half_s, SHAPE_ORDER)
     orthogonal, upper = np.linalg.qr(powers)
@@ -372,7 +373,7 @@ def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDA
     return lambda values: np.asarray(of_rest @ (orthogonal.T @ values))
 
 
-def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.float64]:
+def one_turn_deg(theta_deg: Floats, circle: Circle) -> Floats:
     """Return progress along one turn at recorded angles, NaN outside, shape (n,) [deg].
 
     Of a longer run the first whole turn from the plan's start counts, else the middle one. Slight overlaps at its ends do
@@ -392,7 +393,7 @@ def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.f
     return np.where(inside, phi, np.nan)
 
 
-def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:
+def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: NDArray[np.bool_]) -> RawCircle:
     """Return usable rows of the turn; refuse holes and a bar off the circle."""
     if recording.usable is not None:
         rows = rows & recording.usable

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +19,9 @@ class DriveRecording:
     """
 
     name: str
-    t_s: NDArray[np.float64]
-    position_mm: NDArray[np.float64]
-    force_n: NDArray[np.float64]
+    t_s: Floats
+    position_mm: Floats
+    force_n: Floats
 
     def __len__(self) -> int:
         return len(self.t_s)

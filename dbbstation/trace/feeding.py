@@ -10,8 +10,7 @@ import numpy as np
 from dbbstation.trace.cut import OUTSIDE_FEEDINGS, progress_deg
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.recording import Recording
 
@@ -55,9 +54,7 @@ def feeding_ways(
     return FeedingWay(-circle.overshoot_deg, *begin), FeedingWay(circle.swept_deg - circle.overshoot_deg, *end)
 
 
-def _way(
-    recording: Recording, circle: Circle, behind_s: NDArray[np.float64], along_deg: NDArray[np.float64]
-) -> tuple[float, float] | None:
+def _way(recording: Recording, circle: Circle, behind_s: Floats, along_deg: Floats) -> tuple[float, float] | None:
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     outside = recording.length_mm[(behind_s > -OUTSIDE_FEEDINGS * feeding_s) & (behind_s < -feeding_s)]
     chosen = (along_deg > LEFT_OUT_DEG) & (along_deg < LEFT_OUT_DEG + READ_DEG)

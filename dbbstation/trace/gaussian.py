@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 LEAST_CELLS = 4096
 CELLS_PER_SAMPLE = 4
@@ -17,7 +17,7 @@ CELLS_PER_SAMPLE = 4
 samples themselves can just show."""
 
 
-def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
+def transmission(undulations: Floats, cut_off_upr: float) -> Floats:
     """Return an undulation's transmitted share, 0.5 at the cut-off.
 
     exp(-π (α k / k_c)²), α = sqrt(ln 2 / π), which is 2^-(k / k_c)² [ISO 16610-21:2011, 5.3].
@@ -25,7 +25,7 @@ def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArra
     return np.asarray(np.exp2(-((undulations / cut_off_upr) ** 2)), dtype=np.float64)
 
 
-def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
+def gaussian(theta_deg: Floats, values: Floats, cut_off_upr: float) -> Floats:
     """Return a closed profile without short undulations, at the same angles.
 
     Args:
@@ -44,7 +44,7 @@ def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_of
 
     passed = transmission(np.arange(cells // 2 + 1.0), cut_off_upr)
 
-    def spread(amount: NDArray[np.float64]) -> NDArray[np.float64]:
+    def spread(amount: Floats) -> Floats:
         on_cells = np.bincount(lower, amount * (1.0 - share), cells) + np.bincount(upper, amount * share, cells)
         return np.fft.irfft(np.fft.rfft(on_cells) * passed, cells)
 

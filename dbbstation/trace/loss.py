@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 _OFF = 0.25
 """How far a spacing may be from a whole number of periods [periods]: a device's own clock keeps to hundredths."""
@@ -16,7 +16,7 @@ _REGULAR = 0.9
 """Share of spacings, and of wide ones, that must be whole numbers of periods for wide ones to be losses."""
 
 
-def lost_samples(t_s: NDArray[np.float64]) -> int:
+def lost_samples(t_s: Floats) -> int:
     """Return missing samples by times of a fixed rate; 0 without a fixed rate."""
     if len(t_s) < _FEWEST:
         return 0

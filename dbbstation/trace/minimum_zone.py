@@ -13,6 +13,8 @@ from dbbstation.errors import TraceError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 FEWEST_POINTS = 4
 """Three points lie on one circle: the zone of fewer than four has no width and no place."""
 
@@ -47,7 +49,7 @@ class MinimumZone:
         return self.outer_mm - self.inner_mm
 
 
-def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
+def minimum_zone(points_mm: Floats) -> MinimumZone:
     """Return the exact minimum zone of a closed path.
 
     Two outer and two inner points determine it, with crossing chords [Rivlin, Approximation by circles, Computing 21
@@ -70,7 +72,7 @@ def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
     raise TraceError("its minimum zone was not found", remedy="report this recording: it should always be found")
 
 
-def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
+def _extremes(points_mm: Floats) -> NDArray[np.int64]:
     # Sorting all points takes longer than the search: those of a sound path differ from the first.
     first = points_mm[:FEWEST_POINTS]
     if len(np.unique(first, axis=0)) < FEWEST_POINTS and len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
@@ -87,7 +89,7 @@ def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.unique(np.concatenate(found))
 
 
-def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def _best_centre(points_mm: Floats) -> Floats:
     """Return the zone's centre for a few points by all bisector crossings, shape (2,) [mm]."""
     pairs = np.array(list(combinations(range(len(points_mm)), 2)))
     first, second = points_mm[pairs[:, 0]], points_mm[pairs[:, 1]]
@@ -111,7 +113,7 @@ def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(centres[np.argmin(_widths(centres, points_mm))])
 
 
-def _widths(centres_mm: NDArray[np.float64], points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def _widths(centres_mm: Floats, points_mm: Floats) -> Floats:
     # Points first: ranges are then taken row by row of a thousand centres, not centre by centre of a dozen points.
     across, along = (points_mm[:, k, None] - centres_mm[:, k] for k in (0, 1))
     return np.asarray(np.ptp(np.sqrt(across * across + along * along), axis=0))

@@ -11,8 +11,7 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace.cut import edges_of, progress_deg
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.recording import Recording
 
@@ -28,8 +27,8 @@ FEWEST_SAMPLES = 20
 class Passes:
     """Second pass less first."""
 
-    phi_deg: NDArray[np.float64]
-    apart_um: NDArray[np.float64]
+    phi_deg: Floats
+    apart_um: Floats
     turn_s: float
 
     @property

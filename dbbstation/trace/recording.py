@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.columns import Logged
 
 
@@ -27,9 +28,9 @@ class Recording(WithLogged):
     """
 
     name: str
-    t_s: NDArray[np.float64]
-    length_mm: NDArray[np.float64]
-    theta_deg: NDArray[np.float64] | None = None
+    t_s: Floats
+    length_mm: Floats
+    theta_deg: Floats | None = None
     logged: Logged = field(default_factory=dict)
     usable: NDArray[np.bool_] | None = None
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 BATCHES = 10
 """Readings that follow each other closely see the same vibration and the same draught; their batches hardly do."""
@@ -30,7 +30,7 @@ class Steady:
     count: int
 
 
-def steady(readings_mm: NDArray[np.float64], resolution_mm: float | None = None) -> Steady:
+def steady(readings_mm: Floats, resolution_mm: float | None = None) -> Steady:
     """Return mean and standard uncertainty of readings of one length.
 
     Type A is the standard deviation of the mean of ten batches, for correlated readings [GUM 4.2.3, 4.2.7]. The

@@ -9,12 +9,12 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 def logged_curve(
-    runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    runs: Sequence[tuple[Floats, Floats]],
+) -> tuple[Floats, Floats]:
     """Return a session's temperature curve: rising times [s] and temperatures [degC], two points per run, shape (q,) each.
 
     Of all curves within half a step of each half run's mean, the least bent is taken. Changes within half a run are
@@ -45,7 +45,7 @@ SHOWN_K = 1e-3
 """Finest step that a thermometer is taken to show, and that recordings have [K]."""
 
 
-def _resolution(degc: NDArray[np.float64]) -> float:
+def _resolution(degc: Floats) -> float:
     """Return the greatest common step of shown differences [K]; zero for one value."""
     steps = np.diff(np.unique(np.round(degc / SHOWN_K).astype(np.int64)))
     return SHOWN_K * float(np.gcd.reduce(steps)) if len(steps) else 0.0

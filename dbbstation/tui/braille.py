@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
     Plane: TypeAlias = NDArray[np.bool_]
 
 CELL_WIDE, CELL_HIGH = 2, 4
@@ -32,14 +34,14 @@ def empty(columns: int, rows: int) -> Plane:
     return np.zeros((rows * CELL_HIGH, columns * CELL_WIDE), dtype=np.bool_)
 
 
-def light(plane: Plane, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+def light(plane: Plane, x: Floats, y: Floats) -> None:
     """Raise dots at points inside the plane."""
     with np.errstate(invalid="ignore"):
         inside = (x >= 0.0) & (x < plane.shape[1]) & (y >= 0.0) & (y < plane.shape[0])
     plane[y[inside].astype(np.intp), x[inside].astype(np.intp)] = True
 
 
-def connect(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def connect(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return the points with more in between, so that lines have no gaps.
 
     NaN separates lines.

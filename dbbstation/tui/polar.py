@@ -11,8 +11,7 @@ import numpy as np
 from dbbstation.tui import braille
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.tui.braille import Plane
 
 NOMINAL_SHARE, BAND_SHARE = 0.58, 0.34
@@ -52,9 +51,7 @@ class Dial:
     def empty(self) -> Plane:
         return braille.empty(self.columns, self.rows)
 
-    def places(
-        self, theta_deg: NDArray[np.float64], share: NDArray[np.float64] | float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def places(self, theta_deg: Floats, share: Floats | float) -> tuple[Floats, Floats]:
         """Return points in dots from the upper left corner, shape (n,) each."""
         theta = np.radians(theta_deg)
         x = self.columns * braille.CELL_WIDE / 2.0 + self.radius * share * np.cos(theta)
@@ -71,7 +68,7 @@ class Dial:
         return (BAND_SHARE / scale_um) / (NOMINAL_SHARE / (1e3 * radius_mm))
 
 
-_Values = TypeVar("_Values", float, "NDArray[np.float64]")
+_Values = TypeVar("_Values", float, "Floats")
 
 
 def share_of(deviation_um: _Values, scale_um: float) -> _Values:
@@ -82,8 +79,8 @@ def share_of(deviation_um: _Values, scale_um: float) -> _Values:
 def draw_trace(
     plane: Plane,
     dial: Dial,
-    theta_deg: NDArray[np.float64],
-    deviation_um: NDArray[np.float64],
+    theta_deg: Floats,
+    deviation_um: Floats,
     scale_um: float,
     *,
     thick: bool = False,

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 NEEDED = ("linuxcnc", "halsampler", "rtapi_app", "setpriv")
@@ -79,8 +80,8 @@ class PlannerRun:
         line: of the program, shape (n,).
     """
 
-    time_s: NDArray[np.float64]
-    poses: NDArray[np.float64]
+    time_s: Floats
+    poses: Floats
     line: NDArray[np.int_]
 
     @property
@@ -107,8 +108,8 @@ class ControlKins:
     """
 
     name: str
-    home_mm: NDArray[np.float64]
-    offset_mm: NDArray[np.float64]
+    home_mm: Floats
+    offset_mm: Floats
     home_z_mm: float
     hal: tuple[str, ...] = ()
     tables: tuple[str, ...] = ()

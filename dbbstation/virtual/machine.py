@@ -14,8 +14,7 @@ from dbbstation.virtual.truth import MeasurementErrors
 from dbbstation.virtual.under_spindle import SET_UP_MM, put_up
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.plan.circle import Direction
     from dbbstation.plan.plan import Ball, Plan, PlannedTest
@@ -47,7 +46,7 @@ class VirtualRun:
     direction: Direction
     mounting: int
     path: CommandedPath
-    length_mm: NDArray[np.float64]
+    length_mm: Floats
 
     def length_mm_at(self, t_s: float) -> float:
         """Return the distance at a time after the start, constant beyond the ends [mm]."""

@@ -12,8 +12,7 @@ from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.toolpath import RowKind
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.toolpath import Toolpath
     from dbbstation.plan.circle import Circle
 
@@ -22,8 +21,8 @@ if TYPE_CHECKING:
 class CommandedPath:
     """Poses with times; motion is even in between."""
 
-    t_s: NDArray[np.float64]
-    poses: NDArray[np.float64]
+    t_s: Floats
+    poses: Floats
 
     @property
     def duration_s(self) -> float:

@@ -12,8 +12,7 @@ from dbbstation.sources.contract import Fitted, Motion, Owner, SetUpErrors
 from dbbstation.sources.registry import sources_named
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.plan.circle import Circle
     from dbbstation.sources.contract import Setup
@@ -36,8 +35,8 @@ class MovingBall(ToolBallOffset):
 class SetUp:
     """Actual places of balls."""
 
-    fixed_ball_mm: NDArray[np.float64]
-    moving_ball_mm: NDArray[np.float64]
+    fixed_ball_mm: Floats
+    moving_ball_mm: Floats
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, size_mm: float) -> Self:

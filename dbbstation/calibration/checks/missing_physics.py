@@ -12,9 +12,8 @@ from dbbstation.inference.remainder import Remainder, remainder
 from dbbstation.trace.average import means, sector_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.harmonics import Spectrum
 
 SIGNIFICANT = 1e-8
@@ -40,7 +39,7 @@ def remainder_of(calibration: Calibration, noise: Spectrum) -> Remainder:
 
 def _by_sector(
     calibration: Calibration,
-) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]], list[str]]:
+) -> tuple[list[Floats], list[Floats], list[str]]:
     residuals, phases = [], []
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         sector = sector_of(observation.raw, min(SECTORS, len(residual)))

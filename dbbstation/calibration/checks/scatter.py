@@ -12,9 +12,8 @@ from scipy.special import chdtri
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
 
 DETERMINED = 0.5
 """Share of an effect's stated variance that the runs must take away for them to say where a ball stands."""
@@ -44,9 +43,9 @@ class MountingOffset:
 
     mounting: str
     ball: str
-    stated_mm: NDArray[np.float64]
-    shift_mm: NDArray[np.float64]
-    spread_mm2: NDArray[np.float64]
+    stated_mm: Floats
+    shift_mm: Floats
+    spread_mm2: Floats
     square: float
     freedom: int
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Block
 
 WEAKEST = 3
@@ -105,7 +106,7 @@ def visibility(calibration: Calibration) -> Observability:
     )
 
 
-def indices(singular: NDArray[np.float64], readings: int) -> Indices:
+def indices(singular: Floats, readings: int) -> Indices:
     """Return O1 to O5 of singular values, falling and positive, shape (L,)."""
     greatest, least = float(singular[0]), float(singular[-1])
     return Indices(

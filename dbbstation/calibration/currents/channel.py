@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.layout import Layout
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Motion
 
@@ -59,7 +60,7 @@ class CurrentChannel:
     """
 
     motions: tuple[Motion, ...]
-    current_a: tuple[NDArray[np.float64], ...]
+    current_a: tuple[Floats, ...]
     usable: tuple[NDArray[np.bool_], ...]
     notes: tuple[str, ...]
 
@@ -90,14 +91,14 @@ def current_channel(layout: Layout, observations: Sequence[Observation]) -> Curr
     return CurrentChannel(motions, current, usable, tuple(notes))
 
 
-def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
+def _motion(run: Observation, current_a: Floats) -> Motion:
     raw = replace(run.raw, logged={**run.raw.logged, **currents(current_a)})
     if run.commanded is None and len(raw) > LONG * SECTORS:
         raw = averaged(raw, SECTORS)
     return replace(run, raw=raw).motion()
 
 
-def current_blocks(layout: Layout, channel: CurrentChannel | None, x: NDArray[np.float64]) -> list[Block]:
+def current_blocks(layout: Layout, channel: CurrentChannel | None, x: Floats) -> list[Block]:
     """Return blocks of currents about x, shape (k,), per run and motor with its noise."""
     if channel is None:
         return []
@@ -107,13 +108,13 @@ def current_blocks(layout: Layout, channel: CurrentChannel | None, x: NDArray[np
 
 
 def linearised(
-    layout: Layout, channel: CurrentChannel, x: NDArray[np.float64]
-) -> tuple[list[tuple[int, Block]], list[list[NDArray[np.float64]]]]:
+    layout: Layout, channel: CurrentChannel, x: Floats
+) -> tuple[list[tuple[int, Block]], list[list[Floats]]]:
     """Return blocks with motors, and each motor's residual per run [A]."""
     model = layout.model(x)
     whole = x - layout.nominal
 
-    def of_run(k: int) -> list[tuple[int, Block, NDArray[np.float64]]]:
+    def of_run(k: int) -> list[tuple[int, Block, Floats]]:
         motion = channel.motions[k]
         predicted = motor_currents(model, motion)
         left = channel.current_a[k] - predicted.current_a
@@ -136,13 +137,13 @@ def linearised(
 
     length = sum(map(len, channel.motions)) // len(channel.motions)
     done = [one for run in in_parallel(of_run, range(len(channel.motions)), length) for one in run]
-    left_by_motor: list[list[NDArray[np.float64]]] = [[] for _ in range(STRUTS)]
+    left_by_motor: list[list[Floats]] = [[] for _ in range(STRUTS)]
     for motor, _, rest in done:
         left_by_motor[motor].append(rest)
     return [(motor, block) for motor, block, _ in done], left_by_motor
 
 
-def motor_noise(left: Sequence[Sequence[NDArray[np.float64]]]) -> list[Noise | None]:
+def motor_noise(left: Sequence[Sequence[Floats]]) -> list[Noise | None]:
     """Return each motor's noise from its residual."""
     return [noise_of(of_motor, len(PER_MOTOR)) if of_motor else None for of_motor in left]
 
@@ -151,7 +152,7 @@ def _effective(noise: Noise | None) -> float:
     return SMALLEST_NOISE_A if noise is None else max(noise.effective, SMALLEST_NOISE_A)
 
 
-def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, NDArray[np.float64]]:
+def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, Floats]:
     """Return start values by source from currents alone, at the nominal geometry.
 
     Gains multiply loads and frictions, which a start at zero would hide.

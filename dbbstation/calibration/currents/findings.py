@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.currents.channel import CurrentChannel
     from dbbstation.calibration.layout import Layout
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Block
     from dbbstation.inference.noise import Noise
     from dbbstation.inference.square_root import Solution
@@ -59,7 +60,7 @@ class MotorFindings:
 def motor_findings(
     layout: Layout,
     channel: CurrentChannel | None,
-    x: NDArray[np.float64],
+    x: Floats,
     solution: Solution,
     blocks: Sequence[Block],
     nominal: Sequence[Block],
@@ -92,7 +93,7 @@ def motor_findings(
     )
 
 
-def _rms(parts: Sequence[NDArray[np.float64]]) -> float:
+def _rms(parts: Sequence[Floats]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else np.nan
 
 
@@ -120,7 +121,7 @@ def _centre_of_gravity(
     return said
 
 
-def _doubts(layout: Layout, x: NDArray[np.float64], solution: Solution, held: frozenset[str]) -> list[str]:
+def _doubts(layout: Layout, x: Floats, solution: Solution, held: frozenset[str]) -> list[str]:
     doubts = []
     sigma = np.sqrt(solution.variance)
     for column, (source, _, name) in enumerate(layout.names):

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 FEWEST = 20
 """Readings of a motor that say something."""
 
@@ -22,9 +24,7 @@ CLIPPED_RATIO = 5.0
 steps the last step has two or three times as many readings as the one before; an amplifier at its limit has all of them."""
 
 
-def cleaned(
-    labels: Sequence[str], current_a: Sequence[NDArray[np.float64]]
-) -> tuple[list[NDArray[np.float64]], list[str]]:
+def cleaned(labels: Sequence[str], current_a: Sequence[Floats]) -> tuple[list[Floats], list[str]]:
     """Return currents with NaN at unusable readings, and notes in words, by motor.
 
     Args:
@@ -53,7 +53,7 @@ def one_way(growing: Sequence[NDArray[np.bool_]], usable: Sequence[NDArray[np.bo
     return notes
 
 
-def _of_motor(name: str, labels: Sequence[str], current: Sequence[NDArray[np.float64]]) -> list[str]:
+def _of_motor(name: str, labels: Sequence[str], current: Sequence[Floats]) -> list[str]:
     logged = [k for k, values in enumerate(current) if np.isfinite(values).any()]
     if not logged:
         return [f"{name}: its current was not logged; nothing is said of its drive, the other motors count"]
@@ -81,7 +81,7 @@ def _of_motor(name: str, labels: Sequence[str], current: Sequence[NDArray[np.flo
     return notes
 
 
-def _limits(values: NDArray[np.float64]) -> list[float]:
+def _limits(values: Floats) -> list[float]:
     levels, count = np.unique(values, return_counts=True)
     few = 3
     if len(levels) < few:

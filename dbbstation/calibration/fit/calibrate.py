@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.sources.contract import ErrorSource, Motion
@@ -91,12 +92,12 @@ class Calibration:
     """
 
     layout: Layout
-    x: NDArray[np.float64]
+    x: Floats
     solution: Solution
     noise: Noise
     observations: tuple[Observation, ...]
-    machine_residual_mm: tuple[NDArray[np.float64], ...]
-    residual_mm: tuple[NDArray[np.float64], ...]
+    machine_residual_mm: tuple[Floats, ...]
+    residual_mm: tuple[Floats, ...]
     blocks: tuple[Block, ...]
     directions_lost: tuple[str, ...]
     directions_regularised: tuple[str, ...]
@@ -116,7 +117,7 @@ class Calibration:
         return self.blocks[: len(self.observations)]
 
     @property
-    def null_space(self) -> NDArray[np.float64]:
+    def null_space(self) -> Floats:
         """Return undetermined combinations of columns, each at its plausible size, shape (h, k)."""
         return unseen_combinations(self.blocks, self.layout.known, self.noise.effective, self.solution.held)
 
@@ -136,7 +137,7 @@ def calibrate(
     machine: Machine,
     observations: Sequence[Observation],
     sources: Sequence[ErrorSource] | None = None,
-    start: Mapping[str, NDArray[np.float64]] | None = None,
+    start: Mapping[str, Floats] | None = None,
     *,
     prescribe: Sequence[Name] | None = None,
     shapes_within: float | None = None,
@@ -237,9 +238,9 @@ def _approached(
     layout: Layout,
     runs: Sequence[Observation | RunNodes],
     nominal: Sequence[Block],
-    left: Sequence[NDArray[np.float64]],
+    left: Sequence[Floats],
     motion_of: MotionOf,
-) -> tuple[NDArray[np.float64], list[Block]]:
+) -> tuple[Floats, list[Block]]:
     """Approach a machine that is millimetres off by Gauss-Newton steps with a usual bar's noise.
 
     Early residuals are curvature, which taken for noise would hide visible directions. The noise is therefore measured
@@ -257,11 +258,11 @@ def _approached(
     return x, blocks
 
 
-def _rms_mm(left: Sequence[NDArray[np.float64]]) -> float:
+def _rms_mm(left: Sequence[Floats]) -> float:
     return float(np.sqrt(sum(float(one @ one) for one in left) / sum(map(len, left))))
 
 
-def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.float64]:
+def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> Floats:
     """Return orthonormal rows of fitted directions that only priors bound, in scales, shape (r, f)."""
     known = layout.known
     if not layout.bounded.any():
@@ -270,7 +271,7 @@ def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.
     return lost_directions(blocks, free, noise.effective)
 
 
-def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64], share: float) -> float:
+def _share(layout: Layout, step: Floats, before: Floats, share: float) -> float:
     """Return the share of a step to take.
 
     Full steps oscillate about shape parameters with small amplitude and about nearly invisible combinations. If
@@ -289,9 +290,7 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
     return float(np.clip(share / (1.0 - ratio), SMALLEST_SHARE, 1.0))
 
 
-def _near(
-    layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None, amplitudes_within: float
-) -> Layout:
+def _near(layout: Layout, start: Mapping[str, Floats], within: float | None, amplitudes_within: float) -> Layout:
     nominal, prior = layout.nominal.copy(), layout.known.prior.copy()
     for term in layout.terms:
         if term.source.name not in start:
@@ -316,7 +315,7 @@ SMALLEST_SHAPE = 0.1
 """Of its plausible size: a parameter of shape that starts at less is known to no less than a share of this."""
 
 
-def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+def _start_values(layout: Layout, start: Mapping[str, Floats]) -> Floats:
     x = layout.nominal.copy()
     for term in layout.terms:
         if term.source.name in start:
@@ -351,16 +350,16 @@ def _motions_of(runs: Sequence[Observation | RunNodes]) -> MotionOf:
 def linearise(
     layout: Layout,
     runs: Sequence[Observation | RunNodes],
-    x: NDArray[np.float64],
+    x: Floats,
     motion_of: MotionOf = Observation.motion,
-) -> tuple[list[Block], list[NDArray[np.float64]]]:
+) -> tuple[list[Block], list[Floats]]:
     """Compress every run about x, shape (k,), and return the blocks with measured minus predicted lengths, shape (n,) [mm].
 
     A solution of the blocks is x minus its nominal.
     """
     model = layout.model(x)
 
-    def of_run(run: Observation | RunNodes) -> tuple[Block, NDArray[np.float64]]:
+    def of_run(run: Observation | RunNodes) -> tuple[Block, Floats]:
         if isinstance(run, RunNodes):
             columns, jacobian, length = _predicted(layout, model, run.coarse, motion_of(run.coarse), x)
             if smooth(jacobian) and smooth(length[:, None] - run.run.raw.circle.bar_mm):
@@ -376,17 +375,15 @@ def linearise(
 
 
 def _predicted(
-    layout: Layout, model: MachineModel, observation: Observation, motion: Motion, x: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    layout: Layout, model: MachineModel, observation: Observation, motion: Motion, x: Floats
+) -> tuple[NDArray[np.int64], Floats, Floats]:
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])
     return np.concatenate([np.r_[term.columns] for term in terms]), jacobian, reading.length_mm
 
 
-def _settled(
-    blocks: Sequence[Block], layout: Layout, noise: Noise, held: NDArray[np.float64]
-) -> tuple[Solution, Noise]:
+def _settled(blocks: Sequence[Block], layout: Layout, noise: Noise, held: Floats) -> tuple[Solution, Noise]:
     """Solve with the noise of the own residual; three rounds settle within a per mille."""
     count = sum(block.count for block in blocks if block.noise is None)
     sigma = noise.sigma
@@ -404,7 +401,7 @@ SMALLEST_NOISE_MM = 1e-7
 
 
 @with_one_thread
-def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
+def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[Floats, ...]:
     """Return measured minus predicted length of every run, shape (n,) each [mm]."""
     return tuple(of_residuals(model, observations, lambda _, residual_mm: residual_mm))
 
@@ -413,7 +410,7 @@ def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple
 def of_residuals(
     model: MachineModel,
     observations: Sequence[Observation],
-    work: Callable[[Observation, NDArray[np.float64]], Found],
+    work: Callable[[Observation, Floats], Found],
 ) -> list[Found]:
     """Return `work` of each run and its measured minus predicted length, shape (n,) [mm], one at a time."""
     needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))
@@ -425,13 +422,11 @@ def of_residuals(
     return in_parallel(of_run, runs, _usual_length(runs))
 
 
-def _residuals(
-    model: MachineModel, runs: Sequence[Observation | RunNodes], motion_of: MotionOf
-) -> tuple[NDArray[np.float64], ...]:
+def _residuals(model: MachineModel, runs: Sequence[Observation | RunNodes], motion_of: MotionOf) -> tuple[Floats, ...]:
     return tuple(in_parallel(partial(_residual, model, motion_of), runs, _usual_length(runs)))
 
 
-def _residual(model: MachineModel, motion_of: MotionOf, run: Observation | RunNodes) -> NDArray[np.float64]:
+def _residual(model: MachineModel, motion_of: MotionOf, run: Observation | RunNodes) -> Floats:
     if isinstance(run, RunNodes):
         length = model.bar(motion_of(run.coarse)).length_mm
         if smooth(length[:, None] - run.run.raw.circle.bar_mm):

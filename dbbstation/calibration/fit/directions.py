@@ -10,9 +10,8 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.layout import Layout
+    from dbbstation.computing.arrays import Floats
 
 RECOGNISED = 0.02
 """Share of a known pattern that may lie outside the lost directions for it to count as lost."""
@@ -29,11 +28,11 @@ class RigidPattern:
     """A rigid pattern of errors, by source and parameter order."""
 
     text: str
-    strut_mm: NDArray[np.float64]
-    base_mm: NDArray[np.float64]
+    strut_mm: Floats
+    base_mm: Floats
 
 
-def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.float64]) -> list[RigidPattern]:
+def patterns(base_joints_mm: Floats, axis_of_strut: Floats) -> list[RigidPattern]:
     """Return rigid motions of the base, common strut length and uniform size, in order of trial."""
     none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
     found = [
@@ -57,7 +56,7 @@ def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.floa
     return found
 
 
-def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
+def in_words(layout: Layout, held: Floats) -> tuple[str, ...]:
     """Return a text for every held direction."""
     fitted = np.flatnonzero(~layout.known.random)
     names = [layout.names[column] for column in fitted]
@@ -79,7 +78,7 @@ def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]:
+def of_circles(layout: Layout, held: Floats) -> Floats:
     """Return directions without parts in motor currents, shape (g, f); purely electrical ones go."""
     fitted = np.flatnonzero(~layout.known.random)
     drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
@@ -89,7 +88,7 @@ def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]
     return rows[share > SHOWS_IN_CIRCLES]
 
 
-def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:
+def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> Floats | None:
     parts = {"strut-reference-length": pattern.strut_mm, "base-joints": pattern.base_mm.ravel()}
     present = {name for name, _, _ in names}
     if any(np.any(part) and source not in present for source, part in parts.items()):
@@ -102,14 +101,14 @@ def _as_columns(pattern: RigidPattern, names: list[tuple[str, str, str]]) -> NDA
     return vector
 
 
-def _strut_axes(layout: Layout) -> NDArray[np.float64]:
+def _strut_axes(layout: Layout) -> Floats:
     travel, hexapod = layout.machine.travel, layout.machine.hexapod
     middle = np.array([0.0, 0.0, sum(travel.z_mm) / 2.0])
     struts = hexapod.platform_joints_mm + middle - hexapod.base_joints_mm
     return struts / np.linalg.norm(struts, axis=1, keepdims=True)
 
 
-def _largest_parts(row: NDArray[np.float64], names: list[tuple[str, str, str]]) -> str:
+def _largest_parts(row: Floats, names: list[tuple[str, str, str]]) -> str:
     largest = np.argsort(-np.abs(row))[:3]
     called = [f"{names[k][0]} {names[k][2].removesuffix('_mm').replace('_', ' ')}" for k in largest]
     if np.abs(row[largest[0]]) > 1.0 - ALONE:
@@ -118,7 +117,7 @@ def _largest_parts(row: NDArray[np.float64], names: list[tuple[str, str, str]]) 
     return "a combination, mostly " + ", ".join(parts)
 
 
-def _orthonormal(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _orthonormal(rows: Floats) -> Floats:
     if len(rows) == 0:
         return rows
     _, s, vt = np.linalg.svd(rows, full_matrices=False)

@@ -19,6 +19,7 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Block
     from dbbstation.model.observation import Observation
 
@@ -68,11 +69,11 @@ class RunNodes:
 
     run: Observation
     coarse: Observation
-    roots: NDArray[np.float64]
-    seen: NDArray[np.float64]
+    roots: Floats
+    seen: Floats
     unseen: float
 
-    def samples_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def samples_of(self, values: Floats) -> Floats:
         """Return values at all samples, shape (n,), from those at the nodes, shape (m,)."""
         sector, place = _in_sectors(self.run.raw.phi_deg)
         powers = values.reshape(SECTORS, PER_SECTOR) @ _TO_POWERS.T
@@ -85,9 +86,9 @@ class RunNodes:
     def compressed(
         self,
         columns: NDArray[np.int64],
-        jacobian: NDArray[np.float64],
-        length_mm: NDArray[np.float64],
-        shift: NDArray[np.float64],
+        jacobian: Floats,
+        length_mm: Floats,
+        shift: Floats,
     ) -> Block:
         """Compress the run's samples.
 
@@ -142,13 +143,13 @@ def nodes_of(run: Observation) -> RunNodes | None:
     )
 
 
-def _in_sectors(phi_deg: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _in_sectors(phi_deg: Floats) -> tuple[NDArray[np.int64], Floats]:
     place = phi_deg * (SECTORS / FULL_TURN_DEG)
     sector = np.clip(place.astype(np.int64), 0, SECTORS - 1)
     return sector, 2.0 * (place - sector) - 1.0
 
 
-def smooth(values: NDArray[np.float64]) -> bool:
+def smooth(values: Floats) -> bool:
     """Return whether quantities at nodes, shape (m, k), are polynomials that join between sectors.
 
     Deviations below a billionth are rounding.
@@ -161,12 +162,12 @@ def smooth(values: NDArray[np.float64]) -> bool:
     return bool(np.all(np.maximum(last, step) <= SMOOTH * np.abs(values).max(axis=0) + NOTHING))
 
 
-def _interpolation(place: NDArray[np.float64]) -> NDArray[np.float64]:
+def _interpolation(place: Floats) -> Floats:
     """Return the polynomials that are one at one node, at places from -1 to 1, shape (n, nodes)."""
     distance = place[:, None] - _PLACES
     exact = distance == 0.0
     terms = _WEIGHTS / np.where(exact, 1.0, distance)
-    values: NDArray[np.float64] = terms / terms.sum(axis=1, keepdims=True)
+    values: Floats = terms / terms.sum(axis=1, keepdims=True)
     on_node = exact.any(axis=1)
     values[on_node] = exact[on_node]
     return values

@@ -18,9 +18,8 @@ from dbbstation.sources.contract import Owner
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.layout import Layout
+    from dbbstation.computing.arrays import Floats
 
 Name: TypeAlias = tuple[str, str]
 """A parameter by source and its name there."""
@@ -32,7 +31,7 @@ LEAST_SHARE = 1e-3
 """How much of a lost direction prescribed parameters must hold for the rest to stay where it is."""
 
 
-def prescribed(layout: Layout, lost: NDArray[np.float64], wanted: Sequence[Name]) -> NDArray[np.float64]:
+def prescribed(layout: Layout, lost: Floats, wanted: Sequence[Name]) -> Floats:
     """Return rows that hold parameters in place of lost directions.
 
     Args:
@@ -67,7 +66,7 @@ def prescribed(layout: Layout, lost: NDArray[np.float64], wanted: Sequence[Name]
     return np.eye(len(fitted))[rows]
 
 
-def names_of(layout: Layout, held: NDArray[np.float64]) -> tuple[Name, ...]:
+def names_of(layout: Layout, held: Floats) -> tuple[Name, ...]:
     """Return parameters of unit rows, shape (h, f)."""
     fitted = _fitted(layout)
     return tuple(fitted[int(np.argmax(np.abs(row)))] for row in held)
@@ -82,7 +81,7 @@ def _fitted(layout: Layout) -> list[Name]:
     return [names[column] for column in np.flatnonzero(~layout.known.random)]
 
 
-def _best(fitted: Sequence[Name], lost: NDArray[np.float64]) -> list[int]:
+def _best(fitted: Sequence[Name], lost: Floats) -> list[int]:
     if not len(lost):
         return []
     unseen = np.linalg.norm(lost, axis=0) > 1.0 - ROUNDING

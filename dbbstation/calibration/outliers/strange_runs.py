@@ -15,10 +15,9 @@ from dbbstation.inference.square_root import chi2_without
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Fit, Step
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
 
 FALLS, AT_NOISE = 4.0, 4.0
@@ -73,11 +72,11 @@ def _strange_run(calibration: Calibration) -> list[int]:
     return [worst] if rest[worst] > _strange_from_um(rest) else []
 
 
-def _rests_um(calibration: Calibration) -> NDArray[np.float64]:
+def _rests_um(calibration: Calibration) -> Floats:
     return np.array([rms_um(without_shift(run, left)) for run, left in left_of(calibration)])
 
 
-def _strange_from_um(rests_um: NDArray[np.float64]) -> float:
+def _strange_from_um(rests_um: Floats) -> float:
     return max(STANDS_OUT * float(np.median(rests_um)), LEAST_UM)
 
 
@@ -116,7 +115,7 @@ def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> 
 
 
 def _looks_like(
-    calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
+    calibration: Calibration, others: Sequence[Observation], run: Observation, residual: Floats
 ) -> tuple[OutlierKind, str]:
     noise = _strange_from_um(np.array([rms_um(left) for _, left in left_of(calibration)]))
     best, where = np.inf, run
@@ -145,7 +144,7 @@ def _looks_like(
     return OutlierKind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
 
 
-def _step(residual: NDArray[np.float64]) -> tuple[float, int]:
+def _step(residual: Floats) -> tuple[float, int]:
     count = len(residual)
     at = np.arange(count // 20 + 1, count - count // 20)
     total = np.cumsum(residual)
@@ -155,5 +154,5 @@ def _step(residual: NDArray[np.float64]) -> tuple[float, int]:
     return float(difference[k]), int(at[k])
 
 
-def _without_step(residual: NDArray[np.float64], at: int) -> NDArray[np.float64]:
+def _without_step(residual: Floats, at: int) -> Floats:
     return np.concatenate([residual[:at] - residual[:at].mean(), residual[at:] - residual[at:].mean()])

@@ -17,10 +17,9 @@ from dbbstation.plan.bar import UNKNOWN_BAR_MM
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Fit, Step
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
 
 SIGMAS = 5.0
@@ -198,11 +197,11 @@ def _tests(runs: Sequence[Observation]) -> str:
     return ", ".join(dict.fromkeys(run.test for run in runs))
 
 
-def _um(shift_mm: NDArray[np.float64]) -> tuple[float, float, float]:
+def _um(shift_mm: Floats) -> tuple[float, float, float]:
     x, y, z = (1e3 * shift_mm).tolist()
     return x, y, z
 
 
-def _towards(shift_mm: NDArray[np.float64]) -> str:
+def _towards(shift_mm: Floats) -> str:
     angle = np.degrees(np.arctan2(shift_mm[1], shift_mm[0])) % 360.0
     return f"{1e3 * float(np.hypot(*shift_mm[:2])):.1f} µm towards {angle:.0f}°"

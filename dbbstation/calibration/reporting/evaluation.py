@@ -19,8 +19,7 @@ from dbbstation.trace.analysis import CircleFigures, figures
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.observation import Observation
 
@@ -109,7 +108,7 @@ def _deviations(of: CircleFigures, first: CircleFigures | None = None) -> Circle
 
 
 def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:
-    def of_run(observation: Observation, residual_mm: NDArray[np.float64]) -> tuple[CircleFigures, float, int]:
+    def of_run(observation: Observation, residual_mm: Floats) -> tuple[CircleFigures, float, int]:
         return _figures_of(observation, residual_mm), float(residual_mm @ residual_mm), len(residual_mm)
 
     # Run by run: residuals are a number a sample.
@@ -117,7 +116,7 @@ def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[li
     return list(found), 1e3 * float(np.sqrt(sum(squares) / sum(counts)))
 
 
-def rms_um(residual_mm: Sequence[NDArray[np.float64]]) -> float:
+def rms_um(residual_mm: Sequence[Floats]) -> float:
     """Return the root mean square over all runs [µm]."""
     return 1e3 * float(np.sqrt(sum(float(one @ one) for one in residual_mm) / sum(map(len, residual_mm))))
 
@@ -164,15 +163,13 @@ def plane_uncertainty_um(identified: IdentifiedModel, height_mm: float) -> tuple
     return flatness_um, parallelism_um
 
 
-def _level(xy_mm: NDArray[np.float64], height_mm: float) -> NDArray[np.float64]:
+def _level(xy_mm: Floats, height_mm: float) -> Floats:
     poses = np.zeros((len(xy_mm), 6))
     poses[:, :2], poses[:, 2] = xy_mm, height_mm
     return poses
 
 
-def _error_mm(
-    model: MachineModel, xy_mm: NDArray[np.float64], height_mm: float, corrected: MachineModel | None
-) -> NDArray[np.float64]:
+def _error_mm(model: MachineModel, xy_mm: Floats, height_mm: float, corrected: MachineModel | None) -> Floats:
     poses = _level(xy_mm, height_mm)
     motion = Motion(poses)
     actual = model.anywhere().actual_poses(motion)
@@ -180,7 +177,7 @@ def _error_mm(
     return actual[:, :3] - believed[:, :3]
 
 
-def _figures_of(observation: Observation, residual_mm: NDArray[np.float64]) -> CircleFigures:
+def _figures_of(observation: Observation, residual_mm: Floats) -> CircleFigures:
     return figures(observation.raw, observation.raw.circle.bar_mm + residual_mm)
 
 

@@ -26,11 +26,10 @@ from dbbstation.sources.contract import Owner
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.layout import ParameterSet
     from dbbstation.calibration.reporting.evaluation import Evaluation
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.identified import IdentifiedModel
 
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost", "covariance"})
@@ -151,7 +150,7 @@ def covariance_of(identified: IdentifiedModel) -> Covariance:
     return Covariance(rows, identified.covariance)
 
 
-def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
+def _uncertainties(calibration: Calibration) -> Floats:
     variance = np.maximum(calibration.solution.variance, 0.0)
     variance += calibration.layout.formula_variance(calibration.x)
     if calibration.prescribed:  # they define coordinates, and all parameters are known in these
@@ -159,7 +158,7 @@ def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
     return known_u(variance, np.sum(calibration.null_space**2, axis=0))
 
 
-def _values(calibration: Calibration, term: ParameterSet, u: NDArray[np.float64]) -> SourceValues:
+def _values(calibration: Calibration, term: ParameterSet, u: Floats) -> SourceValues:
     numbers = zip(term.parameters, calibration.x[term.columns], u[term.columns], strict=True)
     return SourceValues(
         name=term.source.name,

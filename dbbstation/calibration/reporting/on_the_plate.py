@@ -15,9 +15,8 @@ from dbbstation.trace.analysis import figures
 from dbbstation.trace.average import by_angle
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
     from dbbstation.plan.circle import Direction
 
@@ -35,9 +34,9 @@ class CircleBeforeAfter:
     """
 
     direction: Direction
-    theta_deg: NDArray[np.float64]
-    before_um: NDArray[np.float64]
-    after_um: NDArray[np.float64]
+    theta_deg: Floats
+    before_um: Floats
+    after_um: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +49,10 @@ class CircleTest:
     """
 
     name: str
-    ball_mm: NDArray[np.float64]
+    ball_mm: Floats
     circles: tuple[CircleBeforeAfter, ...]
     circularity_um: tuple[float, float]
-    centre_um: NDArray[np.float64]
+    centre_um: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +65,8 @@ class BallShift:
 
     tests: tuple[str, ...]
     stated_um: float
-    shift_um: NDArray[np.float64]
-    sigma_um: NDArray[np.float64]
+    shift_um: Floats
+    sigma_um: Floats
 
 
 def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
@@ -107,7 +106,7 @@ def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:
     )
 
 
-def _test(name: str, runs: list[tuple[Observation, NDArray[np.float64], NDArray[np.float64]]]) -> CircleTest:
+def _test(name: str, runs: list[tuple[Observation, Floats, Floats]]) -> CircleTest:
     circles, found = [], []
     for observation, *both in runs:
         raw = observation.raw

@@ -16,8 +16,7 @@ from dbbstation.trace.analysis import figures
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
     from dbbstation.trace.circle import RawCircle
 
@@ -69,22 +68,22 @@ def predicted_circles(
     return tuple(circles)
 
 
-def smooth_circularity_um(raw: RawCircle, length_mm: NDArray[np.float64]) -> float:
+def smooth_circularity_um(raw: RawCircle, length_mm: Floats) -> float:
     """Return circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
     return smooth_circularities_um(raw, [length_mm])[0]
 
 
-def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[NDArray[np.float64]]) -> list[float]:
+def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[Floats]) -> list[float]:
     """Return the same of several lengths, each of shape (n,) [mm] [µm]."""
     return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
 
 
-def smooth_lengths_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def smooth_lengths_mm(raw: RawCircle, length_mm: Floats) -> Floats:
     """Return lengths up to 30 undulations per revolution, shape (n,) [mm]."""
     return _smooth_mm(raw, [length_mm])[0]
 
 
-def _smooth_mm(raw: RawCircle, lengths_mm: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+def _smooth_mm(raw: RawCircle, lengths_mm: Sequence[Floats]) -> list[Floats]:
     highest = min(UNDULATIONS, max(len(raw) // SAMPLES_PER_UNDULATION, 2))
     bar_mm = raw.circle.bar_mm
     several = smooth_of([length_mm - bar_mm for length_mm in lengths_mm], np.radians(raw.phi_deg), highest)

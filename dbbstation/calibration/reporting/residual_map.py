@@ -14,8 +14,7 @@ from dbbstation.plan.circle import Direction
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
 
 SECTORS = 36
@@ -31,7 +30,7 @@ class ResidualMap:
     """
 
     tests: tuple[str, ...]
-    um: Mapping[Direction, NDArray[np.float64]]
+    um: Mapping[Direction, Floats]
 
     @property
     def reach_um(self) -> float:
@@ -40,7 +39,7 @@ class ResidualMap:
 
 
 @with_one_thread
-def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> ResidualMap:
+def residual_map(observations: Sequence[Observation], residual_mm: Sequence[Floats]) -> ResidualMap:
     """Return residuals averaged over ten degrees, noise removed."""
     names = names_of_tests(observations)
     rows = {name: k for k, name in enumerate(dict.fromkeys(names))}
@@ -59,7 +58,7 @@ def names_of_tests(observations: Sequence[Observation]) -> list[str]:
     ]
 
 
-def _by_angle_um(observation: Observation, residual_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def _by_angle_um(observation: Observation, residual_mm: Floats) -> Floats:
     curve = smooth(residual_mm, np.radians(observation.raw.phi_deg))
     sector = (observation.raw.theta_deg * (SECTORS / 360.0)).astype(np.int64) % SECTORS
     count = np.bincount(sector, minlength=SECTORS)

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
+from dbbstation.computing.arrays import Floats
 from dbbstation.errors import Problem
 from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
 from dbbstation.files.source_text import without_faults
@@ -197,7 +197,7 @@ class MachineParts(Schema):
 def machine_parts(machine: Machine) -> MachineParts:
     """Return a machine as files hold it, the exact inverse of `MachineParts.to_domain`."""
 
-    def points(joints: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+    def points(joints: Floats) -> tuple[tuple[float, ...], ...]:
         return tuple(tuple(joint) for joint in joints.tolist())
 
     return MachineParts.model_validate(

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from os import PathLike
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.provenance import Provenance
     from dbbstation.files.yaml.text import Location, YamlDocument
     from dbbstation.machine.geometry import Machine
@@ -211,7 +210,7 @@ def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem
             faults.append(document.problem(location, what, "restore the file as it was written"))
 
 
-def covariance_fault(covariance: NDArray[np.float64]) -> str | None:
+def covariance_fault(covariance: Floats) -> str | None:
     """Return why a matrix, shape (k, k), is no covariance, or None."""
     variance = np.diag(covariance)
     if (variance < 0).any():

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
@@ -39,7 +39,7 @@ class PoseTable:
         others: texts of further columns by name.
     """
 
-    poses: NDArray[np.float64]
+    poses: Floats
     others: dict[str, list[str]]
 
 
@@ -90,8 +90,8 @@ def _number(cell: str, name: str, path: Path, line: int, language: NumberLanguag
 
 def write_poses(
     path: Path,
-    poses: NDArray[np.float64],
-    uncertainty_mm: NDArray[np.float64],
+    poses: Floats,
+    uncertainty_mm: Floats,
     others: Mapping[str, Sequence[str]],
     provenance: Provenance,
     *,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 TIME, POSITION, FORCE, CURRENT = "t_s", "position_mm", "force_n", "motor_current_a"
 REQUIRED = (TIME, POSITION)
@@ -43,7 +43,7 @@ class DriveFile:
 
     file: str
     line: int
-    numbers: dict[str, NDArray[np.float64]]
+    numbers: dict[str, Floats]
     others: dict[str, tuple[str, ...]]
     warnings: tuple[Problem, ...]
 
@@ -142,7 +142,7 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
 
 def _numbers(
     rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Floats]:
     text = io.StringIO("\n".join(line for _, line in rows))
     places = [names.index(name) for name in known]
     try:
@@ -175,7 +175,7 @@ def _name_faults(
                 faults.append(Problem(file, number, 0, what, "correct or remove the line"))
 
 
-def _check_values(numbers: dict[str, NDArray[np.float64]], lines: list[int], file: str, faults: list[Problem]) -> None:
+def _check_values(numbers: dict[str, Floats], lines: list[int], file: str, faults: list[Problem]) -> None:
     t = numbers[TIME]
     for index in np.flatnonzero(np.diff(t) <= 0.0)[:MOST_FAULTS] + 1:
         how = "runs backwards" if t[index] < t[index - 1] else "stands still"
@@ -187,7 +187,7 @@ def _check_values(numbers: dict[str, NDArray[np.float64]], lines: list[int], fil
             faults.append(Problem(file, lines[index], 0, what, "check the unit, it is the end of the column's name"))
 
 
-def compared_csv(columns: Mapping[str, NDArray[np.float64]]) -> str:
+def compared_csv(columns: Mapping[str, Floats]) -> str:
     """Return columns of one length as CSV text, six significant digits."""
     out = io.StringIO()
     out.write(",".join(columns) + "\n")

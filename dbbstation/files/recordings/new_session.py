@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
@@ -53,7 +51,7 @@ class FinishedRun:
 
     test: str
     direction: Direction
-    columns: Mapping[str, NDArray[np.float64]]
+    columns: Mapping[str, Floats]
     repeat: int = 1
     mounting: int | None = None
     started: datetime | None = None

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 PART = ".part"
 """Ending, after `.csv`, of a run that is being recorded."""
 
@@ -158,7 +160,7 @@ _BY_THEMSELVES = (columns.TIME, columns.LENGTH, columns.THETA)
 """Columns that a recording has in places of their own."""
 
 
-def _recording(file: str, numbers: Mapping[str, NDArray[np.float64]], usable: NDArray[np.bool_] | None) -> Recording:
+def _recording(file: str, numbers: Mapping[str, Floats], usable: NDArray[np.bool_] | None) -> Recording:
     return Recording(
         name=file,
         t_s=numbers[columns.TIME],

@@ -13,8 +13,7 @@ from dbbstation.trace import columns
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.recordings.run_lines import Lines
 
 
@@ -51,7 +50,7 @@ class Numbers:
 
     def __init__(self) -> None:
         self.faults = Counted()
-        self._parts: dict[str, list[NDArray[np.float64]]] = {}
+        self._parts: dict[str, list[Floats]] = {}
         self._last: Lines | None = None
 
     def take(self, lines: Lines) -> None:
@@ -66,7 +65,7 @@ class Numbers:
             for name, values in numbers.items():
                 self._parts.setdefault(name, []).append(values)
 
-    def columns(self) -> dict[str, NDArray[np.float64]]:
+    def columns(self) -> dict[str, Floats]:
         """Return every numeric column, shape (n,), and release the pieces; faults are added to `faults`."""
         last = self._last
         if self.faults.count or last is None:
@@ -85,7 +84,7 @@ class Numbers:
         return joined
 
 
-def _parsed(lines: Lines) -> dict[str, NDArray[np.float64]] | None:
+def _parsed(lines: Lines) -> dict[str, Floats] | None:
     if not lines.regular() or lines.bad_crc():
         return None
     names = [name for name in lines.columns if name in columns.COLUMNS]
@@ -111,7 +110,7 @@ def _faults_of_lines(lines: Lines) -> Iterator[Problem]:
         yield Problem(lines.file, 0, 0, what, "write plain decimal numbers")
 
 
-def _faults_of_time(file: str, t_s: NDArray[np.float64], numbers: Sequence[int]) -> Iterator[Problem]:
+def _faults_of_time(file: str, t_s: Floats, numbers: Sequence[int]) -> Iterator[Problem]:
     for index in (np.flatnonzero(t_s[1:] <= t_s[:-1]) + 1).tolist():
         what = "runs backwards" if t_s[index] < t_s[index - 1] else "stands still"
         what = f"time {what} here: t_s {t_s[index]:g} after {t_s[index - 1]:g}"
@@ -119,7 +118,7 @@ def _faults_of_time(file: str, t_s: NDArray[np.float64], numbers: Sequence[int])
         yield Problem(file, numbers[index], 0, what, remedy)
 
 
-def _faults_of_size(file: str, found: dict[str, NDArray[np.float64]], numbers: Sequence[int]) -> Iterator[Problem]:
+def _faults_of_size(file: str, found: dict[str, Floats], numbers: Sequence[int]) -> Iterator[Problem]:
     for name, values in found.items():
         column = columns.COLUMNS[name]
         for index in np.flatnonzero((values > column.size) | (values < -column.size))[:1].tolist():

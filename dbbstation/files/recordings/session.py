@@ -49,8 +49,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
@@ -107,11 +106,11 @@ class SessionFolder(SessionDetails):
         circle = self.plan.tests[run.test].run(run.direction)
         return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
 
-    def bar_temp_c(self, logged: Mapping[str, NDArray[np.float64]]) -> float | None:
+    def bar_temp_c(self, logged: Mapping[str, Floats]) -> float | None:
         """Return the bar's temperature by its thermometer, else the shop's; None if unknown."""
         return float(np.mean(logged["bar"])) if "bar" in logged else self.ambient_temp_c
 
-    def setup(self, run: RunEntry, logged: Mapping[str, NDArray[np.float64]] = MappingProxyType({})) -> Setup:
+    def setup(self, run: RunEntry, logged: Mapping[str, Floats] = MappingProxyType({})) -> Setup:
         """Return ball, mounting and bar of a run under names unique among sessions."""
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.errors import Problem
     from dbbstation.files.formats.session import SetUpErrorsSchema
     from dbbstation.files.yaml.text import Location, YamlDocument
@@ -117,5 +116,5 @@ def _no_such_mounting(
     return document.problem((*location, "mounting"), what, remedy)
 
 
-def _mm(readings: Readings) -> NDArray[np.float64]:
+def _mm(readings: Readings) -> Floats:
     return np.array([np.nan if reading is None else reading / 1e3 for reading in readings])

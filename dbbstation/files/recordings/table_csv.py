@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 SEPARATORS = ",;\t"
 MOST_FAULTS = 20
 OF_SHEETS = frozenset({"#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#ref!", "#bezug!"})
@@ -51,7 +53,7 @@ class TableFile:
     names: tuple[str, ...]
     lines: NDArray[np.int64]
     cells: dict[str, tuple[str, ...]]
-    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    values: dict[str, Floats] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -198,14 +200,14 @@ def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: i
     return faults
 
 
-def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLanguage) -> tuple[str, ...]:
+def _plain(cells: Sequence[str], values: Floats, language: NumberLanguage) -> tuple[str, ...]:
     return tuple(
         cell.replace(language.decimal, PLAIN.decimal) if np.isfinite(value) else cell
         for cell, value in zip(cells, values, strict=True)
     )
 
 
-def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float64]:
+def _numbers(cells: Sequence[str], language: NumberLanguage) -> Floats:
     plain: Sequence[str] = cells
     if language.decimal != PLAIN.decimal and not any(PLAIN.decimal in cell for cell in cells):
         plain = [cell.replace(language.decimal, PLAIN.decimal) for cell in cells]

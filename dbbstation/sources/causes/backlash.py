@@ -24,6 +24,7 @@ from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource
 
@@ -66,23 +67,21 @@ class Backlash(SourceWithHistory):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> PlayState:  # noqa: ARG002
         self.require(motion)
         return leaning(motion.struts(machine).length_mm)
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
-    ) -> tuple[Effect, PlayState]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: PlayState) -> tuple[Effect, PlayState]:
         lag, _, behind = self._lag(motion, machine, values, state)
         return Effect(strut_mm=lag), behind
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, by_width, _ = self._lag(motion, machine, values, self.begin(motion, machine, values))
         return Effect(strut_mm=MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS))
 
     def _lag(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+        self, motion: Motion, machine: Machine, values: Floats, state: PlayState
+    ) -> tuple[Floats, Floats, PlayState]:
         lag, by_width, behind = followed(motion.struts(machine).length_mm, MM_PER_UM * np.abs(values), state)
         return np.where(values < 0.0, -lag, lag), by_width, behind
 
@@ -121,17 +120,15 @@ class _WoundUp(SourceWithHistory):
         meaning = "travel of a strut over which 37 % of a turn-round are left, all struts alike"
         return (*widths, Parameter("wind_up_length_mm", "mm", 0.05, meaning, LENGTHS_MM))
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> WoundState:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> WoundState:  # noqa: ARG002
         self.require(motion)
         return wound(motion.struts(machine).length_mm)
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: WoundState
-    ) -> tuple[Effect, WoundState]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: WoundState) -> tuple[Effect, WoundState]:
         side, _, behind = wound_up(motion.struts(machine).length_mm, _lengths(values)[0], state)
         return Effect(strut_mm=side * MM_PER_UM * values[:STRUTS]), behind
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         length, is_stated = _lengths(values)
         width = MM_PER_UM * values[:STRUTS]
         start = self.begin(motion, machine, values)
@@ -141,6 +138,6 @@ class _WoundUp(SourceWithHistory):
         return Effect(strut_mm=np.concatenate([own, (width * is_stated * by_length)[:, :, None]], axis=2))
 
 
-def _lengths(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _lengths(values: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     least = np.maximum(AHEAD * MM_PER_UM * np.abs(values[:STRUTS]), 1e-9)
     return np.maximum(values[STRUTS], least), values[STRUTS] >= least

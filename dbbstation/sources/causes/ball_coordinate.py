@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
@@ -37,8 +36,8 @@ class BallCoordinate(LinearSource):
     def shared_by(self, motion: Motion) -> str:
         return "" if motion.setup is None else motion.setup.ball
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(fixed_ball_mm=np.eye(3))
 
-    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
+    def stated_mm(self, motion: Motion) -> Floats | None:
         return None if motion.setup is None else np.full(3, motion.setup.ball_uncertainty_mm)

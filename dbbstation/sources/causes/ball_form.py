@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -56,7 +55,7 @@ class BallForm(LinearSource):
             for wave, name in (("cos", "cosine"), ("sin", "sine"))
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         if motion.setup is None:
             return Effect(reading_mm=np.zeros((len(motion), 2 * len(ORDERS))))
         away = motion.poses[:, :3] - motion.setup.fixed_ball_mm

@@ -12,8 +12,7 @@ from dbbstation.sources.laws.encoder import reading_without_noise_mm
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -65,17 +64,17 @@ class BarCyclic(ErrorSource):
         swept = [np.ptp(m.reading_mm[m.kept]) for m in motions if m.reading_mm is not None]
         return bool(np.median(swept) >= MM_PER_UM * nonlinear[0])
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         waves, _ = self._waves(motion, values[2])
         return Effect(reading_mm=MM_PER_UM * waves @ values[:2])
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         waves, by_period = self._waves(motion, values[2])
         sine, cosine = waves.T
         period = by_period * (values[0] * cosine - values[1] * sine)
         return Effect(reading_mm=MM_PER_UM * np.column_stack([sine, cosine, period]))
 
-    def _waves(self, motion: Motion, period_um: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _waves(self, motion: Motion, period_um: float) -> tuple[Floats, Floats]:
         """Return sine and cosine, shape (n, 2) [1], and the phase's derivative by the period, shape (n,) [rad/µm].
 
         A period of at most zero makes no wave.

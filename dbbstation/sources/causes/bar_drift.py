@@ -10,9 +10,7 @@ from dbbstation.sources.laws.by_temperature import FollowsTemperature
 from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -46,11 +44,11 @@ class BarDrift(ErrorSource):
         meaning = "reading minus true distance, from the first sample to the end of warm-up"
         return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), "pause_loss_um", 1800.0)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         return Effect(reading_mm=MM_PER_UM * grown(motion, values))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))
 
@@ -71,5 +69,5 @@ class _ByTemperature(FollowsTemperature, cause=BarDrift):
     thermometers = (("bar",),)
     growth = Parameter("drift_um_k", "µm/K", 1.6, "drift of the reading for each kelvin that the bar is warmer")
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(reading_mm=MM_PER_UM * self.warmer_k(motion))

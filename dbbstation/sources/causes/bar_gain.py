@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -46,7 +45,7 @@ class BarGain(LinearSource):
             ),
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         """Return the commanded way; zero without calibrated length or ball place."""
         setup = motion.setup
         if setup is None or setup.bar_length_mm is None or not setup.place_known:

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
@@ -31,8 +30,8 @@ class BarOffset(LinearSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return (Parameter("offset_mm", "mm", 0.0005, "reading minus true distance"),)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(reading_mm=np.ones(1))
 
-    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
+    def stated_mm(self, motion: Motion) -> Floats | None:
         return None if motion.setup is None else np.array([motion.setup.bar_uncertainty_mm])

@@ -10,8 +10,7 @@ from dbbstation.sources.contract import Effect, LinearSource, Motion, Need, Owne
 from dbbstation.sources.laws.encoder import reading_without_noise_mm
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -50,7 +49,7 @@ class BarScale(LinearSource):
             ),
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         reading = reading_without_noise_mm(motion)
         way = (reading - np.round(np.median(reading))) / REACH_MM

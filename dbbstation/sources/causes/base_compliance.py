@@ -14,8 +14,7 @@ from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, stated_te
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
@@ -48,13 +47,13 @@ class BaseCompliance(LinearSource):
             for way in ("horizontal", "vertical")
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         frames, struts = motion.frames(machine), motion.struts(machine)
         force = base_loads(struts, stated_tensions(self.name, machine, frames, struts), machine.strut_masses)
         horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
         return Effect(base_joint_mm=MM_PER_N * np.stack([force @ horizontal, force @ vertical], axis=-1))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, pull[6][3], t[6], weight = GRAVITY * (STRUT_KG[0] + STRUT_KG[1] + STRUT_KG[3]);
 platform_load(at, load);

@@ -14,8 +14,7 @@ from dbbstation.sources.laws.weights import for_such_struts, platform_masses, st
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
@@ -53,18 +52,16 @@ class CogShift(LinearSource):
             for axis in "xyz"
         )
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         stretch, tension = self._of_a_shift(motion, machine, values)
         return Effect(strut_mm=stretch, load_n=tension)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         each = [self._of_a_shift(motion, machine, axis) for axis in np.eye(3)]
         stretch, tensions = (np.stack(one, axis=-1) for one in zip(*each, strict=True))
         return Effect(strut_mm=stretch, load_n=tensions)
 
-    def _of_a_shift(
-        self, motion: Motion, machine: Machine, shift_mm: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _of_a_shift(self, motion: Motion, machine: Machine, shift_mm: Floats) -> tuple[Floats, Floats]:
         weight_n = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2
         struts = motion.struts(machine)
         x, y, _ = (motion.frames(machine).rotation @ shift_mm).T
@@ -72,7 +69,7 @@ class CogShift(LinearSource):
         tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
         return stretch_mm(struts, strut_compliance(machine), tension), tension
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, t[6];
 load[3] = -WEIGHT * dot(at->r[1], v), load[4] = WEIGHT * dot(at->r[0], v);

@@ -13,8 +13,7 @@ from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 from dbbstation.sources.laws.weights import platform_masses, stated_loads
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 N_PER_KN = 1e3
@@ -87,11 +86,11 @@ class DriveFriction(ErrorSource):
             found += [Parameter(of_motor(motor, name), *kind) for name, kind in zip(PER_MOTOR, kinds, strict=True)]
         return tuple(found)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         carried, _ = _carried(self._driven(motion, machine), values)
         return Effect(current_a=_by_motor(values)[0] / N_PER_KN * carried)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         carried, frictions = _carried(self._driven(motion, machine), values)
         gain = _by_motor(values)[0][:, None] / N_PER_KN
         answers = np.concatenate([carried[:, :, None] / N_PER_KN, -gain * frictions], axis=2)
@@ -100,15 +99,13 @@ class DriveFriction(ErrorSource):
         by_parameter[:, own, own] = answers
         return Effect(current_a=by_parameter.reshape(len(answers), STRUTS, -1))
 
-    def current_per_load(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def current_per_load(self, motion: Motion, machine: Machine, values: Floats) -> Floats:
         gain, share = _by_motor(values)[[0, 3]] / N_PER_KN
         load, direction, _ = self._driven(motion, machine)
-        answer: NDArray[np.float64] = gain * (1.0 - share * direction * np.sign(load))
+        answer: Floats = gain * (1.0 - share * direction * np.sign(load))
         return answer
 
-    def _driven(
-        self, motion: Motion, machine: Machine
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _driven(self, motion: Motion, machine: Machine) -> tuple[Floats, Floats, Floats]:
         if motion.time_s is None:
             self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
@@ -118,7 +115,7 @@ class DriveFriction(ErrorSource):
         return load, directions(length)[place], speed_mm_s(time_s, length)[place]
 
 
-def directions(length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def directions(length_mm: Floats) -> Floats:
     """Return the direction of friction, from -1 (shrinking) to 1 (growing), shape (n, 6).
 
     Args:
@@ -128,7 +125,7 @@ def directions(length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     return -2.0 / TURNED_OVER_MM * lag
 
 
-def driven_directions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def driven_directions(motion: Motion, machine: Machine) -> Floats:
     """Return the direction of friction along a motion, shape (n, 6).
 
     Readings between -1 and 1, within TURNED_OVER_MM of a reversal, show no friction.
@@ -136,13 +133,11 @@ def driven_directions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     return directions(motion.struts(machine).length_mm)
 
 
-def _by_motor(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _by_motor(values: Floats) -> Floats:
     return values.reshape(STRUTS, len(PER_MOTOR)).T
 
 
-def _carried(
-    driven: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], values: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _carried(driven: tuple[Floats, Floats, Floats], values: Floats) -> tuple[Floats, Floats]:
     load, direction, speed = driven
     frictions = np.stack([direction, speed, direction * np.abs(load) / N_PER_KN, np.ones_like(load)], axis=-1)
     return load - np.einsum("nik,ki->ni", frictions, _by_motor(values)[1:]), frictions

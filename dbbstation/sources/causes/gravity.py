@@ -15,8 +15,7 @@ from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, strut_com
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Compliance, Machine
     from dbbstation.sources.contract import ErrorSource
 
@@ -62,15 +61,15 @@ class Gravity(LinearSource):
         meaning = "elongation of a strut of 1000 mm per force that pulls it, positive"
         return (Parameter("strut_compliance_um_kn", "µm/kN", usual, meaning, positive=True),)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=_stretched(motion, machine)[1][:, :, None])
 
-    def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:
+    def found_compliance(self, machine: Machine, values: Floats) -> Compliance | None:
         if values[0] == 0.0:
             return None
         return replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N * float(values[0]))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, t[6];
 platform_load(at, load);
@@ -97,23 +96,23 @@ class _Contacts(Gravity):
         meaning = "compliance that a strut loses as its force grows 2.72 times; the other value is that at 1 kN"
         return (compliance, Parameter("stiffening_um_kn", "µm/kN", STIFFENING * compliance.plausible, meaning))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         tension, stretch = _stretched(motion, machine)
         return Effect(strut_mm=np.stack([stretch, -MM_PER_N * tension * _folds(tension, ACROSS_N)], axis=2))
 
-    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return effects of another load across, and of contacts softer where the strut is longer."""
         tension, stretch = _stretched(motion, machine)
         own, folds = MM_PER_N * tension, _folds(tension, ACROSS_N)
         changes = [own * (folds - _folds(tension, 3.0 * ACROSS_N)), (own - stretch) * folds]
         return Effect(strut_mm=values[1] * np.stack(changes, axis=2))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:
         springs = super().c_form(machine, values, thermometers).body
         return CForm(f"{springs}\nEACH e->strut[i] -= 1e-6 * v[1] * t[i] * log(1e-3 * hypot(t[i], {ACROSS_N}));")
 
 
-def _folds(tension: NDArray[np.float64], across_n: float) -> NDArray[np.float64]:
+def _folds(tension: Floats, across_n: float) -> Floats:
     return np.log(PER_KN * np.hypot(tension, across_n))
 
 
@@ -124,7 +123,7 @@ STIFFENING = 0.1
 """Usual size of what an e-fold of load takes off a compliance: rollers deflect by about the 0.9th power of their load."""
 
 
-def _stretched(motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _stretched(motion: Motion, machine: Machine) -> tuple[Floats, Floats]:
     masses = platform_masses(Gravity.name, machine)
     frames, struts = motion.frames(machine), motion.struts(machine)
     tension = strut_tensions(struts, platform_weight(frames, masses))

@@ -11,8 +11,7 @@ from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -62,11 +61,11 @@ class JigBump(ErrorSource):
         after = [_is_after(motion, nonlinear[0]) for motion in motions]
         return any(after) and not all(after)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_is_after(motion, values[3])))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         return Effect(fixed_ball_mm=MM_PER_UM * np.eye(3, 4) * float(_is_after(motion, values[3])))
 

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -57,16 +56,16 @@ class JigDistortion(ErrorSource):
             ),
         )
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         place, lean = _bends(motion)
         return Effect(fixed_ball_mm=(place + values[3] * lean) @ values[:3])
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         place, lean = _bends(motion)
         return Effect(fixed_ball_mm=np.column_stack([place + values[3] * lean, lean @ values[:3]]))
 
 
-def _bends(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bends(motion: Motion) -> tuple[Floats, Floats]:
     """Return the ball's shift per bow, saddle and twist at d = 0, and per mm of depth.
 
     Shapes (3, 3), [mm/µm] and [1/µm]; zero for a ball in no bore.

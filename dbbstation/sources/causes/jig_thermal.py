@@ -10,8 +10,7 @@ from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Par
 from dbbstation.sources.laws.by_temperature import STEEL_UM_M_K
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM_M = 1e-6
@@ -43,7 +42,7 @@ class JigThermal(LinearSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return (Parameter("warmer_k", "K", 2.0, "temperature of the plate on the machine minus that on the CMM"),)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         setup = motion.setup
         if setup is None or setup.plate is None:
             return Effect(fixed_ball_mm=np.zeros((3, 1)))

@@ -23,8 +23,7 @@ from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Hexapod, Machine
     from dbbstation.machine.kinematics import Struts
     from dbbstation.sources.contract import Parameter
@@ -77,19 +76,17 @@ class JointFriction(SourceWithHistory):
         meaning = f"force that swings strut {{}}, 1 m from its base joint; {for_such_struts(machine)}"
         return of_each_strut("strut_{}_n", "N", 10.0, meaning, positive=True)
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> PlayState:  # noqa: ARG002
         self.require(motion)
         return leaning(joint_angles(motion.struts(machine), outer_axes(machine.hexapod)).angle_rad)
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
-    ) -> tuple[Effect, PlayState]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: PlayState) -> tuple[Effect, PlayState]:
         struts = motion.struts(machine)
         drag, behind = friction_drag(struts, outer_axes(machine.hexapod), state)
         tension = strut_tensions(struts, transverse_load(struts, values[:, None] * drag))
         return Effect(strut_mm=stretch_mm(struts, strut_compliance(machine), tension)), behind
 
-    def left_open(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return effects of the outer axis alone, of either axis as the strut leans over, and of other wind-up angles.
 
         Bearings differ, and their load changes with inclination. Wind-up is visible only where a joint hardly swings.
@@ -112,7 +109,7 @@ class JointFriction(SourceWithHistory):
         tensions = [strut_tensions(struts, transverse_load(struts, values[:, None] * part)) for part in parts]
         return Effect(strut_mm=np.stack([stretch_mm(struts, compliance, tension) for tension in tensions], axis=-1))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         struts = motion.struts(machine)
         drag, _ = friction_drag(struts, outer_axes(machine.hexapod), self.begin(motion, machine, values))
         by_joint = []
@@ -124,12 +121,12 @@ class JointFriction(SourceWithHistory):
         return Effect(strut_mm=np.stack(by_joint, axis=-1))
 
 
-def outer_axes(hexapod: Hexapod) -> NDArray[np.float64]:
+def outer_axes(hexapod: Hexapod) -> Floats:
     """Return the base-fixed axes of base joints, unit vectors, machine frame, shape (6, 3)."""
     across = hexapod.platform_joints_mm[:, :2] - hexapod.base_joints_mm[:, :2]
     across[np.linalg.norm(across, axis=1) == 0.0] = [0.0, 1.0]  # a strut that is plumb there: any level axis is as good
     axes = np.column_stack([-across[:, 1], across[:, 0], np.zeros(STRUTS)])
-    unit: NDArray[np.float64] = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    unit: Floats = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     return unit
 
 
@@ -142,12 +139,12 @@ class JointAngles:
         by_first: outer angle by platform joint, shape (n, 6, 3) [rad/mm].
     """
 
-    angle_rad: NDArray[np.float64]
-    by_first: NDArray[np.float64]
-    by_second: NDArray[np.float64]
+    angle_rad: Floats
+    by_first: Floats
+    by_second: Floats
 
 
-def joint_angles(struts: Struts, axes: NDArray[np.float64]) -> JointAngles:
+def joint_angles(struts: Struts, axes: Floats) -> JointAngles:
     """Return the joints' angles along a path."""
     unit = struts.unit
     aside = np.einsum("nij,ij->ni", unit, axes)  # sine of the second angle
@@ -164,9 +161,7 @@ def joint_angles(struts: Struts, axes: NDArray[np.float64]) -> JointAngles:
     )
 
 
-def friction_drag(
-    struts: Struts, axes: NDArray[np.float64], state: PlayState | None = None
-) -> tuple[NDArray[np.float64], PlayState]:
+def friction_drag(struts: Struts, axes: Floats, state: PlayState | None = None) -> tuple[Floats, PlayState]:
     """Return forces on platform joints for 1 N m of friction about each base axis, (n, 6, 3) [N].
 
     Returns:
@@ -178,7 +173,7 @@ def friction_drag(
     return outer + inner, behind
 
 
-def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def drags(joints: JointAngles, acting: Floats) -> tuple[Floats, Floats]:
     """Return forces on platform joints for acting shares of 1 N m, (n, 6, 3) [N]."""
     return (
         LEVER_MM * acting[:, :STRUTS, None] * joints.by_first,
@@ -186,9 +181,7 @@ def drags(joints: JointAngles, acting: NDArray[np.float64]) -> tuple[NDArray[np.
     )
 
 
-def resistance(
-    angle_rad: NDArray[np.float64], state: PlayState, wind_up_rad: float = WIND_UP_RAD
-) -> tuple[NDArray[np.float64], PlayState]:
+def resistance(angle_rad: Floats, state: PlayState, wind_up_rad: float = WIND_UP_RAD) -> tuple[Floats, PlayState]:
     """Return the acting share of friction against motion, -1 to 1, shape (n, m).
 
     Args:

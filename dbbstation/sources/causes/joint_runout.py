@@ -15,8 +15,7 @@ from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion,
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -84,18 +83,18 @@ class JointRunout(LinearSource):
             ]
         return tuple(found)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
         return Effect(strut_mm=MM_PER_UM * np.einsum("nkp,kp->nk", lengths, values.reshape(STRUTS, -1)))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         lengths = motion.once(self.name, machine, lambda: _per_offset(motion, machine))
         own = np.zeros((len(motion), STRUTS, STRUTS, lengths.shape[2]))
         each = np.arange(STRUTS)
         own[:, each, each] = MM_PER_UM * lengths
         return Effect(strut_mm=own.reshape(len(motion), STRUTS, -1))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         rest = inverse(machine.hexapod, middle(machine)).unit[0]
         return CForm(
             """EACH {
@@ -118,7 +117,7 @@ class JointRunout(LinearSource):
         )
 
 
-def _per_offset(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def _per_offset(motion: Motion, machine: Machine) -> Floats:
     """Return each strut's length change per own offset, in parameter order, shape (n, 6, 8) [1]."""
     frames = motion.frames(machine)
     unit, rest = motion.struts(machine).unit, inverse(machine.hexapod, middle(machine)).unit[0]
@@ -128,7 +127,7 @@ def _per_offset(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     return np.concatenate([*(-_forms(swing) for swing in swings), swings[1]], axis=2)
 
 
-def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:
+def _across(rest: Floats) -> Floats:
     """Return directions v and h across `rest`, shape (6, 3); shape (6, 2, 3) [1]."""
     level = np.cross(rest, [0.0, 0.0, 1.0])
     size = np.linalg.norm(level, axis=1, keepdims=True)
@@ -137,7 +136,7 @@ def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.cross(level, rest), level], axis=1)
 
 
-def _forms(swing: NDArray[np.float64]) -> NDArray[np.float64]:
+def _forms(swing: Floats) -> Floats:
     """Return v²/2, h²/2 and v h of swings (v, h), shape (n, 6, 2); shape (n, 6, 3) [1]."""
     v, h = swing[..., 0], swing[..., 1]
     return np.stack([v**2 / 2.0, h**2 / 2.0, v * h], axis=-1)

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
@@ -34,8 +33,8 @@ class Mounting(LinearSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return tuple(Parameter(f"{axis}_mm", "mm", 0.002, f"ball actual minus CMM {axis.upper()}") for axis in "xyz")
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(fixed_ball_mm=np.eye(3))
 
-    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
+    def stated_mm(self, motion: Motion) -> Floats | None:
         return None if motion.setup is None else np.zeros(3) + motion.setup.mounting_repeatability_mm

@@ -35,8 +35,7 @@ from dbbstation.sources.laws.weights import platform_masses
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -91,24 +90,22 @@ class Play(SourceWithHistory):
         meaning = "force in a strut below which friction holds it, all struts alike"
         return (*plays, Parameter("friction_n", "N", 100.0, meaning, FRICTION_N))
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> PlayState:  # noqa: ARG002
         self.require(motion)
         return leaning(motion.struts(machine).length_mm)
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
-    ) -> tuple[Effect, PlayState]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: PlayState) -> tuple[Effect, PlayState]:
         place, _, behind = self._places(motion, machine, values, state)
         return Effect(strut_mm=place), behind
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, by_width, _ = self._places(motion, machine, values, self.begin(motion, machine, values))
         by_play = MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS)
         return Effect(strut_mm=np.concatenate([by_play, np.zeros((*by_width.shape, 1))], axis=2))
 
     def _places(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+        self, motion: Motion, machine: Machine, values: Floats, state: PlayState
+    ) -> tuple[Floats, Floats, PlayState]:
         tension, width = _tensions(motion, machine), MM_PER_UM * values[:STRUTS]
         friction = max(float(values[STRUTS]), 0.0)
         place, by_width, behind = settled(motion.struts(machine).length_mm, tension, np.abs(width), friction, state)
@@ -140,18 +137,18 @@ class _Shaken(ErrorSource):
         meaning = "standard deviation of the force that shakes a strut across its play, all struts alike"
         return (*plays, Parameter("shaking_n", "N", 100.0, meaning, SHAKING_N))
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         share = erf(_tensions(motion, machine) / _spread_n(values))
         return Effect(strut_mm=0.5 * MM_PER_UM * values[:STRUTS] * share)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         ratio = _tensions(motion, machine) / _spread_n(values)
         by_play = 0.5 * MM_PER_UM * erf(ratio)[:, :, None] * np.eye(STRUTS)
         steep = -np.sqrt(2.0) / _spread_n(values) * 2.0 / np.sqrt(np.pi) * ratio * np.exp(-np.square(ratio))
         by_force = 0.5 * MM_PER_UM * values[:STRUTS] * steep
         return Effect(strut_mm=np.concatenate([by_play, by_force[:, :, None]], axis=2))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         return CForm(
             """double load[6] = {0.0}, pull[6][3], t[6], moving = GRAVITY * (STRUT_KG[3] + STRUT_KG[0] / 2.0);
 platform_load(at, load);
@@ -166,11 +163,11 @@ LEAST_N = 1.0
 """Shaking force below which the play is crossed at once, for any load that a sample has [N]."""
 
 
-def _spread_n(values: NDArray[np.float64]) -> float:
+def _spread_n(values: Floats) -> float:
     return float(np.sqrt(2.0) * max(values[STRUTS], LEAST_N))
 
 
-def _tensions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def _tensions(motion: Motion, machine: Machine) -> Floats:
     """Return forces on the drives, positive if the load pulls, shape (n, 6) [N]."""
     masses = platform_masses(Play.name, machine)
     frames, struts = motion.frames(machine), motion.struts(machine)
@@ -181,12 +178,12 @@ def _tensions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
 
 def settled(
-    travel: NDArray[np.float64],
-    tension: NDArray[np.float64],
-    width: NDArray[np.float64],
+    travel: Floats,
+    tension: Floats,
+    width: Floats,
     friction: float,
     state: PlayState,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+) -> tuple[Floats, Floats, PlayState]:
     """Follow each column through its play.
 
     Returns:
@@ -200,14 +197,14 @@ def settled(
 
 @compiled
 def _settle(
-    travel: NDArray[np.float64],
-    tension: NDArray[np.float64],
-    width: NDArray[np.float64],
+    travel: Floats,
+    tension: Floats,
+    width: Floats,
     friction: float,
-    at: NDArray[np.float64],
-    side: NDArray[np.float64],
-    place: NDArray[np.float64],
-    by_width: NDArray[np.float64],
+    at: Floats,
+    side: Floats,
+    place: Floats,
+    by_width: Floats,
 ) -> None:
     count, columns = travel.shape
     for i in range(columns):

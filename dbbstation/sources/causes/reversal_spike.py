@@ -22,8 +22,7 @@ from dbbstation.sources.contract import (
 from dbbstation.sources.laws.turning import TURNED_MM, since_turning
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -80,27 +79,23 @@ class ReversalSpike(ErrorSource):
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
         return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         return Effect(strut_mm=self._along(motion, machine, values)[0])
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> Floats:  # noqa: ARG002
         self.require(motion)
         return _NOTHING
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: NDArray[np.float64]
-    ) -> tuple[Effect, NDArray[np.float64]]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: Floats) -> tuple[Effect, Floats]:
         spike, _, _, behind = _straight(motion.struts(machine).length_mm, values, state)
         return Effect(strut_mm=spike), behind
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, by_height, by_length = self._along(motion, machine, values)
         own = MM_PER_UM * by_height[:, :, None] * np.eye(STRUTS)
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
-    def _along(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _along(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats, Floats]:
         self.require(motion)
         travel = motion.struts(machine).length_mm
         if motion.straight:
@@ -110,13 +105,11 @@ class ReversalSpike(ErrorSource):
         return spike, by_height, by_length
 
 
-def _sizes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def _sizes(values: Floats) -> tuple[Floats, float]:
     return MM_PER_UM * values[:STRUTS], float(values[STRUTS])
 
 
-def _straight(
-    travel: NDArray[np.float64], values: NDArray[np.float64], state: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _straight(travel: Floats, values: Floats, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
     behind = state.copy()
     _go_on(np.ascontiguousarray(travel), *_sizes(values), TURNED_MM, behind, spike, by_height, by_length)
@@ -158,12 +151,12 @@ def _spike(way: float, sign: float, height: float, length: float) -> tuple[float
 
 @compiled
 def _smooth(
-    since: NDArray[np.float64],
-    height: NDArray[np.float64],
+    since: Floats,
+    height: Floats,
     length: float,
-    spike: NDArray[np.float64],
-    by_height: NDArray[np.float64],
-    by_length: NDArray[np.float64],
+    spike: Floats,
+    by_height: Floats,
+    by_length: Floats,
 ) -> None:
     """Return spikes at signed ways since turning, shape (n, 6) [mm]."""
     count, columns = since.shape
@@ -174,9 +167,7 @@ def _smooth(
 
 
 @inlined
-def _behind(
-    way: float, sign: float, height: float, length: float, left: NDArray[np.float64]
-) -> tuple[float, float, float]:
+def _behind(way: float, sign: float, height: float, length: float, left: Floats) -> tuple[float, float, float]:
     """Return the spike and the previous one's rest, shape (3,), fading over c|a|."""
     spike, by_height, by_length = _spike(way, sign, height, length)
     if left[0] == 0.0 or height == 0.0:
@@ -189,14 +180,14 @@ def _behind(
 
 @compiled
 def _go_on(  # noqa: C901 - what is remembered decides in one pass
-    travel: NDArray[np.float64],
-    height: NDArray[np.float64],
+    travel: Floats,
+    height: Floats,
     length: float,
     turned: float,
-    memory: NDArray[np.float64],
-    spike: NDArray[np.float64],
-    by_height: NDArray[np.float64],
-    by_length: NDArray[np.float64],
+    memory: Floats,
+    spike: Floats,
+    by_height: Floats,
+    by_length: Floats,
 ) -> None:
     count, columns = travel.shape
     for i in range(columns):

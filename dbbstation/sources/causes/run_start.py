@@ -9,12 +9,12 @@ import numpy as np
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from scipy.interpolate import CubicSpline
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
-    _Travelled = tuple[NDArray[np.float64], CubicSpline, NDArray[np.float64]]
+    _Travelled = tuple[Floats, CubicSpline, Floats]
 
 USUAL_DEG = 0.05
 """A fifth of a sample at ten readings a second."""
@@ -54,18 +54,18 @@ class RunStart(ErrorSource):
     def shared_by(self, motion: Motion) -> str:
         return "" if motion.setup is None else motion.setup.run
 
-    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
+    def stated_mm(self, motion: Motion) -> Floats | None:
         """Return the uncertainty from edge sampling [deg]; zero with recorded angles."""
         return np.array([0.0 if motion.setup is None else motion.setup.start_uncertainty_deg])
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         along, spline, there = self._along(motion, machine)
-        gone: NDArray[np.float64] = spline(along + float(values[0])) - there
+        gone: Floats = spline(along + float(values[0])) - there
         return Effect(strut_mm=gone)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         along, spline, _ = self._along(motion, machine)
-        slope: NDArray[np.float64] = spline(along + float(values[0]), 1)
+        slope: Floats = spline(along + float(values[0]), 1)
         return Effect(strut_mm=slope[:, :, None])
 
     def _along(self, motion: Motion, machine: Machine) -> _Travelled:
@@ -74,7 +74,7 @@ class RunStart(ErrorSource):
         return motion.once("travelled", machine, lambda: _along(motion, motion.struts(machine).length_mm))
 
 
-def _along(motion: Motion, length: NDArray[np.float64]) -> _Travelled:
+def _along(motion: Motion, length: Floats) -> _Travelled:
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
 
     travelled = _travelled_deg(motion)
@@ -87,7 +87,7 @@ def _along(motion: Motion, length: NDArray[np.float64]) -> _Travelled:
     return travelled, spline, spline(travelled)
 
 
-def _travelled_deg(motion: Motion) -> NDArray[np.float64]:
+def _travelled_deg(motion: Motion) -> Floats:
     if motion.setup is None:
         return np.zeros(len(motion))
     away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]

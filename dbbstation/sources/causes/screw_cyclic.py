@@ -15,8 +15,7 @@ from dbbstation.sources.laws.screws import screw_lead_mm
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -64,13 +63,13 @@ class ScrewCyclic(LinearSource):
             for wave in ("sine", "cosine")
         )
 
-    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+    def shortest_period_mm(self, machine: Machine, values: Floats) -> float:  # noqa: ARG002
         return screw_lead_mm(self.name, machine) / max(self.harmonics)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=self.waves_mm(motion, machine))
 
-    def waves_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    def waves_mm(self, motion: Motion, machine: Machine) -> Floats:
         turned_rad = 2.0 * np.pi / screw_lead_mm(self.name, machine) * motion.struts(machine).length_mm
         own = []
         for order in self.harmonics:
@@ -78,7 +77,7 @@ class ScrewCyclic(LinearSource):
             own.append((waves[:, :, None, :] * np.eye(STRUTS)[:, :, None]).reshape(len(motion), STRUTS, -1))
         return np.asarray(MM_PER_UM * np.concatenate(own, axis=2), dtype=np.float64)
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = """for (int order = 1; order <= harmonics; order++) EACH {
     double turn = 6.28318530717958647693 * order / lead * at->length[i];
     const double *wave = v + 12 * (order - 1) + 2 * i;
@@ -129,26 +128,26 @@ class _AlongTheScrew(ErrorSource):
         growth = Parameter("growth_percent_m", "percent/m", 200.0, meaning, GROWTHS_PERCENT_M)
         return (*_TwoHarmonics().parameters(machine), growth)
 
-    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:
+    def shortest_period_mm(self, machine: Machine, values: Floats) -> float:
         return _TwoHarmonics().shortest_period_mm(machine, values)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         waves = _TwoHarmonics().waves_mm(motion, machine)
         return Effect(strut_mm=(waves @ values[:-1]) * (1.0 + values[-1] * _out(motion, machine)))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         waves, out = _TwoHarmonics().waves_mm(motion, machine), _out(motion, machine)
         by_growth = out * (waves @ values[:-1])
         return Effect(
             strut_mm=np.concatenate([waves * (1.0 + values[-1] * out)[:, :, None], by_growth[:, :, None]], axis=2)
         )
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         form = _TwoHarmonics().c_form(machine, values)
         grown = {"growth": 1e-5 * float(values[-1]), "middle": sum(machine.travel.strut_mm) / 2.0}
         return replace(form, constants={**form.constants, **grown})
 
 
-def _out(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def _out(motion: Motion, machine: Machine) -> Floats:
     """Return each strut's extension beyond mid-travel, shape (n, 6) [100 m]: one percent per metre."""
     return 1e-5 * (motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0)

@@ -13,8 +13,7 @@ from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion,
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
 
@@ -48,11 +47,11 @@ class ScrewLead(LinearSource):
         zero = f"strut {{}} travels more than counted; zero at {_middle_mm(machine):g} mm"
         return of_each_strut("strut_{}_um_m", "µm/m", 40.0, zero)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         travel = motion.struts(machine).length_mm - _middle_mm(machine)
         return Effect(strut_mm=MM_PER_UM_M * travel[:, :, None] * np.eye(STRUTS))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "EACH e->strut[i] += 1e-6 * v[i] * (at->length[i] - middle);"
         return CForm(body, by_pose=False, constants={"middle": _middle_mm(machine)})
 

@@ -13,8 +13,7 @@ from dbbstation.sources.laws.loop import STANDING, LoopState, driven, undone
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
 
@@ -59,33 +58,27 @@ class ServoLag(ErrorSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         return Effect(strut_mm=self._lag(motion, machine, values)[0])
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> LoopState:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> LoopState:  # noqa: ARG002
         self.require(motion)
         return STANDING
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
-    ) -> tuple[Effect, LoopState]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: LoopState) -> tuple[Effect, LoopState]:
         length, time_s = motion.struts(machine).length_mm, np.asarray(motion.time_s)
         lag, _, behind = driven(length, time_s, S_PER_MS * values, state)
         return Effect(strut_mm=lag), behind
 
-    def undone(
-        self, motion: Motion, reached: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
-    ) -> NDArray[np.float64]:
+    def undone(self, motion: Motion, reached: Motion, machine: Machine, values: Floats, state: LoopState) -> Floats:
         commanded, wanted = motion.struts(machine).length_mm, reached.struts(machine).length_mm
         return undone(commanded, wanted, np.asarray(motion.time_s), S_PER_MS * values, state)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_constant = self._lag(motion, machine, values)[1]
         return Effect(strut_mm=S_PER_MS * by_constant[:, :, None] * np.eye(STRUTS))
 
-    def _lag(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _lag(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats]:
         self.require(motion)
         if motion.straight:
             length = motion.struts(machine).length_mm
@@ -100,9 +93,7 @@ class ServoLag(ErrorSource):
         return lag[place], by_constant[place]
 
 
-def followed(
-    speed: NDArray[np.float64], step_s: NDArray[np.float64], constant_s: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def followed(speed: Floats, step_s: Floats, constant_s: Floats) -> tuple[Floats, Floats]:
     """Return errors e of loops, tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k)."""
     lag, by_constant = np.zeros_like(speed), np.zeros_like(speed)
     _follow(np.ascontiguousarray(speed), np.ascontiguousarray(step_s), constant_s, lag, by_constant)
@@ -115,11 +106,11 @@ FORGOTTEN = 50.0
 
 @compiled
 def _follow(
-    speed: NDArray[np.float64],
-    step: NDArray[np.float64],
-    constant: NDArray[np.float64],
-    lag: NDArray[np.float64],
-    by_constant: NDArray[np.float64],
+    speed: Floats,
+    step: Floats,
+    constant: Floats,
+    lag: Floats,
+    by_constant: Floats,
 ) -> None:
     """Solve each column exactly for speeds linear between rows.
 

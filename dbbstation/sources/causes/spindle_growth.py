@@ -15,8 +15,7 @@ from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -60,13 +59,13 @@ class SpindleGrowth(ErrorSource):
         begun = Parameter("begun_percent", "percent", 40.0, before, BEGUN_PERCENT, newer=True)
         return (*warm_up_parameters(growth, "pause_loss_um", 1800.0), begun)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         growth, *_, percent = values
         out_um = grown(motion, values[:-1]) + percent / 100.0 * growth
         return Effect(tool_tip_mm=MM_PER_UM * out_um[:, None] * _OUT_OF_THE_SPINDLE)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         self.require(motion)
         growth, *_, percent = values
         law = grown_by(motion, values[:-1])
@@ -93,9 +92,9 @@ class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
         "growth_um_k", "µm/K", 3.0, "way of the tool tip out of the spindle for each kelvin of the machine"
     )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(tool_tip_mm=(MM_PER_UM * self.warmer_k(motion) * _OUT_OF_THE_SPINDLE)[..., None])
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "e->tip[2] -= 1e-3 * v[0] * warmer[thermometer[0]];"
         return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))

@@ -11,9 +11,7 @@ from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion,
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
@@ -59,12 +57,12 @@ class StrutBending(LinearSource):
             Parameter("shortening_um", "µm", USUAL_UM, "shortening of a level strut of 1000 mm under its own weight"),
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         struts = motion.struts(machine)
         across_squared = 1.0 - (struts.unit @ DOWN) ** 2
         return Effect(strut_mm=-MM_PER_UM * (across_squared * (struts.length_mm / 1000.0) ** 5)[:, :, None])
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         return CForm(
             """EACH {
     double z = at->unit[i][2], m = at->length[i] / 1000.0;

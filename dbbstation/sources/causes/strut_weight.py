@@ -16,8 +16,7 @@ from dbbstation.sources.laws.weights import for_such_struts, masses_for_c, strut
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 USUAL = StrutMasses(strut_kg=25.0, motor_kg=20.0, motor_length_mm=0.0)
@@ -71,7 +70,7 @@ class StrutWeight(LinearSource):
             for part in _parts(machine)
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         struts = motion.struts(machine)
         lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
         stretch, loads = [], []
@@ -83,7 +82,7 @@ class StrutWeight(LinearSource):
             loads.append(motor_loads(struts, tension, kilogram))
         return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(loads, axis=-1))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
         given = {f"{part}_kg": float(value) for part, value in zip(_parts(machine), values, strict=True)}
         return CForm(

@@ -13,9 +13,7 @@ from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM_M = 1e-6
@@ -52,11 +50,11 @@ class ThermalFrame(ErrorSource):
         meaning = "growth of the base from the first sample to the end of warm-up"
         return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), "pause_loss_um_m", 7200.0)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         self.require(motion)
         return Effect(base_joint_mm=grown(motion, values)[:, None, None] * _per_growth_mm(machine))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         self.require(motion)
         law = grown_by(motion, values)
         return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
@@ -80,13 +78,13 @@ class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
         "growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of the base for each kelvin that it is warmer"
     )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(base_joint_mm=(self.warmer_k(motion)[:, :, None] * _per_growth_mm(machine))[..., None])
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "ALL e->base[i][k] += 1e-6 * v[0] * warmer[thermometer[0]] * Q[i][k];"
         return CForm(body, by_pose=False, thermometers=self.chosen(thermometers))
 
 
-def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:
+def _per_growth_mm(machine: Machine) -> Floats:
     return MM_PER_UM_M * machine.hexapod.base_joints_mm

@@ -14,9 +14,7 @@ from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM_M = 1e-6
@@ -53,11 +51,11 @@ class ThermalStruts(ErrorSource):
         meaning = "growth of all struts from the first sample to the end of warm-up"
         return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), "pause_loss_um_m", 3600.0)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         per_growth = self._per_growth_mm(motion, machine)
         return Effect(strut_mm=grown(motion, values)[:, None] * per_growth)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         per_growth = self._per_growth_mm(motion, machine)
         return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
 
@@ -67,7 +65,7 @@ class ThermalStruts(ErrorSource):
     def other_laws(self) -> tuple[ErrorSource, ...]:
         return (_InTwoStages(), *super().other_laws())
 
-    def _per_growth_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    def _per_growth_mm(self, motion: Motion, machine: Machine) -> Floats:
         self.require(motion)
         return _per_growth_mm(motion, machine)
 
@@ -82,15 +80,15 @@ class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
     thermometers = (tuple(f"strut{k + 1}" for k in range(STRUTS)), MACHINE)
     growth = Parameter("growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of a strut for each kelvin that it is warmer")
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(strut_mm=(self.warmer_k(motion) * _per_growth_mm(motion, machine))[:, :, None])
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         chosen = self.chosen(thermometers)
         each = chosen if len(chosen) == STRUTS else chosen * STRUTS
         body = "EACH e->strut[i] += 1e-6 * v[0] * warmer[thermometer[i]] * at->length[i];"
         return CForm(body, by_pose=False, thermometers=each)
 
 
-def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def _per_growth_mm(motion: Motion, machine: Machine) -> Floats:
     return MM_PER_UM_M * motion.struts(machine).length_mm

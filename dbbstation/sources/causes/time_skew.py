@@ -11,8 +11,7 @@ from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner
 from dbbstation.sources.laws.rates import driven_in_time
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 S_PER_MS = 1e-3
@@ -56,21 +55,19 @@ class TimeSkew(ErrorSource):
             Parameter("late_ms", "ms", USUAL_MS, "time by which readings were taken after the poses they stand at"),
         )
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         gone, _ = self._gone_on(motion, machine, S_PER_MS * float(values[0]))
         return Effect(strut_mm=gone)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, speed = self._gone_on(motion, machine, S_PER_MS * float(values[0]))
         return Effect(strut_mm=S_PER_MS * speed[:, :, None])
 
-    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
+    def stated_mm(self, motion: Motion) -> Floats | None:  # noqa: ARG002
         """Return its usual size [ms] as a random effect, because exact circles do not determine it."""
         return np.array([USUAL_MS])
 
-    def _gone_on(
-        self, motion: Motion, machine: Machine, late_s: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _gone_on(self, motion: Motion, machine: Machine, late_s: float) -> tuple[Floats, Floats]:
         self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
         if len(time_s) == 1:
@@ -79,6 +76,6 @@ class TimeSkew(ErrorSource):
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
 
         spline = CubicSpline(time_s, length)
-        gone: NDArray[np.float64] = spline(time_s + late_s) - spline(time_s)
-        speed: NDArray[np.float64] = spline(time_s + late_s, 1)
+        gone: Floats = spline(time_s + late_s) - spline(time_s)
+        speed: Floats = spline(time_s + late_s, 1)
         return gone[place], speed[place]

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 
@@ -42,5 +41,5 @@ class ToolBallOffset(LinearSource):
             for axis in "xyz"
         )
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return Effect(tool_tip_mm=np.eye(3))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import JointAxes, Machine
     from dbbstation.machine.kinematics import Struts
     from dbbstation.machine.rotation import Frames
@@ -57,7 +58,7 @@ class UjointScrew(LinearSource):
         meaning = "travel per turn of the platform end about the strut, seen along it clockwise; 0 where corrected"
         return (Parameter("lead_mm", "mm", screw_lead_mm(self.name, machine), meaning),)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         axes = _axes(machine)
         here = _second_axes(axes, motion.struts(machine), motion.frames(machine))
         at_rest = middle(machine)
@@ -66,7 +67,7 @@ class UjointScrew(LinearSource):
         turned = np.angle(here * rest.conj())
         return Effect(strut_mm=(turned / (2.0 * np.pi))[:, :, None])
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         axes, at_rest = _axes(machine), middle(machine)
         rest = _second_axes(axes, inverse(machine.hexapod, at_rest), at_rest)[0]
         return CForm(
@@ -105,7 +106,7 @@ def _second_axes(axes: JointAxes, struts: Struts, frames: Frames) -> NDArray[np.
     return found
 
 
-def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _length(vectors: Floats) -> Floats:
     return np.asarray(np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 

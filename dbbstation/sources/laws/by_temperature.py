@@ -19,8 +19,7 @@ from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motio
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 STEEL_UM_M_K = 11.5
@@ -52,7 +51,7 @@ class FollowsTemperature(LinearSource):
         cls.detail_mm = cause.detail_mm
 
     @abstractmethod
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """By the growth per kelvin, from `warmer_k`."""
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
@@ -71,15 +70,13 @@ class FollowsTemperature(LinearSource):
     def has_history(self) -> bool:
         return True
 
-    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Motion:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: Floats) -> Motion:  # noqa: ARG002
         return motion.stretch(slice(0, 1))
 
-    def advance(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: Motion
-    ) -> tuple[Effect, Motion]:
+    def advance(self, motion: Motion, machine: Machine, values: Floats, state: Motion) -> tuple[Effect, Motion]:
         return self.effect(motion.after(state), machine, values).last(len(motion)), state
 
-    def warmer_k(self, motion: Motion) -> NDArray[np.float64]:
+    def warmer_k(self, motion: Motion) -> Floats:
         """Return the warming since the session's begin, shape (n, 1), or (n, 6) for struts [K]."""
         self.require(motion)
         logged = [logged_degc(motion, name) for name in self._columns(motion)]
@@ -147,7 +144,7 @@ def known_thermometers(motion: Motion) -> set[str]:
     return set(motion.temperature_degc)
 
 
-def logged_degc(motion: Motion, name: str) -> tuple[NDArray[np.float64], float]:
+def logged_degc(motion: Motion, name: str) -> tuple[Floats, float]:
     """Return a thermometer's readings, shape (n,), and its start value [degC]."""
     if motion.setup is None or not motion.setup.thermometers or motion.time_s is None:
         own = motion.temperature_degc[name]

@@ -14,7 +14,7 @@ from dbbstation.machine.compiled import compiled
 from dbbstation.sources.laws.play_operator import leaning
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,20 +27,18 @@ class WoundState:
         by_length: derivative of that by length, shape (m,).
     """
 
-    travel: NDArray[np.float64]
-    side: NDArray[np.float64]
-    by_length: NDArray[np.float64]
+    travel: Floats
+    side: Floats
+    by_length: Floats
 
 
-def wound(travel: NDArray[np.float64]) -> WoundState:
+def wound(travel: Floats) -> WoundState:
     """Return the state before a run that begins in motion."""
     start = leaning(travel)
     return WoundState(start.place, start.side, np.zeros_like(start.side))
 
 
-def wound_up(
-    travel: NDArray[np.float64], length: NDArray[np.float64], state: WoundState
-) -> tuple[NDArray[np.float64], NDArray[np.float64], WoundState]:
+def wound_up(travel: Floats, length: Floats, state: WoundState) -> tuple[Floats, Floats, WoundState]:
     """Return wind-up z: dz = -(s/2 + z) |dx| / l, s the sign of dx.
 
     Returns:
@@ -54,13 +52,13 @@ def wound_up(
 
 @compiled
 def _wind(
-    travel: NDArray[np.float64],
-    length: NDArray[np.float64],
-    at: NDArray[np.float64],
-    now: NDArray[np.float64],
-    slope: NDArray[np.float64],
-    side: NDArray[np.float64],
-    by_length: NDArray[np.float64],
+    travel: Floats,
+    length: Floats,
+    at: Floats,
+    now: Floats,
+    slope: Floats,
+    side: Floats,
+    by_length: Floats,
 ) -> None:
     count, columns = travel.shape
     for i in range(columns):

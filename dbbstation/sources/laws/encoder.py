@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.sources.contract import Motion
 
 WINDOWS = 40
@@ -17,7 +16,7 @@ WINDOWS = 40
 CUBIC = 3
 
 
-def reading_without_noise_mm(motion: Motion) -> NDArray[np.float64]:
+def reading_without_noise_mm(motion: Motion) -> Floats:
     """Return the reading without most of its noise, shape (n,) [mm].
 
     An error at noisy readings would resemble noise and be identified wrongly.
@@ -25,7 +24,7 @@ def reading_without_noise_mm(motion: Motion) -> NDArray[np.float64]:
     return motion.once("reading without noise", None, lambda: _smoothed(motion))
 
 
-def _smoothed(motion: Motion) -> NDArray[np.float64]:
+def _smoothed(motion: Motion) -> Floats:
     reading = np.array(motion.reading_mm, dtype=np.float64)
     own = reading[motion.kept]
     window = 2 * (len(own) // (2 * WINDOWS)) + 1

@@ -24,7 +24,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.laws.rates import SHORTEST_S
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 INPUT, INPUT_SPEED, OUTPUT, OUTPUT_SPEED, BY_CONSTANT, SPEED_BY_CONSTANT = range(6)
 
@@ -42,16 +42,14 @@ class LoopState:
     rows: int
     time_s: float
     step_s: float
-    memory: NDArray[np.float64]
+    memory: Floats
 
 
 STANDING = LoopState(0, 0.0, 0.0, np.zeros((6, STRUTS)))
 """Before a program: nothing has moved."""
 
 
-def driven(
-    length_mm: NDArray[np.float64], time_s: NDArray[np.float64], constant_s: NDArray[np.float64], state: LoopState
-) -> tuple[NDArray[np.float64], NDArray[np.float64], LoopState]:
+def driven(length_mm: Floats, time_s: Floats, constant_s: Floats, state: LoopState) -> tuple[Floats, Floats, LoopState]:
     """Return errors y - x [mm], derivatives by tau [mm/s], shapes (n, 6), and the last state.
 
     Args:
@@ -66,12 +64,12 @@ def driven(
 
 
 def undone(
-    length_mm: NDArray[np.float64],
-    reached_mm: NDArray[np.float64],
-    time_s: NDArray[np.float64],
-    constant_s: NDArray[np.float64],
+    length_mm: Floats,
+    reached_mm: Floats,
+    time_s: Floats,
+    constant_s: Floats,
     state: LoopState,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return errors y - x of loops that reach y, shape (n, 6) [mm].
 
     Args:
@@ -85,7 +83,7 @@ def undone(
 
 
 @inlined
-def _even(length: NDArray[np.float64], memory: NDArray[np.float64], h: float, clock: NDArray[np.float64]) -> float:
+def _even(length: Floats, memory: Floats, h: float, clock: Floats) -> float:
     """Return the counted share of the speed change, w h / (h + h')."""
     both = new = old = 0.0
     for i in range(len(length)):
@@ -98,14 +96,14 @@ def _even(length: NDArray[np.float64], memory: NDArray[np.float64], h: float, cl
 
 @compiled
 def _undo(
-    length: NDArray[np.float64],
-    reached: NDArray[np.float64],
-    time: NDArray[np.float64],
-    constant: NDArray[np.float64],
+    length: Floats,
+    reached: Floats,
+    time: Floats,
+    constant: Floats,
     shortest: float,
-    clock: NDArray[np.float64],
-    memory: NDArray[np.float64],
-    error: NDArray[np.float64],
+    clock: Floats,
+    memory: Floats,
+    error: Floats,
 ) -> None:
     count, columns = length.shape
     needed, needed_speed = memory[INPUT].copy(), memory[INPUT_SPEED].copy()
@@ -136,14 +134,14 @@ def _undo(
 
 @compiled
 def _drive(
-    length: NDArray[np.float64],
-    time: NDArray[np.float64],
-    constant: NDArray[np.float64],
+    length: Floats,
+    time: Floats,
+    constant: Floats,
     shortest: float,
-    clock: NDArray[np.float64],
-    memory: NDArray[np.float64],
-    lag: NDArray[np.float64],
-    by_constant: NDArray[np.float64],
+    clock: Floats,
+    memory: Floats,
+    lag: Floats,
+    by_constant: Floats,
 ) -> None:
     count, columns = length.shape
     for k in range(count):

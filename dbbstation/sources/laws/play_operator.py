@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.machine.compiled import compiled
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,11 @@ class PlayState:
         side: derivative of y - x by width, -1/2 to 1/2, shape (m,); initially the leaning end.
     """
 
-    place: NDArray[np.float64]
-    side: NDArray[np.float64]
+    place: Floats
+    side: Floats
 
 
-def leaning(travel: NDArray[np.float64]) -> PlayState:
+def leaning(travel: Floats) -> PlayState:
     """Return the state before a run that begins in motion.
 
     -1/2 for a growing column, +1/2 for a shrinking one, 0 for none.
@@ -36,9 +36,7 @@ def leaning(travel: NDArray[np.float64]) -> PlayState:
     return PlayState(np.full(travel.shape[1], np.nan), side)
 
 
-def followed(
-    travel: NDArray[np.float64], width: NDArray[np.float64], state: PlayState
-) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+def followed(travel: Floats, width: Floats, state: PlayState) -> tuple[Floats, Floats, PlayState]:
     """Return the play operator: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2.
 
     Returns:
@@ -51,7 +49,7 @@ def followed(
 
 
 @compiled
-def _lean(travel: NDArray[np.float64], side: NDArray[np.float64]) -> None:
+def _lean(travel: Floats, side: Floats) -> None:
     count, columns = travel.shape
     for i in range(columns):
         k = 1
@@ -63,12 +61,12 @@ def _lean(travel: NDArray[np.float64], side: NDArray[np.float64]) -> None:
 
 @compiled
 def _follow(
-    travel: NDArray[np.float64],
-    width: NDArray[np.float64],
-    place: NDArray[np.float64],
-    side: NDArray[np.float64],
-    lag: NDArray[np.float64],
-    by_width: NDArray[np.float64],
+    travel: Floats,
+    width: Floats,
+    place: Floats,
+    side: Floats,
+    lag: Floats,
+    by_width: Floats,
 ) -> None:
     count, columns = travel.shape
     for i in range(columns):

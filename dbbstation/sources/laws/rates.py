@@ -9,6 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Motion
 
@@ -16,9 +17,7 @@ SHORTEST_S = 1e-6
 """Rows that are closer in time than this are one: their difference is rounding, not movement [s]."""
 
 
-def driven_in_time(
-    motion: Motion, machine: Machine
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def driven_in_time(motion: Motion, machine: Machine) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return commanded strut lengths at rising times.
 
     Returns:
@@ -35,11 +34,11 @@ def driven_in_time(
     )
 
 
-def speed_mm_s(time_s: NDArray[np.float64], length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def speed_mm_s(time_s: Floats, length_mm: Floats) -> Floats:
     """Return second-order speeds at rising times, shape (m, 6) [mm/s]; zero for one row."""
     rows = len(time_s)
     if rows == 1:
         return np.zeros_like(length_mm)
     # At the ends a parabola through three rows.
-    speed: NDArray[np.float64] = np.gradient(length_mm, time_s, axis=0, edge_order=1 if rows == 2 else 2)  # noqa: PLR2004
+    speed: Floats = np.gradient(length_mm, time_s, axis=0, edge_order=1 if rows == 2 else 2)  # noqa: PLR2004
     return speed

@@ -9,13 +9,13 @@ import numpy as np
 from dbbstation.machine.compiled import compiled, inlined
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 TURNED_MM = 1e-3
 """A strut has turned round once it has come back by this: less is rounding of the program or of recorded angles."""
 
 
-def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
+def since_turning(travel: Floats) -> Floats:
     """Return each column's signed way since its last turn, shape (n, m); zero before the first.
 
     The turning point is the vertex of the parabola through the outermost row and its neighbours, over the way of all
@@ -27,7 +27,7 @@ def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @inlined
-def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, float, float, float]:
+def _parabola(travel: Floats, i: int, k: int, side: float) -> tuple[float, float, float, float]:
     """Return the parabola through row k and its neighbours, over the way of all columns.
 
     Returns:
@@ -49,7 +49,7 @@ def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple
 
 
 @inlined
-def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, bool]:
+def _vertex(travel: Floats, i: int, k: int, side: float) -> tuple[float, bool]:
     """Return the turning point on the high (1.0) or low (-1.0) side, and whether row k is behind it.
 
     The neighbouring parabola midway is a lower limit; otherwise it could jump between nearly equal rows and make a
@@ -66,7 +66,7 @@ def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[f
 
 
 @compiled
-def _since(travel: NDArray[np.float64], turned: float, since: NDArray[np.float64]) -> None:
+def _since(travel: Floats, turned: float, since: Floats) -> None:
     count, columns = travel.shape
     for i in range(columns):
         turn, way, has_turned = 0.0, 0.0, False  # where the column last turned, and which way it goes

@@ -24,8 +24,7 @@ from dbbstation.sources.contract import Effect, ErrorSource, Parameter
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Motion
 
@@ -91,16 +90,16 @@ class InTwoStages(ErrorSource):
         delayed = replace(growth, name=f"delayed_{name}", plausible=FASTER * growth.plausible, meaning=meaning)
         return (growth, replace(constant, grid=TIME_CONSTANTS_S[::2]), *others, delayed)
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         slow, fast = (self._one.effect(motion, machine, body @ values) for body in _two_bodies(len(values)))
         return slow + fast
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         each = (self._one.derivative(motion, machine, body @ values).times(body) for body in _two_bodies(len(values)))
         return sum(each, Effect())
 
 
-def _two_bodies(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _two_bodies(count: int) -> tuple[Floats, Floats]:
     """Return matrices from the law's parameters to those of each body, shape (count - 1, count)."""
     slow, fast = np.eye(count - 1, count), np.eye(count - 1, count)
     more = 1.0 / (1.0 - FASTER)
@@ -109,14 +108,14 @@ def _two_bodies(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return slow, fast
 
 
-def grown(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def grown(motion: Motion, values: Floats) -> Floats:
     """Return growth at every sample, shape (n,), in its parameters' unit."""
     growth, constant_s, loss = values
-    law: NDArray[np.float64] = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
+    law: Floats = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
     return law
 
 
-def grown_by(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def grown_by(motion: Motion, values: Floats) -> Floats:
     """Return derivatives of `grown` by its parameters, shape (n, 3)."""
     growth, constant_s, loss = values
     time_s = _time_s(motion)
@@ -125,7 +124,7 @@ def grown_by(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]
     return np.column_stack([warmed(time_s, constant_s), by_constant, -_paused(motion, constant_s, warmed)])
 
 
-def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64]:
+def warmed(time_s: Floats, constant_s: float) -> Floats:
     """Return the completed share of a warm-up, 1 - exp(-t / tau), shape (n,) [1].
 
     It is zero before t = 0; a constant of at most zero gives a step.
@@ -136,7 +135,7 @@ def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64
     return -np.expm1(-since / constant_s)
 
 
-def warmed_by_constant(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64]:
+def warmed_by_constant(time_s: Floats, constant_s: float) -> Floats:
     """Return the derivative of `warmed` by the constant, -t / tau² exp(-t / tau), shape (n,) [1/s]."""
     if constant_s <= 0.0:
         return np.zeros(len(time_s))
@@ -156,14 +155,12 @@ def _pauses_between(moving_s: tuple[tuple[float, float], ...]) -> list[tuple[flo
     return [(begin, end) for begin, end in pairs if end - begin >= PAUSE_S]
 
 
-def _paused(
-    motion: Motion, constant_s: float, law: Callable[[NDArray[np.float64], float], NDArray[np.float64]]
-) -> NDArray[np.float64]:
+def _paused(motion: Motion, constant_s: float, law: Callable[[Floats, float], Floats]) -> Floats:
     """Return the effect of pauses, shape (n,): a step down at each begin and up at its end."""
     time_s = _time_s(motion)
     steps = [law(time_s - begin, constant_s) - law(time_s - end, constant_s) for begin, end in pauses_s(motion)]
     return sum(steps, np.zeros(len(time_s)))
 
 
-def _time_s(motion: Motion) -> NDArray[np.float64]:
+def _time_s(motion: Motion) -> Floats:
     return np.asarray(motion.time_s)

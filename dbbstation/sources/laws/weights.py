@@ -12,8 +12,7 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Hexapod, Machine, Masses
     from dbbstation.machine.kinematics import Struts
     from dbbstation.machine.rotation import Frames
@@ -53,7 +52,7 @@ def platform_masses(source: str, machine: Machine) -> Masses:
     return machine.masses
 
 
-def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Struts) -> NDArray[np.float64]:
+def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Struts) -> Floats:
     """Return tensions under the machine file's weights, at platform joints, shape (n, 6) [N]."""
     load = platform_weight(frames, platform_masses(source, machine))
     if machine.strut_masses is not None:
@@ -61,7 +60,7 @@ def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Strut
     return strut_tensions(struts, load)
 
 
-def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod) -> NDArray[np.float64]:
+def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod) -> Floats:
     """Return motor loads under the machine file's weights, shape (n, 6) [N].
 
     Args:
@@ -71,7 +70,7 @@ def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod
     return motor_loads(struts, stated_tensions(source, machine, frames, struts), machine.strut_masses)
 
 
-def masses_for_c(masses: StrutMasses | None) -> NDArray[np.float64]:
+def masses_for_c(masses: StrutMasses | None) -> Floats:
     """Return a strut's masses and lengths as `strut_load` of `control/kernel.c` takes them, shape (5,) [kg, mm]."""
     none = StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
     own = masses or none

@@ -15,8 +15,7 @@ from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 POINTS = 25
@@ -41,12 +40,12 @@ class UnexplainedByForce(LinearSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         return values_at(_points_n(self.name, machine), "N")
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         points = _points_n(self.name, machine)
         weight = platform_weight(motion.frames(machine), platform_masses(self.name, machine))
         return piecewise_linear(points, strut_tensions(motion.struts(machine), weight))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = """double load[6] = {0.0}, t[6];
 platform_load(at, load);
 tensions(at, load, t);
@@ -54,6 +53,6 @@ EACH e->strut[i] += 1e-3 * curve(v + points * i, points, -WEIGHT, WEIGHT, t[i]);
         return CForm(body, constants={"points": POINTS})
 
 
-def _points_n(name: str, machine: Machine) -> NDArray[np.float64]:
+def _points_n(name: str, machine: Machine) -> Floats:
     weight_n = GRAVITY_M_S2 * platform_masses(name, machine).platform_kg
     return np.linspace(-weight_n, weight_n, POINTS)

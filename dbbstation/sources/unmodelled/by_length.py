@@ -13,8 +13,7 @@ from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 POINTS = 25
@@ -38,17 +37,17 @@ class UnexplainedByLength(LinearSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         return values_at(_points_mm(machine), "mm")
 
-    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+    def shortest_period_mm(self, machine: Machine, values: Floats) -> float:  # noqa: ARG002
         return float(2.0 * np.diff(_points_mm(machine))[0])
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         return piecewise_linear(_points_mm(machine), motion.struts(machine).length_mm)
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "EACH e->strut[i] += 1e-3 * curve(v + points * i, points, low, high, at->length[i]);"
         low, high = machine.travel.strut_mm
         return CForm(body, by_pose=False, constants={"points": POINTS, "low": low, "high": high})
 
 
-def _points_mm(machine: Machine) -> NDArray[np.float64]:
+def _points_mm(machine: Machine) -> Floats:
     return np.linspace(*machine.travel.strut_mm, POINTS)

@@ -10,7 +10,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Effect, Parameter, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 MM_PER_UM = 1e-3
 
@@ -22,7 +22,7 @@ PLAUSIBLE_UM = 2.0 * TOLERANCE_UM
 """An error that would matter, so much above the tolerance that no fit takes for lost what the tolerance bounds [µm]."""
 
 
-def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
+def values_at(points: Floats, unit: str) -> tuple[Parameter, ...]:
     """Return one value for each strut at each point, by strut."""
     return tuple(
         Parameter(
@@ -38,7 +38,7 @@ def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
     )
 
 
-def piecewise_linear(points: NDArray[np.float64], values: NDArray[np.float64]) -> Effect:
+def piecewise_linear(points: Floats, values: Floats) -> Effect:
     """Return the derivative by the points' values, at values of shape (n, 6); constant beyond the ends.
 
     Args:

@@ -14,8 +14,7 @@ from dbbstation.sources.unmodelled.points import MM_PER_UM, PLAUSIBLE_UM, TOLERA
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 PERIODS_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
@@ -47,17 +46,17 @@ class UnexplainedWave(ErrorSource):
             found += [Parameter(period, "mm", 20.0, f"period of the wave of strut {i + 1}", PERIODS_MM, strut=i + 1)]
         return tuple(found)
 
-    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+    def shortest_period_mm(self, machine: Machine, values: Floats) -> float:  # noqa: ARG002
         by_strut = values.reshape(STRUTS, 3)
         there = (by_strut[:, :2] != 0.0).any(axis=1) & (by_strut[:, 2] != 0.0)
         return float(np.abs(by_strut[there, 2]).min(initial=SMOOTH_MM))
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_strut = values.reshape(STRUTS, 3)
         waves, _ = _waves(motion, machine, by_strut[:, 2])
         return Effect(strut_mm=MM_PER_UM * np.sum(waves * by_strut[:, :2], axis=-1))
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_strut = values.reshape(STRUTS, 3)
         waves, turned_rad = _waves(motion, machine, by_strut[:, 2])
         sine, cosine = waves[:, :, 0], waves[:, :, 1]
@@ -67,7 +66,7 @@ class UnexplainedWave(ErrorSource):
         own = each[:, :, None, :] * np.eye(STRUTS)[:, :, None]
         return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, 3 * STRUTS))
 
-    def c_form(self, machine: Machine, values: NDArray[np.float64], thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
+    def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = """EACH {
     double turn = v[3 * i + 2] ? 6.28318530717958647693 * (at->length[i] - middle) / v[3 * i + 2] : 0.0;
     e->strut[i] += 1e-3 * (v[3 * i] * sin(turn) + v[3 * i + 1] * cos(turn));
@@ -75,9 +74,7 @@ class UnexplainedWave(ErrorSource):
         return CForm(body, by_pose=False, constants={"middle": sum(machine.travel.strut_mm) / 2.0})
 
 
-def _waves(
-    motion: Motion, machine: Machine, period_mm: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _waves(motion: Motion, machine: Machine, period_mm: Floats) -> tuple[Floats, Floats]:
     travel = motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0
     turned_rad = 2.0 * np.pi * travel / np.where(period_mm == 0.0, np.inf, period_mm)
     return np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1), turned_rad

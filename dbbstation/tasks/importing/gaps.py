@@ -15,6 +15,7 @@ from dbbstation.files.source_text import shortened
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.foreign_csv import ForeignTable
 
@@ -88,7 +89,7 @@ def samples_of(
 
 def held_over_gaps(
     table: ForeignTable, rows: NDArray[np.int64], name: str, faults: list[Problem]
-) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+) -> tuple[Floats, tuple[str, ...]]:
     """Return a slow column, such as a temperature; a gap repeats the reading before, a first gap the one after."""
     numbers = table.table.values[name][rows]
     bad = ~np.isfinite(numbers)

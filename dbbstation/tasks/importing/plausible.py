@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.table_csv import TableFile
     from dbbstation.plan.circle import Circle
@@ -45,7 +46,7 @@ class Implausible:
 
 
 def unlike_a_bar(
-    numbers: NDArray[np.float64], means: str, unit: str, zero_mm: float, circle: Circle, feed_in_mm: float | None = None
+    numbers: Floats, means: str, unit: str, zero_mm: float, circle: Circle, feed_in_mm: float | None = None
 ) -> Implausible | None:
     """Return why a turn's readings contradict their unit while another fits, or None.
 
@@ -77,7 +78,7 @@ def unlike_a_bar(
     return Implausible(what, means, others)
 
 
-def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | None:
+def unlike_a_turn(theta_deg: Floats, unit: str) -> Implausible | None:
     """Return why angles contradict their unit while another gives a turn, or None."""
     span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
     turns = [
@@ -90,9 +91,7 @@ def unlike_a_turn(theta_deg: NDArray[np.float64], unit: str) -> Implausible | No
     return Implausible(f"angles span {span:.4g} {unit}, which is no turn", ANGLE, tuple(turns))
 
 
-def unlike_the_feed(
-    t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], unit: str, circle: Circle
-) -> Implausible | None:
+def unlike_the_feed(t_s: Floats, theta_deg: Floats, unit: str, circle: Circle) -> Implausible | None:
     """Return why times contradict their unit while another gives the plan's feed, or None."""
     turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
     took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
@@ -117,7 +116,7 @@ def check_units(
     mapping: MappingFile,
     table: TableFile,
     rows: NDArray[np.int64],
-    values: Mapping[str, NDArray[np.float64]],
+    values: Mapping[str, Floats],
     circle: Circle,
 ) -> None:
     """Refuse numbers that contradict their unit while another fits.
@@ -159,15 +158,15 @@ def check_units(
     )
 
 
-def centre_mm(length_mm: NDArray[np.float64], theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+def centre_mm(length_mm: Floats, theta_deg: Floats) -> Floats:
     """Return the least-squares centre, shape (2,) [mm], from the first harmonic."""
     angle = np.radians(theta_deg)
     columns = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
-    found: NDArray[np.float64] = np.linalg.lstsq(columns, length_mm, rcond=None)[0][1:]
+    found: Floats = np.linalg.lstsq(columns, length_mm, rcond=None)[0][1:]
     return found
 
 
-def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[NDArray[np.float64]]]]) -> float | None:
+def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[Floats]]]) -> float | None:
     """Return the probability that raw circles are as near to their commanded centres by chance; None if unknown.
 
     Each axis of a centre scatters at least by CMM and holder (sigma). A distance up to r has a probability of at most 1

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.plan.plan import Plan
@@ -153,12 +154,12 @@ class Reader:
         ]
 
     def _split(self, table: ForeignTable) -> list[NDArray[np.int64]]:
-        def numbers(means: str) -> NDArray[np.float64] | None:
+        def numbers(means: str) -> Floats | None:
             name = self.mapping.column(means)
             if name is None or name not in table.table.values:
                 return None
             factor, offset = in_run_units(means, self.mapping.columns[name].unit or "")
-            found: NDArray[np.float64] = table.table.values[name] * factor + offset
+            found: Floats = table.table.values[name] * factor + offset
             return found
 
         every = np.arange(len(table.table))
@@ -259,9 +260,7 @@ class Reader:
         )
         return ImportedRun(file, run, circle, (*computed, *travelled.computed))
 
-    def _values(
-        self, table: ForeignTable, rows: NDArray[np.int64]
-    ) -> tuple[dict[str, NDArray[np.float64]], tuple[str, ...]]:
+    def _values(self, table: ForeignTable, rows: NDArray[np.int64]) -> tuple[dict[str, Floats], tuple[str, ...]]:
         found, said = {}, list[str]()
         for name, column in self.mapping.columns.items():
             if column.means not in UNITS or column.unit is None:
@@ -394,7 +393,7 @@ _SAY_IT = "add it to the mapping, as `ignored` where it does not matter"
 
 def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
     """Return the probability that runs are as near to their commanded centres by chance; None if unknown."""
-    centres: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
+    centres: dict[tuple[str, int | None], list[Floats]] = {}
     for one in runs:
         columns_of = one.run.columns
         if columns.THETA in columns_of:

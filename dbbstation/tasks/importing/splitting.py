@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
 
 SMALLEST_RUN_DEG = 90.0
@@ -25,7 +26,7 @@ def longest_pause_s(circles: Sequence[Circle]) -> float:
     return max(LARGEST_GAP_DEG / circle.turning_deg_s for circle in circles)
 
 
-def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pause_s: float) -> list[NDArray[np.int64]]:
+def parts_by_gaps(t_s: Floats | None, lines: NDArray[np.int64], pause_s: float) -> list[NDArray[np.int64]]:
     """Return the rows of each run, separated by pauses, restarted times or empty lines.
 
     Args:
@@ -38,7 +39,7 @@ def parts_by_gaps(t_s: NDArray[np.float64] | None, lines: NDArray[np.int64], pau
     return _parts(len(lines), np.flatnonzero(begins) + 1)
 
 
-def parts_by_direction(angle_deg: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+def parts_by_direction(angle_deg: Floats) -> list[NDArray[np.int64]]:
     """Return the rows of each run, separated by a change of turning direction."""
     travelled = np.unwrap(angle_deg, period=FULL_TURN_DEG)
     ends: list[int] = []

@@ -13,6 +13,7 @@ from dbbstation.trace.cut import LARGEST_GAP_DEG
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.mapping import AngleSchema
 
 LONGEST_START_S = 3600.0
@@ -47,18 +48,18 @@ class TravelledPath:
         computed: values that the file lacks, in words.
     """
 
-    t_s: NDArray[np.float64]
-    theta_deg: NDArray[np.float64] | None
+    t_s: Floats
+    theta_deg: Floats | None
     rows: NDArray[np.int64]
     computed: tuple[str, ...] = ()
 
 
-def rises(angle_deg: NDArray[np.float64]) -> bool:
+def rises(angle_deg: Floats) -> bool:
     """Return whether angles grow, apart from steps of a turn."""
     return float(np.sum(np.diff(_unwrapped(angle_deg)))) > 0.0
 
 
-def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Circle) -> NDArray[np.float64]:
+def machine_angles(angle_deg: Floats, said: AngleSchema, circle: Circle) -> Floats:
     """Return angles from +X towards +Y, shape (n,) [deg].
 
     Args:
@@ -78,7 +79,7 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
     return theta
 
 
-def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float | None:
+def unplanned_span_deg(theta_deg: Floats, circle: Circle) -> float | None:
     """Return the angles' span if it is neither a turn nor the plan's path with overshoot, else None [deg]."""
     travelled = _unwrapped(theta_deg)
     spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
@@ -91,7 +92,7 @@ def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float 
     return None if any(abs(span - one) <= near for one in planned) else span + spacing
 
 
-def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle: Circle) -> tuple[str, ...]:
+def check_span(theta_deg: Floats, stated_deg: float | None, circle: Circle) -> tuple[str, ...]:
     """Return notes on a confirmed span that is not the plan's.
 
     Args:
@@ -112,9 +113,7 @@ def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle:
     return (f"its angles span {span:.0f} degrees, as was confirmed: one turn of them counts",)
 
 
-def travel(
-    t_s: NDArray[np.float64] | None, theta_deg: NDArray[np.float64] | None, circle: Circle, trace: str | None
-) -> TravelledPath:
+def travel(t_s: Floats | None, theta_deg: Floats | None, circle: Circle, trace: str | None) -> TravelledPath:
     """Return a run's times and angles.
 
     Args:
@@ -136,7 +135,7 @@ def travel(
     return TravelledPath(timed, None, rows, computed) if trace == "whole" else _turn(timed, circle, computed)
 
 
-def _from_angles(theta_deg: NDArray[np.float64], circle: Circle) -> TravelledPath:
+def _from_angles(theta_deg: Floats, circle: Circle) -> TravelledPath:
     progress = circle.direction.sign * (_unwrapped(theta_deg) - theta_deg[0])
     still = np.flatnonzero(np.diff(progress) <= 0.0)
     if len(still):
@@ -146,7 +145,7 @@ def _from_angles(theta_deg: NDArray[np.float64], circle: Circle) -> TravelledPat
     return TravelledPath(progress / circle.turning_deg_s, theta_deg, np.arange(len(theta_deg)), (said,))
 
 
-def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def _from_zero(t_s: Floats) -> tuple[Floats, tuple[str, ...]]:
     back = np.flatnonzero(np.diff(t_s) <= 0.0)
     if len(back):
         k = int(back[0]) + 1
@@ -157,7 +156,7 @@ def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str
     return t_s - t_s[0], ("times: counted from the first sample of each run, before that they are those of a clock",)
 
 
-def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -> TravelledPath:
+def _turn(t_s: Floats, circle: Circle, computed: tuple[str, ...]) -> TravelledPath:
     progress = (t_s - t_s[0]) * circle.turning_deg_s
     if progress[-1] < LEAST_TURN * FULL_TURN_DEG:
         turn_s = FULL_TURN_DEG / circle.turning_deg_s
@@ -170,7 +169,7 @@ def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -
     return TravelledPath(t_s[rows], circle.theta_deg(progress[rows]), rows, (*computed, said, *more))
 
 
-def _feed_note(t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], circle: Circle) -> tuple[str, ...]:
+def _feed_note(t_s: Floats, theta_deg: Floats, circle: Circle) -> tuple[str, ...]:
     if len(t_s) < 2:  # noqa: PLR2004 - one sample has no speed
         return ()
     turned = abs(float(np.sum(np.diff(_unwrapped(theta_deg)))))
@@ -184,5 +183,5 @@ def _at(circle: Circle) -> str:
     return f"at the plan's feed of {circle.feed_mm_min:g} mm/min"
 
 
-def _unwrapped(theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unwrapped(theta_deg: Floats) -> Floats:
     return np.unwrap(theta_deg, period=FULL_TURN_DEG)

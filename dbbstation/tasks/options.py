@@ -93,8 +93,8 @@ LargestCorrectionMm = Annotated[
     ),
 ]
 DECIMAL, SEPARATOR = (
-    "Decimal sign in the files  [default: the shop's; else as found, or a dot].",
-    "Separator of columns  [default: the shop's; else as found, or a comma].",
+    "Decimal sign in the files  [default: the shop's, else as found, else a dot].",
+    "Separator of columns  [default: the shop's, else as found, else a comma].",
 )
 Decimal = Annotated[Literal[".", ","] | None, Option(DECIMAL, setting="numbers.decimal")]
 Separator = Annotated[

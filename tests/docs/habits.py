@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli import cli
+from studies.__main__ import study
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -95,7 +96,7 @@ def in_messages(root: Path) -> Iterator[str]:
     for path in sorted((root / "dbbstation").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Raise) or (
-                isinstance(node, ast.Call) and _name(node) in {"say", "echo", "Problem"}
+                isinstance(node, ast.Call) and _name(node) in {"say", "echo", "Problem", "of"}
             ):
                 for text in _texts(node):
                     yield from sentences_of(text)
@@ -135,7 +136,11 @@ def _texts(node: ast.AST) -> Iterator[str]:
 
 
 def kinds(root: Path = HERE) -> dict[str, list[str]]:
-    return {"documents": list(in_documents(root)), "help": list(in_help()), "messages": list(in_messages(root))}
+    return {
+        "documents": list(in_documents(root)),
+        "help": [*in_help(), *in_help(study)],
+        "messages": list(in_messages(root)),
+    }
 
 
 def shares(sentences: list[str]) -> dict[str, float]:

@@ -71,7 +71,7 @@ def __getattr__(name: str) -> object:
 
 
 class _Package(ModuleType):
-    """Keeps a public name that a folder has too: importing `dbbstation.circles.path` would replace the function `circles`."""
+    """Keeps a public function with the name of a folder: importing `dbbstation.circles.path` would replace the function `circles`."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _PUBLIC and isinstance(value, ModuleType)):

@@ -132,11 +132,11 @@ class TravelError(MachineError):
 
 
 class TraceError(StationError):
-    """A recording that does not show the circle it should."""
+    """A recording that does not show its planned circle."""
 
 
 class ModelError(StationError):
-    """An error source needs what it was not given, or is not known."""
+    """An error source is unknown, or lacks data that it needs."""
 
 
 class CalibrationError(StationError):

@@ -62,7 +62,7 @@ def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
             found = estimated([drawn], least_of, float(-deviation_um.min()))
             return Estimate(radius_um - found.value_um, found.u_um, radius_um - found.as_read_um)
         case _:
-            raise ValueError(f"{quantity} is no range of one circle")
+            raise ValueError(f"{quantity} is not a range of one circle")
 
 
 def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:

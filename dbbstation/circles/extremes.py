@@ -101,7 +101,7 @@ def drawn_paths(
     seed: int,
     taken: Sequence[int] = (0,),
 ) -> tuple[DrawnPath, ...]:
-    """Draw noise of a path, for each of several numbers of removed lines.
+    """Draw noise of a path for several numbers of removed spectral lines.
 
     Args:
         apart: form and noise of its deviations, in time order; the form filtered already.
@@ -205,8 +205,7 @@ BLOCKS = 4
 def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> Estimate:
     """Return a range without noise's contribution.
 
-    One recording cannot separate correlated noise from short form. If the spectrum rises above its end, both the whole
-    spectrum and its end are used, and the interval covers both.
+    One recording cannot separate correlated noise from short form. If the spectrum rises above its end, the interval covers the results of the whole spectrum and of its end.
 
     Args:
         paths: one or both directions, from one circle.

@@ -105,7 +105,7 @@ def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
 
 
 def both(one: CirclePath, other: CirclePath) -> CirclePath:
-    """Return two paths as one with their common least-squares circle, equally weighted.
+    """Return two paths as one path about their common least-squares circle, with equal weights.
 
     Raises:
         TraceError: the points do not determine a circle.

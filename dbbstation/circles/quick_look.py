@@ -117,8 +117,7 @@ def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     """Fit signatures to one or both directions.
 
     Centre and radius of each turn and a common form of 3 to 10 undulations are fitted too. The residual counts as noise
-    white up to 30 undulations per revolution. One direction cannot separate squareness from servo mismatch: both are
-    missing then.
+    white up to 30 undulations per revolution. One direction alone cannot separate squareness from servo mismatch, and the result then lacks both.
 
     Args:
         turns: one or two of opposite sense.

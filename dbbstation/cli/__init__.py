@@ -128,7 +128,7 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
         sys.exit(problem.exit_code)
     except (click.Abort, KeyboardInterrupt):
         # A terminal shows ^C where the cursor stands.
-        echo(("\n" if sys.stderr.isatty() else "") + "interrupted; what was written before stays", err=True)
+        echo(("\n" if sys.stderr.isatty() else "") + "interrupted; files that were already written are kept", err=True)
         sys.exit(FAILED)
     except BrokenPipeError:
         # Whoever read the output has seen enough, as `| head` does.
@@ -161,7 +161,7 @@ def _invoked(group: click.Group, context: click.Context) -> object:
         return group.invoke(context)
     except SystemExit as left:
         what = f"code that a file brings ended the program, with {left.code!r}"
-        raise StationError(what, remedy="let it raise an error in place of sys.exit") from left
+        raise StationError(what, remedy="raise an error in it instead of calling sys.exit") from left
 
 
 _SHOWN_BY_PYTHON = warnings.showwarning

@@ -64,4 +64,4 @@ class Asker:
             click.UsageError: names every option that is missing.
         """
         if self._missing:
-            raise click.UsageError("what the files do not say has to be given:\n  " + "\n  ".join(self._missing))
+            raise click.UsageError("state these facts, which the files lack:\n  " + "\n  ".join(self._missing))

@@ -115,7 +115,7 @@ def bar(
     echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
     echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
     if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
-        echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
+        echo(f"note: the reading drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: let the bar cool down", err=True)
     if fault := file.to_bar(None).certificate_fault(datetime.now(UTC).date()):
         echo(f"note: `measure` refuses this bar: {fault}", err=True)
     echo(f"{out}: `dbbstation measure --bar {out} …` takes it")

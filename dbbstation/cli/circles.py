@@ -107,7 +107,7 @@ def _print(result: CirclesResult, *, several: bool) -> None:
                 ]
             )
         print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "U", "D", "U", "H", "U"], "at [deg]"], rows)
-    echo("\nWhat noise adds to G, F and H is taken off; --budget says how much that is.")
+    echo("\nG, F and H are without the contribution of noise; --budget states this contribution.")
     _print_why_not(_with_budgets(result))
 
 

@@ -38,7 +38,7 @@ def _print_runs(result: ComparisonResult) -> None:
     from dbbstation.cli.output import print_table
 
     echo(
-        "B less A [µm], largest first; found: rms of what was found; sigmas: how far that is out; u: standard uncertainty by noise, "
+        "B less A [µm], largest first; found: rms of what was found; sigmas: size in standard deviations; u: standard uncertainty by noise, "
         "balls and bars"
     )
     titles = ["test", "dir", "n", "found", "sigmas", "rms", "noise", "centre x", "y", "u", "mean", "u", "G", "peak"]
@@ -100,7 +100,7 @@ def _print_causes(result: ComparisonResult) -> None:
         if result.cancelling:
             echo(cancelling_text(result.cancelling))
         held = result.held_out_rms_um
-        echo(f"held-out tests: {held.before:.2f} -> {held.after:.2f} µm rms, once their balls and bars have settled")
+        echo(f"held-out tests: {held.before:.2f} -> {held.after:.2f} µm rms, after a fit of their balls and bars")
     echo(f"\n{result.left.text}")
     for verdict in ("ambiguous", "ruled-out", "not-testable"):
         names = [c.name for c in result.causes if c.named and c.verdict == verdict and c not in there]

@@ -120,8 +120,7 @@ def parameters(
 ) -> None:
     r"""Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
 
-    A weaker way than `control kinematics`: refitted values imitate what genhexkins lacks. They are numbers for a control, never
-    the machine. The table states the remaining errors of the tool in the volume.
+    A less exact alternative to `control kinematics`: refitted values imitate what genhexkins lacks. They do not describe the machine. The table states the remaining errors of the tool in the volume.
 
     \b
     Examples:

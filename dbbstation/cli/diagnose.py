@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.results.diagnosis import DiagnosisFigures, DiagnosisResult
 
-EFFECTS = "Rank the causes by what each contributes to the circles, with its cure and the circles as they would be without it."
+EFFECTS = "Rank causes by their contribution to the circles, with cures and the circles without each cause."
 
 
 def show(result: DiagnosisResult, *, effects: Annotated[bool, Option(EFFECTS)] = False) -> None:
@@ -95,7 +95,7 @@ def _print_workspace(elsewhere: WorkspaceError) -> None:
             f"over the workspace, kinematic calibration less joint model, {which}: {error:.1f} µm rms{more}; u of the joint "
             f"model {known}"
         )
-    echo(f"  the common shift is {shift} µm; a program whose zero is set on the part does not feel it")
+    echo(f"  the common shift is {shift} µm; a zero that is set on the part removes it")
 
 
 MOST_POINTS = 12
@@ -129,7 +129,7 @@ def _print_gain(result: DiagnosisFigures) -> None:
     echo(f"\nresidual within mountings {residual.before:.2f} -> {residual.after:.2f} µm rms")
     normalised = result.held_out_normalised
     if result.held_out == "not-tested" and any(source.verdict == "identified" for source in result.sources):
-        echo("no tests were held back: whether what is identified predicts others was not tested")
+        echo("no tests were held out: predictions of the identified causes were not tested")
     if max(held_out.before, held_out.after) > UNPREDICTABLE_UM:
         echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
     else:
@@ -174,7 +174,7 @@ SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
 
 
 def _probable(source: SourceFinding) -> str:
-    """Return a probability, no closer to one or zero than the catalogue is complete."""
+    """Return a probability, limited by how complete the catalogue is."""
     if source.probability is None:
         return ""
     surest = 0.999

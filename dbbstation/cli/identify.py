@@ -46,7 +46,7 @@ def show(result: DriveResult) -> None:
         echo(f"  {name:<26} {100 * error:6.2f} %{worse}")
         before = error
     if left_out := held_back.not_in_model:
-        echo(f"  not in the model, since nothing decides on it: {', '.join(left_out)}")
+        echo(f"  not in the model, since these recordings do not decide on it: {', '.join(left_out)}")
     if result.locations:
         echo("\nwhere the misfit of mass and viscous friction is largest:")
         _print_locations(result.locations)

@@ -103,7 +103,7 @@ def _print(result: MismatchResult) -> None:
             "without each of them"
         )
     elif any(f.verdict == "identified" for f in there):
-        echo("\nheld-out parts were not asked for: whether what is identified predicts other rows was not tested.")
+        echo("\nno parts were held out: predictions of the identified causes were not tested.")
     echo()
     _print_left(result)
     for verdict in ("not-testable", "ruled-out"):

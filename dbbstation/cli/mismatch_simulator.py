@@ -32,7 +32,7 @@ def show_simulator(result: SimulatorResult) -> None:
             f"{held_out.corrected:.3g} {unit} rms corrected; over {len(held_out.parts)} parts, each chosen anew and simulated"
         )
     elif there:
-        echo("\nheld-out parts were not asked for, or not reached: whether what is found predicts was not tested.")
+        echo("\nno parts were held out, or the search ended before: predictions were not tested.")
     echo()
     _print_left(result)
     if result.next:
@@ -57,9 +57,7 @@ def _print_whether(result: SimulatorResult) -> None:
             f"{rms.corrected:.3g} corrected."
         )
     elif result.stopped:
-        echo(
-            "No mismatch was found before: whether what the refitted simulator leaves is noise was not asked to the end."
-        )
+        echo("No mismatch was found so far; the search ended before it had tested all of the residual.")
     else:
         echo(
             f"No mismatch: what the refitted simulator leaves, {rms.refitted:.3g} {unit} rms, is noise.".replace(
@@ -71,7 +69,7 @@ def _print_whether(result: SimulatorResult) -> None:
         noise = f"{result.noise.sigma:.3g} {unit}".rstrip()
     echo(f"noise of one row: {noise}")
     if not result.settled and not result.stopped:
-        echo("The search did not settle: what it ended at is not the only set of terms that it came by.")
+        echo("The search did not converge: it found several sets of terms.")
 
 
 def _print_left(result: SimulatorResult) -> None:

@@ -68,7 +68,7 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell user and log something beside the result, on one line, because names may contain line ends."""
+    """Tell the user a note and log it, on one line even if names contain line ends."""
     log_said(text)
     echo(on_one_line(text), err=True)
 

@@ -199,7 +199,7 @@ class _Stages:
         self._told = ""
 
     def tell(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Move to a stage, or on within it."""
+        """Move the bar to a stage, or forward within the stage."""
         new = text != self._told
         if new:
             _LOG.info("... %s", text)

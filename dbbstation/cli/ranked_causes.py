@@ -38,7 +38,7 @@ def print_effects(effects: Sequence[CauseEffect]) -> None:
         for rank, one in enumerate(effects, start=1)
     ]
     print_table(["", "cause", "verdict", "G", "U", "centres", "U", "workspace", "U", "G measured", "without it"], rows)
-    echo("what causes that act against each other contribute need not add up to what is measured")
+    echo("contributions of opposing causes need not add up to the measured value")
     for rank, one in enumerate(effects, start=1):
         echo(f"{rank}. {one.cause}: {one.cure}")
     shown = effects[:MOST_CAUSES]

@@ -1,4 +1,4 @@
-"""Former names of commands and flags: an unknown one is answered with the new one."""
+"""Former names of commands and flags, which are answered with their new names."""
 
 RENAMED = {
     "drive": "`identify`",

@@ -119,7 +119,7 @@ def reject(folder: _Folder, run: _Run, *, reason: _Reason, as_json: o.Json = Fal
       dbbstation session reject 2026-11-20-hexapod-7 a-cw-2 --reason "chip under the holder"
     """
     if not reason.strip():
-        raise click.UsageError("say why with --reason: whoever reads the session later will ask")
+        raise click.UsageError("give the reason with --reason, for later readers of the session")
     _tell(run, _judged(folder, run, accepted=False, reason=reason.strip()), as_json=as_json)
 
 
@@ -128,7 +128,7 @@ def take_in(folder: _Folder, *, as_json: o.Json = False) -> None:
     r"""List sealed runs that lie in the session's folder and are in no list.
 
     `dbbstation check` names them. They may come from a second program that wrote into the folder, or from a session file
-    that was restored. They are `complete` then: accept or reject each.
+    that was restored. Their state is then `complete`: accept or reject each run.
 
     \b
     Examples:
@@ -176,7 +176,7 @@ def amend(
     from dbbstation.files.recordings.amending import amend as noted
 
     if not reason.strip():
-        raise click.UsageError("say why with --reason: whoever reads the session later will ask")
+        raise click.UsageError("give the reason with --reason, for later readers of the session")
     found = noted(folder, reason.strip(), made=datetime.now(UTC).replace(microsecond=0), plan=plan, machine=machine)
     if as_json:
         changed = [
@@ -200,7 +200,7 @@ def seal(
     r"""Seal a session that was recorded elsewhere.
 
     A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
-    `sealed`. From then on a changed recording or plan is noticed, and runs that were taken out or exchanged.
+    `sealed`. Every command then notices a changed recording or plan, and a removed or exchanged run.
 
     \b
     Examples:
@@ -264,7 +264,7 @@ def log(folder: _Folder, *, as_json: o.Json = False) -> None:
 def rebuild(folder: _Folder, *, as_json: o.Json = False) -> None:
     r"""Write the session file anew, as the event log has it.
 
-    For a session file that was spoilt, is gone, or was edited by mistake. The present file is kept in the folder `sealed`.
+    Use it for a session file that was damaged, lost or edited by mistake. The present file is kept in the folder `sealed`.
     The recordings are not touched.
 
     \b

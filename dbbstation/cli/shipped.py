@@ -105,7 +105,7 @@ def shipped(
 
     files = shipped_files()
     if (name is None) != (out is None):
-        raise click.UsageError("NAME and --out belong together: what is copied, and where to")
+        raise click.UsageError("give NAME, which is copied, and --out, the folder for the copy")
     if name is None or out is None:
         names = [*(key for key in files if not key.startswith(f"{_SESSION}/")), _SESSION, "examples"]
         if as_json:
@@ -125,7 +125,7 @@ def shipped(
     )
     if not chosen:
         kinds = ["examples", *dict.fromkeys(key.partition("/")[0] for key in files)]
-        raise StationError(f"nothing that comes along is called {name!r}", remedy=nearest(name, kinds))
+        raise StationError(f"no shipped file is called {name!r}", remedy=nearest(name, kinds))
     write_folder(out, {key: content_of(path) for key, path in chosen.items()}, force=force)
     if as_json:
         print_json({"shipped": sorted(chosen)})

@@ -32,7 +32,7 @@ def with_one_thread(work: Callable[Asked, Result]) -> Callable[Asked, Result]:
 
 
 class _Limit:
-    """Counts workers: the first sets the limit, the last removes it."""
+    """Counts workers. The first sets the limit and the last removes it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def correction_of(
     kind: str, digest: str, date: str, taken_out: Iterable[Fitted], machine: Machine
 ) -> ControlCorrection:
-    """Return a control's correction, as a machine file has it."""
+    """Return a control's correction in the form of a machine file."""
     sources = {
         fitted.source.name: {
             parameter.name: float(value)

@@ -1,4 +1,4 @@
-"""Four ways to correct one machine that LinuxCNC drives: what `dbbstation demo --control linuxcnc` does."""
+"""Correct one machine that LinuxCNC drives in four ways, as `dbbstation demo --control linuxcnc` does."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class CircleChannel:
 
     @property
     def named(self) -> tuple[Cause, ...]:
-        """Return named causes; laws and forms of one are equally likely."""
+        """Return named causes; all laws and forms of one cause are equally likely."""
         found = []
         for name in dict.fromkeys(name for name, _ in self.sources):
             laws = [key for key in self.sources if key[0] == name]

@@ -83,7 +83,7 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
         CalibrationError: the fit does not converge.
     """
     if curve is None:
-        raise ModelError("nothing is left without a name that a curve describes")
+        raise ModelError("the model has no unnamed effect that a curve describes")
     if curve.follows not in KEPT_AS:
         raise ModelError(
             f"what is left follows {curve.variable}, which no program knows of itself or no model has a source for: it "

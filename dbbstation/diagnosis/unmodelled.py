@@ -56,8 +56,7 @@ class Unmodelled:
     def look(self, fit: Calibration, best: Sequence[Member], noise_mm: float) -> None:
         """Search for waves, bumps, steps and pulses beside base and named causes, and add them.
 
-        Effects of an earlier look that the best set lacks are forgotten. This look finds them again unless a named cause
-        explains them.
+        Effects of an earlier look that the best set lacks are forgotten. The new search finds these effects again, unless a named cause explains them.
         """
         members = [member for member in best if member.cause.named]
         channel = self.channel
@@ -131,7 +130,7 @@ def _label(shapes: Sequence[Shape]) -> str:
 
 
 def _name(shape: Shape) -> str:
-    """Return a shape's cause; dents and steps belong to one strut."""
+    """Return the name of a shape's cause; dents and steps belong to one strut."""
     own = f", strut {shape.strut}" if shape.strut and shape.kind in {"bump", "step"} else ""
     text = shape.form.text("")
     return f"unmodelled: {shape.follows}{own}{', ' + text if text else ''}"

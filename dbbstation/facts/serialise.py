@@ -1,4 +1,4 @@
-"""The one way from results to JSON and its schemas."""
+"""Convert results to JSON and to JSON schemas."""
 
 from __future__ import annotations
 

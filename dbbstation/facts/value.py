@@ -1,4 +1,4 @@
-"""A number with its standard uncertainty and unit, the one type of it."""
+"""A number with its standard uncertainty and unit."""
 
 from __future__ import annotations
 
@@ -43,5 +43,5 @@ class Value:
         return f"{known} {self.unit}".rstrip()
 
     def at_least(self, uncertainty: float) -> Value:
-        """Return it with at least this standard uncertainty; nan changes nothing."""
+        """Return the value with at least this standard uncertainty; NaN changes nothing."""
         return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self

@@ -69,7 +69,7 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
 
 @contextlib.contextmanager
 def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
-    """Yield a file to write piece by piece; it takes its place when all is written.
+    """Yield a temporary file to write piece by piece; it replaces the target at the end.
 
     Raises:
         OutputError: as `write_bytes`; the old file stays after any error.
@@ -100,7 +100,7 @@ def write_folder(
     own: bool = False,
     read_only: Callable[[str], bool] = lambda _name: False,
 ) -> None:
-    """Write several files into one folder, made if missing, all or none.
+    """Write all or none of several files into a folder, which is made if missing.
 
     Args:
         files: content by path; a path that ends with a slash is an empty folder.
@@ -132,7 +132,7 @@ def write_folder(
                 _refuse_input(folder / name)
         if own and not real_path((folder / name).parent).is_relative_to(real_path(folder)):
             what = "a link in the session leads out of it, and nothing is written there"
-            raise OutputError(what, where=str((folder / name).parent), remedy="put the folder itself there")
+            raise OutputError(what, where=str((folder / name).parent), remedy="put the folder itself there, not a link")
     with _told(folder):
         _replace_all(folder, files, read_only)
     for name in files:
@@ -183,12 +183,12 @@ def _refuse_input(path: Path) -> None:
 
 def _refuse_overwriting(path: Path, *, force: bool) -> None:
     if path.is_dir():
-        raise OutputError("this is a folder, a file cannot be written there", where=str(path), remedy="name a file")
+        raise OutputError("this is a folder: give the name of a file", where=str(path), remedy="name a file")
     if path.is_symlink() and not path.exists():
         what = f"this is a link to {path.readlink()}, which is not there"
         raise OutputError(what, where=str(path), remedy="name the file itself")
     if path.exists() and not path.is_file():
-        raise OutputError("this is a device or a pipe, no file", where=str(path), remedy="name a file")
+        raise OutputError("this is a device or a pipe, not a file", where=str(path), remedy="name a file")
     if path.exists() and not force:
         raise OutputError("the file exists already", where=str(path), remedy="give --force to replace it")
 

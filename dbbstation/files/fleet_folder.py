@@ -1,4 +1,4 @@
-"""The folder of a fleet's results, each whole under its key."""
+"""The folder of a fleet's results, one file per key."""
 
 from __future__ import annotations
 
@@ -101,5 +101,5 @@ class FleetFolder:
 
 
 def _begun(path: Path) -> bool:
-    """Return whether a path is left from a fleet that ended before it marked the folder."""
+    """Return whether a path was left by a fleet that ended before marking the folder."""
     return path.name == LOCK_FILE or is_leftover(path)

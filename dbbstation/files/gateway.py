@@ -55,7 +55,7 @@ class Source:
         data = self._file.read(min(most, self._left + 1))
         self._left -= len(data)
         if self._left < 0:
-            raise TooLargeError(errno.EFBIG, f"the file goes on beyond {self._largest:,} bytes", str(self._path))
+            raise TooLargeError(errno.EFBIG, f"the file is longer than {self._largest:,} bytes", str(self._path))
         return data
 
     def blocks(self) -> Iterator[bytes]:
@@ -117,9 +117,9 @@ def _stat(path: Path) -> os.stat_result:
 
 def _check(path: Path, found: os.stat_result, largest: int) -> None:
     if stat.S_ISDIR(found.st_mode):
-        raise IsADirectoryError(errno.EISDIR, "this is a folder, a file is needed", str(path))
+        raise IsADirectoryError(errno.EISDIR, "this is a folder: name a file", str(path))
     if not stat.S_ISREG(found.st_mode):
-        raise NotRegularError(errno.EINVAL, "this is a pipe or a device, a file is needed", str(path))
+        raise NotRegularError(errno.EINVAL, "this is a pipe or a device: name a file", str(path))
     if found.st_size > largest:
         what = f"the file has {found.st_size:,} bytes, at most {largest:,} are read"
         raise TooLargeError(errno.EFBIG, what, str(path))

@@ -74,7 +74,7 @@ def input_book() -> Iterator[InputBook]:
 
 
 def in_a_book(task: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Let a task note its inputs if no command does, so that from Python, too, it never replaces one."""
+    """Let a task note its inputs if no command does, so that Python scripts never overwrite an input."""
 
     @wraps(task)
     def call(*args: Given.args, **named: Given.kwargs) -> Result:

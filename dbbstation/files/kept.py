@@ -71,7 +71,7 @@ class _Row:
 
 
 class Kept:
-    """What is kept of one folder's files, each written at once. A context.
+    """Stored results of one folder's files, each written at once. A context.
 
     Args:
         begin_anew: discard all but noted anchors.

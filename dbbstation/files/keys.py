@@ -1,4 +1,4 @@
-"""Keys of kept results, over all that determines them."""
+"""Keys of stored results: hashes over everything that determines them."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
     except ValueError as error:
         faults.append(Problem(str(path), 0, 0, f"is not Python: {error}", "name a Python file"))
     except (MemoryError, RecursionError):
-        faults.append(Problem(str(path), 0, 0, "is nested too deeply", "name a file that a person has written"))
+        faults.append(Problem(str(path), 0, 0, "is nested too deeply", "name a file that was written by hand"))
     return None
 
 

@@ -40,7 +40,7 @@ def unreadable(path: Path, error: OSError) -> Problem:
     if isinstance(error, FileNotFoundError):
         return Problem(str(path), 0, 0, "there is no such file", "check the path")
     if isinstance(error, IsADirectoryError):
-        return Problem(str(path), 0, 0, "this is a folder, a file is needed", "name the file in it")
+        return Problem(str(path), 0, 0, "this is a folder: name a file", "name a file in this folder")
     if isinstance(error, NotRegularError):
         return Problem(str(path), 0, 0, str(error.strerror), "write it to a file first")
     if isinstance(error, TooLargeError):

@@ -1,4 +1,4 @@
-"""Values of one quantity against those before it, as independent standard normal numbers.
+"""Values of one quantity, compared with earlier values, as independent standard normal numbers.
 
 Level and, later, scatter are estimated from the values before. Recursive residuals are independent [Brown, Durbin and
 Evans 1975, J. R. Stat. Soc. B 37, 149]. Over their scatter they follow Student's t, and its probability gives a standard
@@ -49,7 +49,7 @@ class ScatterRatio:
 
     @property
     def more_than_stated(self) -> bool:
-        """Return whether it contradicts the stated uncertainties."""
+        """Return whether the scatter contradicts the stated uncertainties."""
         return self.freedom > 0 and bool(chdtrc(self.freedom, self.square) < CONTRADICTS)
 
     def with_residuals(self, residual: Floats) -> ScatterRatio:
@@ -59,7 +59,7 @@ class ScatterRatio:
 
 @dataclass(frozen=True, eq=False)
 class Standardised:
-    """Values compared with those before them; arrays have shape (n,).
+    """Values compared with earlier values; arrays have shape (n,).
 
     Attributes:
         z: standard normal without change; NaN for the first.

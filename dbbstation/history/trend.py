@@ -65,7 +65,7 @@ class Subject:
 
     @property
     def is_parameter(self) -> bool:
-        """Return whether it comes from models."""
+        """Return whether the quantity is a parameter of models."""
         return not self.test
 
 

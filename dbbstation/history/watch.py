@@ -80,7 +80,7 @@ class Watched:
 
     @property
     def verdict(self) -> TrendVerdict:
-        """Return the verdict on all of it."""
+        """Return the verdict on the whole history."""
         if not self.watched:
             return TrendVerdict.CANNOT_TELL
         found = {event.verdict for event in self.events}

@@ -187,7 +187,7 @@ def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, 
 def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[list[int], NDArray[np.int64]]]:
     """Return blocks and random effects of each group.
 
-    An effect of many blocks, such as a bar, would tie all. The limit of blocks per effect minimises rows times columns
+    An effect of many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises rows times columns
     squared.
     """
     total, count = len(random), sum(len(block.target) for block in blocks)

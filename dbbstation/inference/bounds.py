@@ -1,7 +1,6 @@
 """Bounds on searches: how often, how many and how much at once, for every client.
 
-They spare time and memory, or ask for no more than anybody reads. A search that ends at one says so, or finds with
-twice as much what it finds with this.
+They spare time and memory, or ask for no more than anybody reads. A search that ends at a bound reports it, or finds the same with twice the bound.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ class VerdictsByLevel:
     def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
         """Return the verdict on a member, given its size in standard deviations.
 
-        A class may be sure without any of its members: then held-out parts refute none of them.
+        A class may be certain while none of its members is. Held-out parts then refute no member.
         """
         classes = [one for one in self._levels.follows if name in one.members]
         answers = {one.answer for one in classes}

@@ -5,7 +5,7 @@ refitted with every hypothesis. `settle` compares sets of laws and of patterns w
 
 residual = base + sum of laws + sum of patterns + noise
 
-Columns cover all rows, but only `kept` rows are fitted, so that the others can be predicted.
+Columns cover all rows, but only `kept` rows are fitted. The other rows can then be predicted.
 """
 
 from __future__ import annotations

@@ -168,7 +168,7 @@ class Followed:
 
     @property
     def in_time(self) -> bool:
-        """Return whether it follows time or run alone, which other rows cannot repeat."""
+        """Return whether the effect follows time or run alone, which other rows cannot repeat."""
         return set[str]().union(*self.variables) <= ONCE
 
     @property
@@ -196,7 +196,7 @@ class Levels:
         return corrects_of(self.follows)
 
     def times(self, factor: float) -> Levels:
-        """Return the same in a smaller unit."""
+        """Return the levels in a smaller unit."""
 
         def scaled(size: float | None) -> float | None:
             return None if size is None else factor * size

@@ -19,7 +19,7 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class Louder:
-    """Mean squares in some stretches against those elsewhere."""
+    """Mean squares in some stretches, compared with other stretches."""
 
     probability: float
     rms: float

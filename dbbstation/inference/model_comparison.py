@@ -368,7 +368,7 @@ class ModelComparison:
         return _scanned(forms, towards, left)
 
     def around(self, members: Sequence[Member], causes: Iterable[Cause]) -> Around:
-        """Return every cause beside members but any few, by one elimination."""
+        """Return every cause beside all members but a few, by one elimination."""
         forms = self._forms_of(tuple(causes))
         lower, z, evidence = self._eliminated(members)
         across = self._across(members, lower, forms.needed)
@@ -377,7 +377,7 @@ class ModelComparison:
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
         """Scan each member beside the others, in its variant, without slack, at all sizes.
 
-        A block's inverse in A's inverse is what it has beside others [Schur complement; Horn and Johnson, Matrix
+        The inverse of a block of A's inverse is the block's information beside the others [Schur complement; Horn and Johnson, Matrix
         Analysis, 2nd ed., sec. 0.7.3].
 
         Returns:

@@ -1,6 +1,6 @@
 """Formula inaccuracy: the effect modulated along its variable.
 
-Smooth modulations stand for it [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+Smooth modulations represent the inaccuracy [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ class Fitting:
         return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
 
     def without_axes(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return columns in noise, shape (n, k), less these, shape (n + b, k)."""
+        """Return columns in noise, shape (n, k), minus their projection on these, shape (n + b, k)."""
         new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
         for _ in range(2 if self.axes.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
             new = new - self.axes @ (self.axes.T @ new)

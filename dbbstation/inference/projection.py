@@ -225,7 +225,7 @@ class _Without(CauseColumns):
 
 
 def _less(products: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Take the products of columns, shape (m, q), off those given, shape (q, q), in their memory."""
+    """Subtract the products of columns, shape (m, q), from the given products, shape (q, q), in place."""
     if not columns.size:
         return products
     found = np.asarray(dsyrk(-1.0, columns, beta=1.0, c=products.T, trans=1, overwrite_c=1), dtype=np.float64)

@@ -129,7 +129,7 @@ def read_off(settled: Settled, trial: Trial | None, levels: Levels) -> tuple[Cau
 
 
 class CauseJudge:
-    """Findings on causes; a client subclasses it for its own words and values.
+    """Findings on causes. Clients derive their own class for words and values.
 
     Attributes:
         is_catalogue: causes are asked for by name; what level 3 leaves open and is improbable by itself is judged as absent.

@@ -46,7 +46,7 @@ class _How:
     work: SearchWork = field(default_factory=SearchWork)
 
     def part(self, stages: int) -> _How:
-        """Return the same for one of so many stages, with its share of the work."""
+        """Return the options for one of several stages, with its share of the work."""
         return replace(self, work=self.work.part(stages))
 
 
@@ -205,7 +205,7 @@ def _settled(
 
 
 def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
-    """Return promising laws without exact columns yet; none if no work is left to compare them."""
+    """Return promising laws that have no exact columns yet; empty if the limit of work is reached."""
     return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in laid_out]
 
 

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 class Beginning(Enum):
     """What noise is first measured beside.
 
-    Each start has its own blind spot: wandering noise resembles curves, smooth effects resemble noise, and pulses
-    resemble outliers. All are tried.
+    Wandering noise resembles curves, smooth effects resemble noise, and pulses resemble outliers. All are tried.
     """
 
     EVERYTHING = "everything"

@@ -1,4 +1,4 @@
-"""Upper triangles of many rows, and what columns leave of others."""
+"""Upper triangles of many rows, and residuals of columns beside others."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class Variable:
 
     @property
     def half_range(self) -> float:
-        """Return one unit of `scaled` in the variable's unit."""
+        """Return the length of one scaled unit in the variable's unit."""
         return 0.5 * self.extent
 
     def travel(self, rows: slice) -> NDArray[np.float64]:
@@ -90,7 +90,7 @@ class Variable:
         return np.asarray(np.unwrap(own, period=self.period), dtype=np.float64)
 
     def is_path(self, blocks: Sequence[slice]) -> bool:
-        """Return whether it moves continuously, as along a path."""
+        """Return whether the variable moves continuously, as along a path."""
         steps = [np.abs(np.diff(self.travel(rows))) for rows in blocks]
         every = np.concatenate([np.zeros(0), *steps])
         return len(every) > 0 and float(np.median(every)) < CONTINUOUS * self.extent

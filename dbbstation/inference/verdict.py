@@ -109,7 +109,7 @@ class DensityGains(Gains):
 
     @property
     def predicts(self) -> bool:
-        """Return whether parts without the best favour it surely."""
+        """Return whether held-out parts without the best one surely favour the effect."""
         return self.without_best >= math.log(SURE / ABSENT)
 
 

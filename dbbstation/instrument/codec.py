@@ -65,7 +65,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
         if voice is not None:
             return _told(voice[0], Content(value, counter, voice[1], features))
     raise InstrumentError(
-        f"its wire has no way to say {status!r}",
+        f"its protocol cannot express {status!r}",
         where=protocol.name,
         remedy="give a code, a special or a message frame of the protocol file that status",
     )

@@ -280,14 +280,14 @@ def _command(link: Link, step: LineCommand, patience_s: float) -> bytes:
             raise InstrumentError(
                 f"it refuses the command {symptoms.shown(step.send)}",
                 where=link.name,
-                remedy="is it the right instrument and the right profile, and does its display show the actual value?",
+                remedy="check instrument, profile, and that its display shows the actual value",
             )
         if time.monotonic() > deadline_s:
             answer = symptoms.shown(came) if came else "nothing"
             raise InstrumentError(
                 f"to the command {symptoms.shown(step.send)} came {answer} instead of {symptoms.shown(step.reply)}",
                 where=link.name,
-                remedy="is it the right instrument, switched on and set to the right baud rate?",
+                remedy="check that it is this instrument, switched on and set to this baud rate",
             )
         came += link.read()
     time.sleep(step.wait_s)

@@ -97,7 +97,7 @@ class Content:
 
 
 class Code(Schema):
-    """One code, its meaning, and the `remedy` of a bad status."""
+    """A code, its meaning, and the `remedy` of a bad status."""
 
     code: Bytes
     means: str

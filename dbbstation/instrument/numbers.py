@@ -33,7 +33,7 @@ class Number(Schema):
     @model_validator(mode="after")
     def _modulus_with_counter(self) -> Self:
         if (self.of == "counter") != (self.modulus is not None):
-            raise ValueError("a counter, and only a counter, has a modulus")
+            raise ValueError("give a modulus with counters only")
         return self
 
     def pattern(self) -> bytes:
@@ -188,7 +188,7 @@ class Integer(Number):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if bool(self.tags) != (self.payload_bits < 8):  # noqa: PLR2004 (bits of a byte)
-            raise ValueError("tags and payload_bits below 8 come together")
+            raise ValueError("give tags together with payload_bits below 8")
         if self.tags and (len(self.tags) != self.size or self.written != "binary"):
             raise ValueError("one tag per byte, and only for binary numbers")
         if any(tag & ((1 << self.payload_bits) - 1) or not 0 <= tag <= 255 for tag in self.tags):  # noqa: PLR2004

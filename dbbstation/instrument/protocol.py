@@ -67,7 +67,7 @@ class LineCommand(Schema):
 
 
 class FollowUp(Schema):
-    """What is asked once after a fault, to hear what it is in the device's own words.
+    """A request that is sent once after a fault, to get the device's own message.
 
     Attributes:
         frames: the first is the answer while there is a fault, others that there is nothing to tell. All are messages.
@@ -80,7 +80,7 @@ class FollowUp(Schema):
     def _messages(self) -> FollowUp:
         fault = next(filter(None, (frame.fault() for frame in self.frames)), "")
         if fault or not all(frame.is_message for frame in self.frames):
-            raise ValueError(fault or "what follows a fault is a message, and carries no length")
+            raise ValueError(fault or "a reply after a fault is a message without a length")
         return self
 
 
@@ -104,7 +104,7 @@ class Ask(Schema):
         if self.asked != bool(self.request):
             raise ValueError("modes poll and latch have request bytes, mode stream has none")
         if self.follow_up is not None and not self.asked:
-            raise ValueError("a device that streams is not asked, not even after a fault")
+            raise ValueError("a streaming device takes no requests, also after a fault")
         return self
 
     @property
@@ -151,7 +151,7 @@ class Length(Schema):
     @model_validator(mode="after")
     def _count_has_size(self) -> Length:
         if (self.unit == "count") != (self.mm_per_count is not None):
-            raise ValueError("unit count, and only it, needs mm_per_count")
+            raise ValueError("give mm_per_count with the unit count only")
         if self.range_mm[0] >= self.range_mm[1]:
             raise ValueError("range_mm is [lowest, highest]")
         if self.zero_mm and not self.relative:
@@ -196,7 +196,7 @@ class Timing(Schema):
 
 
 class Reference(Schema):
-    """Where a statement of the file comes from; `verified` says whether it was read there, not remembered."""
+    """Source of a statement of the file; `verified` is true if it was read in the source."""
 
     says: str
     where: str
@@ -233,7 +233,7 @@ class Protocol(Schema):
         if fault:
             raise ValueError(fault)
         if self.frames[0].is_message or not all(frame.is_message for frame in self.frames[1:]):
-            raise ValueError("the first frame, and only the first, carries the length")
+            raise ValueError("only the first frame carries the length")
         whole = self.whole()
         if not whole.by_width and not whole.terminator:
             raise ValueError(

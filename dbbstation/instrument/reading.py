@@ -44,5 +44,5 @@ class Reading:
 
     @property
     def gone(self) -> bool:
-        """Return whether the device denies the length; a doubtful one is lost on the line."""
+        """Return whether the device reports no length; a doubtful length was damaged on the line."""
         return self.status not in {OK, DOUBTFUL}

@@ -1,7 +1,6 @@
 """The device's sample counter: losses and counters out of order.
 
-After a damaged or doubled line the sequence continues from before it; after a loss it continues ahead, after a restart
-behind. The line is therefore held until the next ones decide. A damaged counter is continued by chance only with two
+After a damaged or doubled line the counter continues from the line before. After a loss it is larger, after a restart smaller. The driver therefore keeps the line until it has read the next lines. A damaged counter is continued by chance only with two
 faults in a row and one value in `modulus`: at one damaged line in a thousand and modulus 256, one chance in 250
 million.
 """
@@ -37,7 +36,7 @@ class Placed(Generic[Held]):
 
 
 class SampleOrder(Generic[Held]):
-    """Orders samples by counter and returns them in wire order, doubtful ones later."""
+    """Orders samples by counter and returns them in wire order, doubtful samples with a delay."""
 
     def __init__(self, modulus: int | None, where: str) -> None:
         self._modulus = modulus

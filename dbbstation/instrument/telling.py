@@ -31,7 +31,7 @@ class Text(Schema):
     @model_validator(mode="after")
     def _fits(self) -> Text:
         if len(self.written) > (self.width or self.max_width) or not self.written.isascii():
-            raise ValueError("what is written is ASCII, and fits into the width")
+            raise ValueError("`written` must be ASCII and fit into the width")
         return self
 
     def pattern(self) -> bytes:

@@ -5,8 +5,7 @@ balls (m, 3), m = 1 or n. Poses are processed in groups of `LANES`, the last axi
 Lanes do not branch, so results do not depend on grouping; a last group repeats its last pose.
 
 t (3, LANES) and r (3, 3, LANES) are platform positions and rotations, q and p joints of base and platform (6, 3,
-LANES); a Jacobian (6, 6, LANES) has rows [u, (R P) x u]. All are in one file because the compiler's cache checks one
-file.
+LANES); a Jacobian (6, 6, LANES) has rows [u, (R P) x u]. All kernels are in one file because the compiler's cache checks one file.
 """
 
 from __future__ import annotations

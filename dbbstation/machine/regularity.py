@@ -23,7 +23,7 @@ OFF_MM = 1.0
 def check_joints(machine: Machine) -> None:
     """Refuse a machine with three exactly regular joints and three that are not.
 
-    Machines regular in both or neither pass.
+    Machines are accepted if all or none of their joints are regular.
 
     Raises:
         ModelError: names the joint, or its three, and the deviation.

@@ -90,7 +90,7 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
         fitted.source.require(motion)
         if fitted.source.looks_ahead:
             raise ModelError(
-                f"the error source {fitted.source.name} cannot be compensated: its effect hangs on what the machine does later",
+                f"the error source {fitted.source.name} cannot be compensated: its effect depends on later motion",
                 remedy="leave it out of the model, or write its effect from the rows so far and set `looks_ahead` to False",
             )
     remembering = _with_history(own, motion)
@@ -119,7 +119,7 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
 def shifted(model: MachineModel, wanted: Motion) -> Floats:
     """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
 
-    Kept for comparison: it is first order, with wrong orientation.
+    This first-order method, with a wrong orientation, is kept for comparison.
     """
     error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
     poses = wanted.poses.copy()
@@ -133,7 +133,7 @@ def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
 
 
 class _Slope:
-    """Each strut's secant of what is lacking over its command."""
+    """Each strut's secant of the missing length over its command."""
 
     def __init__(self) -> None:
         self._before: tuple[Floats, Floats] | None = None
@@ -267,7 +267,7 @@ class _Stretch:
                 f"{axis}{value:.3f}" for axis, value in zip("XYZABC", self._wanted.poses[row], strict=True)
             )
             raise ModelError(
-                f"no command leads the machine to the pose {pose}: strut {search.lost} does not come there",
+                f"no command leads the machine to the pose {pose}: strut {search.lost} does not reach it",
                 remedy="check the model's sources for an effect as large as the motion itself",
             )
         return search.at[None], self._lacking(rows, search.at[None])[1]

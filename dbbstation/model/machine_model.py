@@ -127,7 +127,7 @@ class MachineModel:
                 return there
             there = reached(firm + bent, there.frames)
         raise KinematicsError(
-            "the machine gives way under its weights without coming to rest",
+            "the machine finds no equilibrium under its weights",
             where=f"pose {int(np.argmax(change)) + 1}",
             remedy="check the masses and compliances of the machine file and of the model, and the commanded pose",
         )
@@ -190,7 +190,7 @@ class Actual:
         return replace(self.model.as_found, hexapod=self.hexapod)
 
     def seen_by(self, source: ErrorSource, machine: Machine) -> tuple[Motion, Machine]:
-        """Return motion and machine for a source: weights at actual poses, others as commanded."""
+        """Return motion and machine for a source: actual poses for weights, commanded poses for others."""
         return (self.placed, replace(machine, hexapod=self.hexapod)) if source.weighs else (self.motion, machine)
 
     def by(self, fitted: Fitted) -> Effect:

@@ -1,4 +1,4 @@
-"""How one control writes and reads a toolpath."""
+"""Write and read a toolpath in the language of a control."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Each pose is moved by the last decimal of its angles, or of X, Y and Z if the angles are constant, until a hash of its
 six numbers begins with `BITS` zero bits. The mark survives edits of comments, line numbers and feeds, and added or
-deleted lines. Fewer decimals or another place destroy it.
+deleted lines. Fewer decimals or a shifted pose destroy the mark.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ def longest(
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:
-    """Return the ends of pieces, each as far as the tolerance allows: the fewest if parts of a good piece are good.
+    """Return the ends of pieces, each as long as the tolerance allows.
 
     Args:
         may_end: where pieces may end, besides first and last place, shape (n,).

@@ -63,7 +63,7 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
     raise MachineError(
         f"the feed is {toolpath.feed[row]:g} {unit}, the machine's greatest {limit[row]:g} {unit}",
         where=toolpath.where(row),
-        remedy=f"give a smaller F; what the machine reaches stands in its file as `{key}`",
+        remedy=f"give a smaller F; its file states the limit as `{key}`",
     )
 
 

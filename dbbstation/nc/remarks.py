@@ -1,4 +1,4 @@
-"""Unmet requests of a compensated program: reported, or a reason to refuse it."""
+"""Requests that a compensated program misses; they are reported or refused."""
 
 from __future__ import annotations
 

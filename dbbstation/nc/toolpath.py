@@ -165,7 +165,7 @@ class Toolpath:
         return replace(self.only(rows), start=self.start if begins == 0 else self.before[begins])
 
     def only(self, rows: slice | NDArray[np.int64]) -> Toolpath:
-        """Return some rows as a toolpath without texts; each move begins where the one before ends."""
+        """Return some rows as a toolpath without texts; each move begins at the end of the move before."""
         return replace(
             self,
             kind=self.kind[rows],
@@ -263,7 +263,7 @@ class Toolpath:
         return in_pieces(self.pieces(step_mm, step_deg))
 
     def pieces(self, step_mm: float, step_deg: float) -> NDArray[np.int64]:
-        """Return the number of such pieces in each row, shape (n,)."""
+        """Return the number of pieces of each row, shape (n,)."""
         pieces = np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg))
         return np.maximum(pieces, 1.0).astype(np.int64)
 

@@ -190,7 +190,7 @@ class WordDialect(Dialect):
         return ()
 
     def length_guard(self, text: str, holds: Mapping[str, Sequence[float]], row: int) -> Iterable[str]:  # noqa: ARG002
-        """Return the same for a tool length that `text` activates."""
+        """Return the guard for a tool length that `text` activates."""
         return ()
 
     def cannot_say(self, what: str) -> CannotSayError:

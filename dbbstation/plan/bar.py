@@ -74,7 +74,7 @@ class Bar:
         """Return the expected reading minus true distance, with standard uncertainty [mm].
 
         Calibrator excess minus growth a L (T - T_calibration). Known effects are corrected [GUM 3.2.4]; an unstated
-        temperature uncertainty is the usual one. A difference has sqrt(2) times each one's.
+        temperature uncertainty is the usual one. A difference of two temperatures has sqrt(2) times the uncertainty of one.
         """
         long_mm = 0.0 if self.reading_mm is None else self.reading_mm - self.calibrated_length_mm
         if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:

@@ -41,8 +41,7 @@ def by_holder(plan: Plan) -> tuple[str, ...]:
 def against_drift(plan: Plan) -> tuple[str, ...]:
     """Return tests in an order whose heights follow no drift.
 
-    Priorities: correlation with a steady drift at most `LARGEST_LEAK`; the same with a bent one; few balls put up; few
-    holder changes. Tests count as equal time steps. Exchanges and moves are searched from several starts.
+    Priorities: a correlation of at most `LARGEST_LEAK` with a steady drift, then with a bent drift, then few balls to put up, then few holder changes. Tests count as equal time steps. Exchanges and moves are searched from several starts.
     """
     names = list(plan.tests)
     tests = [plan.tests[name] for name in names]

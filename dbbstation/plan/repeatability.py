@@ -81,7 +81,7 @@ def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float
     """
     several = [place for place in places_um if len(place) >= FEWEST]
     if not several:
-        raise ValueError("no place has two mountings: there is no scatter to be seen")
+        raise ValueError("each place has one mounting only: scatter needs two")
     off = [place - place.mean(axis=0) for place in several]
     squares = np.sum([np.sum(one**2, axis=0) for one in off], axis=0)
     freedom = sum(len(one) - 1 for one in off)

@@ -86,7 +86,7 @@ class Worst:
 
     @property
     def within(self) -> bool:
-        """Return whether it is within the limit."""
+        """Return whether the figure is within the limit."""
         return self.size_um <= self.tolerance.largest_um
 
 

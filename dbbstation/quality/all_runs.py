@@ -1,7 +1,6 @@
 """Faults common to all runs: programs mirrored, turned or reversed, and another bar.
 
-Such a session agrees with itself, but mirrored forms of several tests fit no hexapod, and a uniformly oversized machine
-also errs in other ways. Ways to have run the session are compared by likelihood. Sound runs favour another way by f or
+Such a session is consistent, but no hexapod has mirrored forms in several tests, and a uniformly oversized machine has further errors. Ways to have run the session are compared by likelihood. Sound runs favour another way by f or
 more with a probability of at most 1 / f [Markov's inequality].
 """
 

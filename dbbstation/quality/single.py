@@ -201,7 +201,7 @@ UNEVEN_STOP_S = 0.6
 """By how much the stops at both corners may differ from run to run: passed without a stop, or stopped at for 0.3 s each [s]."""
 
 AFTER_OTHER_FEED = (
-    "set the override on the control to 100 % and run it again; a feed that was wanted goes into the plan"
+    "set the override on the control to 100 % and run it again; if this feed is intended, state it in the plan"
 )
 """What to do about a feed that is not the programmed one."""
 

@@ -97,7 +97,7 @@ def expected_beside(both: Together | None) -> Expected | None:
 def _tail(weights: Floats, covariances_um2: Floats) -> float:
     """Return the factor on the mean covariance for the longer tails of a mixture of sizes.
 
-    Its squared radius is exceeded with probability SHARE; covariances of different sizes are assumed alike in shape.
+    A sound circle exceeds the squared radius with probability SHARE. Covariances are assumed to differ in size only.
     """
     sizes = np.trace(covariances_um2, axis1=1, axis2=2)
     sizes /= weights @ sizes

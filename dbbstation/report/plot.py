@@ -290,7 +290,7 @@ def _reach_um(drawn: Sequence[Drawn]) -> float:
 
 def _drawn(one: MeasuredCircle) -> DrawnCircle:
     if one.analysis is None:
-        raise ValueError("a run without a circle is on no sheet")
+        raise ValueError("a run without a circle cannot be drawn")
     x, y = one.analysis.centre_mm
     g = one.budget()
     name = (one.session, one.entry.test, str(one.entry.direction), one.entry.repeat)

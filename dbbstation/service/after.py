@@ -199,7 +199,7 @@ class After:
                 return job.model_copy(update={"model": self.model, "place": self._place})
             case SessionTask.ACCEPTANCE:
                 if self.former is None:
-                    raise ValueError("no session was chosen to hold this one against")
+                    raise ValueError("no session was chosen for the comparison")
                 return job.model_copy(update={"before": self.former.folder})
 
     def _files(self) -> tuple[Path, Path]:

@@ -74,7 +74,7 @@ class ExchangedSimulator(Simulator):
         for signal in self._ports[name]:
             values = found.get(f"{name}.{signal}")
             if values is None or values.shape != t.shape:
-                raise SimulationFault(f"there is no `{name}.{signal}` of {len(t)} rows among what it returns")
+                raise SimulationFault(f"its result has no `{name}.{signal}` with {len(t)} rows")
             signals[signal] = values
         if not all(np.isfinite(values).all() for values in signals.values()):
             return np.full(len(t), np.nan)

@@ -102,7 +102,7 @@ def _read(path: Path) -> dict[str, Floats]:
     try:
         values = np.array(body, dtype=np.float64).reshape(len(body), len(head))
     except ValueError as error:
-        raise SimulationFault(f"its `{OUTPUTS}` has what is no number: {error}") from error
+        raise SimulationFault(f"its `{OUTPUTS}` has a cell that is not a number: {error}") from error
     return {name: values[:, k].copy() for k, name in enumerate(head)}
 
 

@@ -155,7 +155,7 @@ class Runs:
         except BrokenProcessPool as error:
             what = "a process that simulates was ended"
             raise CalibrationError(
-                what, where=told(self._model, asks[0]), remedy="it may lack memory, or crash there"
+                what, where=told(self._model, asks[0]), remedy="it may need more memory, or crash on that computer"
             ) from error
 
     def _result(
@@ -195,5 +195,5 @@ def _one(source: Path | ExchangedSimulator, model: Model, ask: SimulationRequest
         where = f"{place}:{line}" if line else place
         what = f"the simulation failed: {in_words(error)}"
         raise CalibrationError(
-            what, where=f"{where}, {told(model, ask)}", remedy="mend `simulate` for this input"
+            what, where=f"{where}, {told(model, ask)}", remedy="correct `simulate` for this input"
         ) from error

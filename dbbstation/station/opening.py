@@ -64,7 +64,7 @@ def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> l
         return []
     kinds = {True: "a virtual machine", False: "a real machine", None: "a machine that is not noted as virtual"}
     what = f"this session is of {kinds[session.virtual]}, and {instrument.text} is that of {kinds[instrument.virtual]}"
-    return [Problem(str(folder), 0, 0, what, "measure into a session of its own: give another --out")]
+    return [Problem(str(folder), 0, 0, what, "measure into a new session: give another --out")]
 
 
 def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> None:

@@ -104,7 +104,7 @@ def calibrate(
     fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES), known)
     if not machine_sources(fitted):
         raise ModelError(
-            "none of the error sources named belongs to the machine and shows in circles: there is nothing to calibrate",
+            "no named error source belongs to the machine and appears in circles: nothing can be calibrated",
             remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
         )
     recorded = loaded(sessions, tests, exclude, telling)

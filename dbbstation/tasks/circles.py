@@ -29,7 +29,7 @@ def circles(
     findings: o.Findings = False,
     model: Annotated[o.Model | None, o.MODEL_WITH_FINDINGS] = None,
     quick_look: Annotated[
-        bool, Option("Look for the classical signatures of serial axes: symptoms, no causes here.")
+        bool, Option("Fit the classical signatures of serial axes, which are only symptoms on a hexapod.")
     ] = False,
     tests: o.Tests = (),
     exclude: o.Exclude = (),

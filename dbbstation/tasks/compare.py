@@ -34,10 +34,9 @@ def compare(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> ComparisonResult:
-    r"""Put two sessions side by side: where they differ, in what form, and by which cause. Differences are B less A.
+    r"""Compare two sessions: where they differ, in what form, and by which cause. Differences are B less A.
 
-    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. Stated noise, scatter of mountings, and uncertainty of CMM sheets and bars do not count as a difference. Error sources that may have changed, balls and bars that
-    sit elsewhere, and effects without a name compete by their probability, as in `diagnose`.
+    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. Stated noise, scatter of mountings, and uncertainty of CMM sheets and bars do not count as a difference. Changed error sources, displaced balls and bars, and effects without a name compete by probability, as in `diagnose`.
 
     \b
     Examples:

@@ -28,7 +28,7 @@ def named_numbers(texts: Iterable[str], counts: set[int]) -> dict[str, list[floa
     """Return the numbers of each `NAME=1,2,3`; errors as of `numbers_of`."""
     pairs = [text.partition("=") for text in texts]
     for text in (name for name, equals, _ in pairs if not equals):
-        raise ValueError(f"{text!r} names nothing: write {'1=52.1' if counts == {1} else 'G54=20,-35,-1000'}")
+        raise ValueError(f"{text!r} lacks its name: write {'1=52.1' if counts == {1} else 'G54=20,-35,-1000'}")
     return {name.strip().upper(): numbers_of(numbers, counts) for name, _, numbers in pairs}
 
 

@@ -78,7 +78,7 @@ def diagnosed_of(
     for source in named:
         if not source.candidate:
             what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
-            raise ModelError(what, remedy="leave it out; the model of a diagnosis keeps what is left")
+            raise ModelError(what, remedy="leave it out; the model of a diagnosis keeps the effect")
     recorded = loaded(sessions, *chosen, telling)
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
     found = how(recorded.machine, recorded.observations, usable, telling.stage)

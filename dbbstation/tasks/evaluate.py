@@ -38,10 +38,10 @@ def evaluate(
 ) -> EvaluationResult:
     r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
-    After is what the model leaves of the recordings, not a new measurement. The second table shows the circular
+    \"After\" is the residual of the model, not a new measurement. The second table shows the circular
     deviation G that was measured and the one that the model predicts. In both tables G is that of readings low-passed at
     30 undulations per revolution. Flatness over X, Y = ±190 mm and parallelism of a move along X are what the model
-    predicts of programs that are not compensated. Tolerances of the shop's settings are held against every circle.
+    predicts of programs that are not compensated. Every circle is compared with the tolerances of the shop's settings.
 
     \b
     Examples:

@@ -38,7 +38,7 @@ def history(
 ) -> HistoryResult:
     r"""Show the figures of a folder of sessions over time, machine by machine, and changes beyond uncertainty.
 
-    Of every test and direction G, centre X and Y, mean radial error R and centre distance C; parameters of models that lie in
+    The figures are G, centre X and Y, mean radial error R and centre distance C of every test and direction, and parameters of models that lie in
     the folder and come from one of its sessions. Limits come from the shop's settings. A two-sided CUSUM with a limit for
     single sessions watches each quantity, from its second session on; the rate of false alarms is that of the whole table.
     --false-alarms is per session, all quantities of a machine together. No model is fitted. Results are kept in an index in the user's cache folder.

@@ -97,7 +97,7 @@ def mismatch(
     ] = None,
     run: Annotated[
         str | None,
-        Option("Column that tells runs apart; several files are several runs anyway.", metavar="COLUMN"),
+        Option("Column with the name of the run [default: each file is a run].", metavar="COLUMN"),
     ] = None,
     time: Annotated[
         str | None,
@@ -121,8 +121,8 @@ def mismatch(
     matters: Annotated[
         float | None,
         Option(
-            'Smallest effect that you care about, rms in the unit of the measured values: the answer is "no" only if it would '
-            "have been found [default: what refitted parameters leave].",
+            'Smallest effect that matters to you, rms in the unit of the measured values. A "no" holds from this size on '
+            "[default: what refitted parameters leave].",
             metavar="SIZE",
             above=0.0,
         ),

@@ -32,7 +32,7 @@ OUTPUTS = {
 """Of what a command writes: what it is stands in its metavar."""
 Machine = Annotated[File, Option("Machine file.", kind="file", metavar="MACHINE.yaml")]
 Plan = Annotated[File, Option("Test plan.", kind="file", metavar="PLAN.yaml")]
-ANEW = Option("Work out anew what is kept.")
+ANEW = Option("Compute results again instead of reading stored ones.")
 Anew = Annotated[bool, ANEW]
 SOURCES = Option("Error sources by name.", metavar="A,B,...")
 LawOverTime = Annotated[bool, Option("Fit thermal growth as a function of time, even if temperatures were logged.")]

@@ -41,9 +41,9 @@ def report(
     page: Annotated[File, Option(o.OUTPUTS["page"], kind="file")],
     *,
     settings: Settings,
-    before: Annotated[File | None, Option("Session that was measured before, to put beside.")] = None,
+    before: Annotated[File | None, Option("Earlier session for comparison.")] = None,
     model: o.Model | None = None,
-    job: Annotated[str, Option("Job or reason of the measurement, in place of the session's.")] = "",
+    job: Annotated[str, Option("Job or reason of the measurement; replaces that of the session.")] = "",
     place: Annotated[
         str, Option("Place of the measurement, which a certificate needs  [with --certificate a terminal asks for it].")
     ] = "",
@@ -62,8 +62,7 @@ def report(
 ) -> ReportResult:
     r"""Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
 
-    Its first page compares the circles with the tolerances of the shop's settings and states what to do. Then come
-    conditions, polar traces, figures with U, findings of every run, with --model what it leaves and could not see, and all
+    Its first page compares the circles with the tolerances of the shop's settings and states what to do. Conditions, polar traces, figures with U and findings of every run follow, then with --model its residual and unidentifiable directions, and all
     files with their SHA-256. With --before both sessions are shown side by side as measured. The figures are those of
     `circles` and `evaluate`.
 

@@ -93,7 +93,7 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
         raise TraceError(
             f"{share_lost(lost, len(recording))}; {error.what}",
             where=error.where,
-            remedy=f"{AFTER_LOSS}; where that does not help: {error.remedy}",
+            remedy=f"{AFTER_LOSS}; if that does not help: {error.remedy}",
         ) from error
 
 
@@ -256,7 +256,7 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
     raise TraceError(
         f"{shown}, the plan says {circle.feed_mm_min:g}",
         where=recording.name,
-        remedy="set the override on the control to 100 % and run it again; a feed that was wanted goes into the plan",
+        remedy="set the override on the control to 100 % and run it again; if this feed is intended, state it in the plan",
     )
 
 
@@ -414,7 +414,7 @@ def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: NDArr
             f"the length jumps by {jumps[worst]:.3f} mm from one sample to the next, at "
             f"{circle.theta_deg(phi)[worst] % FULL_TURN_DEG:.1f} degrees",
             where=recording.name,
-            remedy="look after balls, seats and cable, and repeat the run",
+            remedy="check balls, cups and cable, and repeat the run",
         )
     off = np.abs(length - circle.bar_mm)
     # Recorded angles need no edges: only the bar's travel bounds how far such a machine may be off.

@@ -69,7 +69,7 @@ def minimum_zone(points_mm: Floats) -> MinimumZone:
         if distance[far] - distance[near] <= np.ptp(within) + AGREED_MM:
             return MinimumZone((float(centre[0]), float(centre[1])), float(distance[near]), float(distance[far]))
         chosen = np.unique([*chosen, near, far])
-    raise TraceError("its minimum zone was not found", remedy="report this recording: it should always be found")
+    raise TraceError("its minimum zone was not found", remedy="report this recording: this is a fault of the program")
 
 
 def _extremes(points_mm: Floats) -> NDArray[np.int64]:

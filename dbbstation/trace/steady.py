@@ -47,7 +47,7 @@ def steady(readings_mm: Floats, resolution_mm: float | None = None) -> Steady:
     if resolution_mm is None:
         steps = np.diff(np.unique(readings_mm))
         if not len(steps):
-            raise ValueError("all readings are alike: the resolution has to be given")
+            raise ValueError("all readings are equal: state the resolution")
         resolution_mm = float(steps.min())
     means = np.array([batch.mean() for batch in np.array_split(readings_mm, BATCHES)])
     of_mean = float(means.std(ddof=1)) / np.sqrt(BATCHES)

@@ -245,7 +245,7 @@ BAR_NO_BAR = "no length yet: {said}"
 BAR_DOUBTFUL = "now {length:.4f} mm, doubtful: {said}"
 BAR_READS = "Reading: {done} of {of}. Leave the bar alone."
 BAR_DONE = "The bar reads {long:+.2f} µm long, standard uncertainty {u:.2f} µm. Written to {path}. Esc takes it."
-BAR_DRIFTED = " It drifted by {drift:+.2f} µm meanwhile: give it time to cool down, then B reads it again."
+BAR_DRIFTED = " It drifted by {drift:+.2f} µm meanwhile: let the bar cool down, then B reads it again."
 
 STEPS: Mapping[SessionTask, tuple[str, str]] = {
     SessionTask.CALIBRATE: ("1", "Calibrate: fit the kinematic parameters"),

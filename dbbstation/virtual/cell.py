@@ -127,4 +127,4 @@ class VirtualCell:
     def _refuse_while_running(self, what: str) -> None:
         self._clock.settle()
         if self.running:
-            raise MachineError(f"cannot {what} while a run goes on", where="virtual machine", remedy="wait, or stop it")
+            raise MachineError(f"cannot {what} during a run", where="virtual machine", remedy="wait, or stop it")

@@ -127,7 +127,7 @@ class WaitingClock(ScaledClock):
         with self._stands:
             if not self._stands.wait_for(lambda: self._now_s >= self._until_s, _PATIENCE_S):
                 raise MachineError(
-                    "its time stands still in the middle of a run: nobody reads its samples",
+                    "its time has stopped during a run, since its samples are not read",
                     where="virtual machine",
                     remedy="read the instrument's port, or close it",
                 )

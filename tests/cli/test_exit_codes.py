@@ -159,7 +159,7 @@ def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen)
     monkeypatch.setattr("dbbstation.calibration.fit.calibrate.linearise", interrupted)
     outcome = run("calibrate", fifteen, "--out", tmp_path / "model.yaml")
     assert (outcome.code, outcome.out) == (FAILED, "")
-    assert outcome.err.strip() == "interrupted; what was written before stays"
+    assert outcome.err.strip() == "interrupted; files that were already written are kept"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -173,7 +173,7 @@ def test_ctrl_c_a_polite_kill_and_a_closed_terminal(tmp_path, fifteen, name):
         process.send_signal(getattr(signal, name))
         out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (FAILED, "")
-    assert "interrupted; what was written before stays" in err
+    assert "interrupted; files that were already written are kept" in err
     assert "Traceback" not in err
     assert not (tmp_path / "model.yaml").exists()
 

@@ -101,7 +101,7 @@ BALL = "FA(9_SHORT)=FEAT/SPHERE,OUTER,CART,0.1,0.2,0.3,20\n"
         ("UNITS/CUBIT\n" + BALL, "`CUBIT` is no unit"),
         (UNITS + BALL.replace("FA(", "F("), "there is no measured sphere"),
         (UNITS + BALL.replace("CART", "POL"), "not in cartesian"),
-        (UNITS + BALL.replace("0.2", "x"), "are no three numbers"),
+        (UNITS + BALL.replace("0.2", "x"), "are not three numbers"),
         (UNITS + BALL + "RECALL/D(OTHER)\n" + BALL.replace("9", "4"), "the frame was set anew in line 3"),
     ],
 )

@@ -174,7 +174,7 @@ def test_what_predicts_worse_than_the_simulation_is_said_first_and_no_correction
 def test_what_was_not_tested_is_said(run, bent):
     outcome = run("mismatch", bent, *QUICK)
     assert "curve over oil_temp_c" in outcome.out
-    assert "whether what is identified predicts other rows was not tested" in outcome.out
+    assert "predictions of the identified causes were not tested" in outcome.out
     data = run("mismatch", bent, *QUICK, "--json").data
     assert data["held_out"] == "not-tested"
     assert all(finding["gains"] is None for finding in data["findings"])

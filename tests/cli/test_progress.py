@@ -283,7 +283,7 @@ def test_ctrl_c_ends_with_one_line_and_leaves_whole_files(tmp_path, name, after_
         pytest.skip("it was over before")
     assert process.returncode == FAILED, said
     told = [line for line in said.splitlines() if not line.startswith("note: ")]  # notes of the files come before
-    assert told == ["interrupted; what was written before stays"]
+    assert told == ["interrupted; files that were already written are kept"]
     assert set(tmp_path.rglob("*")) == before
     assert (tmp_path / "model.yaml").read_text() == "what was there before"
 
@@ -317,6 +317,6 @@ def test_ctrl_c_ends_the_bar_and_says_so():
     screen = pyte.Screen(COLUMNS, ROWS)
     pyte.Stream(screen).feed(said)
     *shown, told = [line.rstrip() for line in screen.display if line.strip()]
-    assert told == "interrupted; what was written before stays"
+    assert told == "interrupted; files that were already written are kept"
     assert [bar[1] for bar in bars(shown)][-1] == "diagnosis"
     assert not screen.cursor.hidden

@@ -121,8 +121,8 @@ def test_names_are_listed_and_each_is_copied(tmp_path):
     ("words", "what"),
     [
         (["plons", "--out", "x"], "did you mean plans?"),
-        (["plans"], "NAME and --out belong together"),
-        (["--out", "x"], "NAME and --out belong together"),
+        (["plans"], "give NAME, which is copied"),
+        (["--out", "x"], "give NAME, which is copied"),
     ],
 )
 def test_what_cannot_be_copied_is_said(tmp_path, words, what):

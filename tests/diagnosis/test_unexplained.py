@@ -201,7 +201,7 @@ def test_a_curve_that_all_struts_share_is_kept_on_all_of_them(hollow):
 
 def test_what_no_program_knows_is_not_kept(hollow):
     _, diagnosis = hollow
-    with pytest.raises(ModelError, match="nothing is left without a name"):
+    with pytest.raises(ModelError, match="has no unnamed effect"):
         keep_unexplained(None, diagnosis.after)
     late = replace(diagnosis.unexplained.curve, follows=Follows("time", "", READING))
     with pytest.raises(ModelError, match="follows time of the reading, which no program knows"):

@@ -148,7 +148,7 @@ def test_no_command_waits_for_a_pipe(tmp_path, line, name):
 def test_a_device_is_no_byte_log():
     outcome = call("instrument", "replay", "/dev/zero")
     assert outcome.code == 1
-    assert outcome.err == "/dev/zero: this is a pipe or a device, a file is needed; write it to a file first\n"
+    assert outcome.err == "/dev/zero: this is a pipe or a device: name a file; write it to a file first\n"
 
 
 def test_a_file_that_grows_while_it_is_read_is_counted(tmp_path):

@@ -18,7 +18,7 @@ CHECKOUT = Path(__file__).parents[2]
 def test_from_a_checkout() -> None:
     assert shipped_folder("protocols") == CHECKOUT / "protocols"
     assert shipped_folder("fixtures") == CHECKOUT / "fixtures"
-    with pytest.raises(InputError, match="this folder of the installation is missing; install dbbstation again"):
+    with pytest.raises(InputError, match="this folder is missing in the installation; install dbbstation again"):
         shipped_folder("nothing")
 
 

@@ -70,7 +70,7 @@ def test_a_name_that_is_not_known_brings_the_nearest() -> None:
         ("name: gauge", "name: other", "gauge.yaml:2:7: the name 'other' is not the file's; rename the file"),
         ("mode: latch", "mode: stream", "gauge.yaml:5:6: ask: value error, modes poll and latch have request bytes"),
         ("[0, 100]", "[100, 0]", "length: value error, range_mm is [lowest, highest]"),
-        ("unit: mm", "unit: count", "length: value error, unit count, and only it, needs mm_per_count"),
+        ("unit: mm", "unit: count", "length: value error, give mm_per_count with the unit count only"),
         ('value: "\\r"', 'value: "\u20ac"', "characters on a wire are bytes"),
         ("width: 8, ", "", "every frame ends in the same literal"),
         ("kind: decimal, width: 8, decimals: 3", "kind: skip, written: x", "a frame without a length is a message"),
@@ -138,7 +138,7 @@ def test_every_profile_is_checked_when_the_file_is_read(tmp_path: Path, added: s
         ),
         (
             '{status: fault, means: x, parts: [{kind: text, width: 2, written: xyz}, {kind: literal, value: "\\r"}]}',
-            "fits into the width",
+            "fit into the width",
         ),
         ("{status: fault, means: x, parts: [{kind: text, written: x}]}", "every frame ends in the same literal"),
     ],

@@ -68,7 +68,7 @@ def test_a_dive_at_an_inner_corner_goes_down_where_the_corner_is():
         ("G41 D1\nG42 D1\n", "while another one is in force"),
         ("G41 D1\nG1 Y0\nG54\n", "changes what moves mean"),
         ("G41 D1\nG1 Y0\nG98 G81 X5 Z-1 R1\n", "a cycle beside a contour"),
-        ("G41 D1\nG1 Y0\nG40\nG3 X5 R9\n", "an arc leads away"),
+        ("G41 D1\nG1 Y0\nG40\nG3 X5 R9\n", "the move behind G40 is an arc"),
         ("G41.1\nG1 Y0\n", "needs D"),
     ],
 )

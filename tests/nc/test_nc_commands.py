@@ -251,7 +251,7 @@ def test_offsets_and_lengths_come_from_linuxcncs_files_and_the_command(tmp_path,
     assert "the length of tool 1: Z10" in out.read_text()
     assert run(compensate, *common, "--offset", "G54=0,0").exit_code == 2
     (tmp_path / "tool.tbl").write_text("tools of the shop\n")
-    with pytest.raises(InputError, match=r"tool\.tbl:1:1: no line of a tool table"):
+    with pytest.raises(InputError, match=r"tool\.tbl:1:1: this is not a line of a tool table"):
         run(compensate, *common, *files)
 
 

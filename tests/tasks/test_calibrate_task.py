@@ -91,7 +91,7 @@ def test_tests_of_loaded_sessions_can_be_chosen(recorded):
 
 
 def test_nothing_to_calibrate_is_said():
-    with pytest.raises(ModelError, match="nothing to calibrate"):
+    with pytest.raises(ModelError, match="nothing can be calibrated"):
         calibrate(SMALL, sources=["bar-offset"])
 
 

@@ -50,7 +50,7 @@ def _by_sector(
 
 
 def is_missing_physics(found: Misfit) -> bool:
-    """Return whether chance does not explain it."""
+    """Return whether chance cannot explain the misfit."""
     return found.probability < SIGNIFICANT
 
 

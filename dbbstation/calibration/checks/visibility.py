@@ -154,7 +154,7 @@ def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
 def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, float]:
     """Return the trace of covariance times a test's own information, averaged over its random effects.
 
-    It approximates the loss without the test, in parameters. Shared effects, such as the bar's length, count as
+    The trace approximates how many parameters are lost without the test. Shared effects, such as the bar's length, count as
     unknowns.
     """
     known, noise = calibration.layout.known, calibration.noise.effective

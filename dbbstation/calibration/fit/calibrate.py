@@ -212,7 +212,7 @@ def calibrate(
     assert held is not None  # noqa: S101 - of the first step
     if must_settle and not settled:
         raise CalibrationError(
-            f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",
+            f"the fit does not converge: step {MOST_STEPS} is {change:.2g} times the limit",
             remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
         )
     left.clear()  # a number a sample, before the residuals are two

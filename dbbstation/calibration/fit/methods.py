@@ -120,8 +120,8 @@ def _check_not_centred(observations: Sequence[Observation]) -> None:
     limit = max(CENTRED_MM, CENTRED_SHARE * float(np.sqrt(stated)))
     if off < limit and bent > LEAST_CIRCULARITY_UM:
         raise CalibrationError(
-            f"the centres of the {len(seen)} circles lie within {1e3 * off:.2g} µm rms of the fixed balls, which no "
-            "mounting does: a centre compensation took the machine's position errors out of these recordings",
-            remedy="switch centre compensation off and measure again, or export raw lengths; --method conv-a can use "
-            "these recordings, without global position",
+            f"the centres of the {len(seen)} circles lie within {1e3 * off:.2g} µm rms of the fixed balls, closer than any "
+            "mounting: a centre compensation has removed the machine's position errors from these recordings",
+            remedy="switch centre compensation off and measure again, or export raw lengths; --method conv-a uses "
+            "these recordings for everything but the position",
         )

@@ -32,7 +32,7 @@ SAME_SIGMAS = 3.0
 
 
 def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Give a run whose ball moved within its mounting its own mounting; None if none moved or it has no other run."""
+    """Return the runs with a new mounting for one whose ball moved within its mounting; None if no ball moved, or the mounting has one run."""
     k = _moved_in(calibration)
     if k is None:
         return None
@@ -131,7 +131,7 @@ def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
 
 
 def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
-    """Return a freed outlier by another fit; others unchanged."""
+    """Return a freed outlier with the values of another fit; leave other outliers unchanged."""
     if outlier.kind is OutlierKind.BAR:
         found = _bar(calibration, outlier.freed[0], outlier.why)
     elif outlier.freed:

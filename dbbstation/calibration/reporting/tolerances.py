@@ -60,7 +60,7 @@ def evaluated_tolerances(
 
 def _low_passed(run: EvaluatedRun) -> tuple[float, float]:
     if run.circularity_30_upr_um is None:
-        raise ValueError("tolerances are for the circular deviation of low-passed readings, which these runs lack")
+        raise ValueError("these runs have no low-passed readings, which the tolerances need")
     return run.circularity_30_upr_um.before, run.circularity_30_upr_um.after
 
 

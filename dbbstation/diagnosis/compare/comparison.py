@@ -262,5 +262,5 @@ def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
             return
     raise TraceError(
         f"in session {name} all circles lie on their commanded centres within noise: their centres were removed",
-        remedy="compare raw bar lengths; a circle without its centre does not say where it was",
+        remedy="compare raw bar lengths; a circle without its centre has no position",
     )

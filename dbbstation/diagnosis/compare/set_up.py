@@ -79,7 +79,7 @@ def _per_degree(pair: Pair) -> NDArray[np.float64]:
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
     """Return a source's sharing tests, columns, shape (n, p), and stated sizes, shape (p,) [mm].
 
-    Runs usually share in both sessions; then variances add.
+    If runs share the error in both sessions, their variances add.
     """
     shared = [[source.shared_by(motion) for motion in motions] for motions in sides.motions]
     together = list(zip(*shared, strict=True))
@@ -107,7 +107,7 @@ def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
 
 
 def set_up_laws(sides: Sides) -> list[Law]:
-    """Return balls and bars beyond their stated size: one or each."""
+    """Return balls and bars with errors beyond their stated size, singly or all."""
     found: list[Law] = []
     named: set[tuple[str, ...]] = set()
     for source in sources_named(SET_UP):
@@ -187,5 +187,5 @@ def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
 
 
 def with_set_up(follows: Sequence[Followed], sides: Sides, settled: Settled) -> tuple[Followed, ...]:
-    """Return classes; one that is alike in all tests is the set-up's."""
+    """Return classes; a class that is alike in all tests is attributed to the set-up."""
     return tuple(replace(one, where=ALIKE) if alike_in_all(one, sides, settled) else one for one in follows)

@@ -144,7 +144,7 @@ class Recordings:
 
 
 def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None = None) -> Recordings:
-    """Prepare recordings in their narrowest band.
+    """Filter all recordings to the narrowest of their bands.
 
     Raises:
         CalibrationError: as `signals_of`; or force contradicts motion.
@@ -179,7 +179,7 @@ def _refuse_wrong_sign(one: Recordings) -> None:
             f"the force has the wrong sign: it acts against the motion (correlation with the speed {agreement:.2f}), so that "
             f"the drive would gain {-mean:.3g} W from its friction",
             where=one.names[0],
-            remedy="force and current must be positive towards greater positions; turn the sign of one channel",
+            remedy="force and current must be positive towards greater positions; change the sign of one channel",
         )
 
 

@@ -78,7 +78,7 @@ class Node:
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Return laws not inserted, and reasons against others."""
+        """Return laws that are not inserted yet, and reasons against the rest."""
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property

@@ -63,13 +63,13 @@ def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None)
 
 
 def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
-    """Compare quickly from one start or beside everything; may miss large effects."""
+    """Compare quickly from one start; large effects may be missed."""
     beginnings = tuple(dict.fromkeys((beginning, Beginning.EVERYTHING)))
     return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=beginnings)
 
 
 def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, refits: bool = True) -> SearchOutcome:
-    """Insert missing terms one by one; unneeded ones are rejected about the same terms.
+    """Insert missing terms one by one, and reject unneeded terms.
 
     Args:
         refits: refit in own noise until stable; False for held-back rows.
@@ -150,8 +150,7 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
 def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
     """Return members smaller than the slack of others at their port.
 
-    Real objects depart from forms in any shape. Absorbed parts are excluded; effects are taken jointly, since similar
-    ones may cancel.
+    Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, since similar effects may cancel.
     """
     every = {one.name: one for one in (*node.inside, *node.outside)}
     members = [every[member.cause.name] for member in settled.best.members]

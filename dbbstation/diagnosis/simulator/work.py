@@ -122,7 +122,7 @@ class SimulationRuns:
         return len(self.time)
 
     def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
-        """Return all rows at each state, shape (n,).
+        """Return simulated outputs of all rows at each state, shape (n,).
 
         Raises:
             RanAwayError: not finite, if `strict`.

@@ -39,4 +39,4 @@ class TableSource(ABC):
 
     @abstractmethod
     def columns(self, variables: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, float]) -> NDArray[np.float64]:
-        """Return one of each amplitude, shape (n, p), in the measured unit."""
+        """Return the effect of unit amplitudes, shape (n, p), in the measured unit."""

@@ -67,7 +67,7 @@ def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
 def _meaning(text: str) -> str:
     if text not in MEANINGS:
         raise PydanticCustomError(
-            "meaning", "`{text}` is nothing that a column can be: {known}", {"text": text, "known": ", ".join(MEANINGS)}
+            "meaning", "`{text}` is not a meaning of a column: {known}", {"text": text, "known": ", ".join(MEANINGS)}
         )
     return text
 
@@ -149,17 +149,19 @@ class MappingFile(Schema):
         for one in sorted({m for m in meanings if m != IGNORED and meanings.count(m) > 1}):
             raise PydanticCustomError("twice", "two columns are `{one}`; take one of them for `ignored`", {"one": one})
         if LENGTH in meanings and DEVIATION in meanings:
-            raise PydanticCustomError("both", "length and deviation say the same twice; ignore one of them", {})
+            raise PydanticCustomError("both", "length and deviation are the same quantity; mark one as `ignored`", {})
         if LENGTH not in meanings and DEVIATION not in meanings:
             raise PydanticCustomError("length", "no column is `length` or `deviation`", {})
         if TIME not in meanings and ANGLE not in meanings:
             raise PydanticCustomError("time", "no column is `time` or `angle`", {})
         if ANGLE in meanings and self.angle is None:
             raise PydanticCustomError(
-                "angle", "a column is an angle: `angle` has to say where 0 lies and how it grows", {}
+                "angle", "a column is an angle: `angle` must state where 0 is and in which direction it grows", {}
             )
         if DEVIATION in meanings and self.zero_mm is None:
-            raise PydanticCustomError("zero", "a column is a deviation: `zero_mm` has to say from which length", {})
+            raise PydanticCustomError(
+                "zero", "a column is a deviation: `zero_mm` must state the length of deviation 0", {}
+            )
         if ANGLE not in meanings and self.trace is None:
             raise PydanticCustomError("trace", "there are no angles: `trace` has to be `whole` or `turn`", {})
         self._split_has_what_it_needs(meanings)

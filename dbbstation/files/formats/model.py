@@ -64,7 +64,7 @@ def _by_name(sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None) 
     names = [source.name for source in own]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ModelError(f"two of the error sources given are called {', '.join(twice)}", remedy="give each once")
+        raise ModelError(f"two of the given error sources are called {', '.join(twice)}", remedy="give each once")
     return {**known_sources(), **dict(zip(names, own, strict=True))}
 
 

@@ -61,9 +61,9 @@ class ProvenanceSchema(Schema):
 
 
 class ModelFile(Schema):
-    """The nominal machine, what is different on the real one, and how well that is known.
+    """The nominal machine, the errors of the real one, and their uncertainty.
 
-    Every key but `null_space` and `provenance` is required, empty where there is nothing to say, so that a file that was cut short is noticed.
+    Every key but `null_space` and `provenance` is required, even if empty, so that a truncated file is noticed.
     """
 
     format: Literal["dbb-model/1"]

@@ -69,7 +69,7 @@ class PathSchema(Schema):
 
 
 class PathOverride(Schema):
-    """Parts of the path that one test has otherwise."""
+    """Parts of the path that differ in one test."""
 
     radius_mm: _Radius | None = None
     """Length of the bar R [mm]."""

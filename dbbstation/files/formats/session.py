@@ -27,7 +27,7 @@ def _moment(text: str) -> str:
         moment = None
     if moment is None or moment.tzinfo is None:
         raise PydanticCustomError(
-            "moment", "`{text}` is no time with its zone, expected such as 2026-11-20T08:04:11Z", {"text": text}
+            "moment", "`{text}` is not a time with its zone, such as 2026-11-20T08:04:11Z", {"text": text}
         )
     return text
 
@@ -36,7 +36,7 @@ def _day(text: str) -> str:
     try:
         date.fromisoformat(text)
     except ValueError:
-        raise PydanticCustomError("day", "`{text}` is no day of the calendar", {"text": text}) from None
+        raise PydanticCustomError("day", "`{text}` is not a date", {"text": text}) from None
     return text
 
 
@@ -52,7 +52,7 @@ Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class BarSchema(Schema):
-    """The bar and how its length was calibrated: held against the plan, nothing of it is added to readings."""
+    """The bar and the calibration of its length, which is compared with the plan and never added to readings."""
 
     serial_number: str = ""
     """Of the bar."""
@@ -85,7 +85,7 @@ class BarSchema(Schema):
 
 
 class InstrumentSchema(Schema):
-    """What read the lengths, and whether it stands at a machine or in a computer."""
+    """The instrument that read the lengths, and whether it is real or virtual."""
 
     name: str
     """Name of the instrument or of its protocol file."""
@@ -98,7 +98,7 @@ class InstrumentSchema(Schema):
 
 
 class ProgramSchema(Schema):
-    """The NC program that was commanded where it was not the plan's nominal circle."""
+    """The commanded NC program, if it was not the plan's nominal circle."""
 
     file: InsidePath
     """Path in the session folder."""
@@ -193,7 +193,7 @@ class LogSchema(Schema):
 
 
 class SealSchema(Schema):
-    """What files beside the runs were when the session was sealed, and how many runs it has."""
+    """Hashes of the files beside the runs when the session was sealed, and the number of runs."""
 
     files: dict[str, Sha256Hex]
     """SHA-256 of machine, plan and the jig file that the plan may name, by their paths as this file names them."""
@@ -234,7 +234,7 @@ class NoteSchema(Schema):
 
 
 class SessionFile(Schema):
-    """What was done: where the machine and plan stand, the bar, one entry per run."""
+    """What was done: paths of machine and plan, the bar, one entry per run."""
 
     format: Literal["dbb-session/1"]
     """Name and version of this format."""

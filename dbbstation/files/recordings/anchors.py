@@ -29,7 +29,7 @@ def links_of(folder: Path) -> tuple[str, ...]:
 
 
 def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
-    """Return when each run was sealed, by test, direction and repeat; without what the event log does not date."""
+    """Return when each run was sealed, by test, direction and repeat, as far as the event log has dates."""
     log, found = read_event_log(folder, []), dict[tuple[str, str, int], datetime]()
     for event in () if log is None else log.events:
         for run in (*event.runs, *(event.all_runs or ())):
@@ -39,7 +39,7 @@ def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
 
 
 def impossible_day(at: datetime) -> str:
-    """Return a run's day and why it cannot be that one, or an empty text."""
+    """Return a run's day, and why this day is impossible, or an empty text."""
     if at > datetime.now(UTC) + timedelta(days=1):  # zones differ by up to 26 hours
         return f"{at:%Y-%m-%d}, which is still to come"
     return f"{at:%Y-%m-%d}, before there were ball bars" if at.year < FIRST_BARS else ""

@@ -97,7 +97,9 @@ def read_sheet(
     if "ball" not in found and not ({"bore"} if of_one_holder else {"bore", "holder"}) <= set(found):
         what = "no column says which ball a row is"
         faults.append(
-            Problem(str(path), table.header, 0, what, "say it with --columns ball=NAME, or with bore and holder")
+            Problem(
+                str(path), table.header, 0, what, "name the column with --columns ball=NAME, or with bore and holder"
+            )
         )
     of_u = [key for key in ("u", "ux", "uy", "uz") if key in found]
     if of_u and coverage is None:
@@ -160,7 +162,7 @@ def jig_of_sheet(
                 )
             )
         elif not all(map(math.isfinite, one.centre_mm)):
-            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "say which column it is: --columns z=NAME"))
+            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "name the column: --columns z=NAME"))
         else:
             x, y, z = (float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
             balls[name] = BallSchema.model_construct(
@@ -236,7 +238,7 @@ def _is_like_a_cmm(one: Measured) -> bool:
 
 def _unlike_a_cmm(one: Measured, file: str, unit: str) -> Problem:
     what = f"the standard uncertainty of {one.name or one.bore} would be {one.uncertainty_um:.3g} µm, if it were in {unit} like its coordinates"
-    return Problem(file, one.line, 0, what, "say the unit of uncertainties: --u-unit µm")
+    return Problem(file, one.line, 0, what, "state the unit of uncertainties: --u-unit µm")
 
 
 def _said_unit(name: str, units: Mapping[str, str]) -> str:

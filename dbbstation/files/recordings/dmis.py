@@ -96,7 +96,7 @@ def _point(name: str, said: str, factor: float, file: str, line: int, faults: li
         x, y, z = (float(cell) * factor for cell in after)
     except ValueError:
         faults.append(
-            Problem(file, line, 0, f"{name}: `{shortened(', '.join(after))}` are no three numbers", "check the line")
+            Problem(file, line, 0, f"{name}: `{shortened(', '.join(after))}` are not three numbers", "check the line")
         )
         return None
     return DmisPoint(name, (x, y, z), line)

@@ -1,4 +1,4 @@
-"""A session's entries of runs, bar and programs, as the rest of the program takes them."""
+"""A session's entries of runs, bar and programs."""
 
 from __future__ import annotations
 

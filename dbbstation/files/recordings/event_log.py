@@ -175,13 +175,13 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
     line = line_of(log.links[-1] if log.events else "", what, at, members)
     event = _event(line, log.links[-1] if log.events else "")
     if event is None:
-        raise ValueError(f"{members} is no change of a session file")
+        raise ValueError(f"{members} is not a change of a session file")
     # A log that was read is not begun anew where it has gone.
     try:
         handle = open_to_change(log.path, create=not log.size, private=True)
     except FileNotFoundError as error:
         raise OutputError(
-            "the event log is gone: the session was moved or deleted while it was written into",
+            "the event log has disappeared: the session was moved or deleted during the measurement",
             where=str(log.path),
             remedy=f"bring it back; runs in {log.path.parent / RUNS} go into its folder {RUNS}, in place of a .part of the same run",
         ) from error
@@ -210,7 +210,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
 
 
 def _parted(log: EventLog, handle: int) -> int:
-    """Part a log from hard links of its file, such as a backup, which keep their content."""
+    """Replace the log by a copy if its file has hard links, such as a backup, so that these stay unchanged."""
     os.close(handle)  # Windows replaces no file that is open
     try:
         write_bytes(log.path, content_of(log.path), force=True, rewrites=True)

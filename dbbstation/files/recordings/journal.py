@@ -83,14 +83,14 @@ def run_line(values: Sequence[float | str], names: Sequence[str], *, exact: bool
             fields.append(value)
             continue
         if not math.isfinite(value):
-            raise ValueError(f"{name} is {value}; a sample without a value has no place in a run")
+            raise ValueError(f"{name} is {value}; every sample of a run needs a value")
         fields.append(repr(value) if exact else f"{value:.{columns.COLUMNS[name].decimals}f}")
     body = ",".join(fields).encode()
     return body + f",{zlib.crc32(body):08x}\n".encode()
 
 
 class RunWriter:
-    """Appends samples to one run; a context that leaves the `.part` unless sealed.
+    """Appends samples to one run. Leaving the context keeps the `.part` unless sealed.
 
     Args:
         names: in order, without the checksum, with `t_s` and `length_mm`.

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FinishedRun:
-    """A run that exists whole, such as a simulated one.
+    """A complete run, such as a simulated one.
 
     Attributes:
         columns: by name, each of shape (n,), in the columns' units.

@@ -144,7 +144,7 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
     """Yield faults of kept copies: damaged, missing, or unknown."""
     if (folder / SEALED).is_symlink():  # it may lead to a whole disk
         what = f"{SEALED} is a link: the copies of what was sealed are part of the session"
-        yield Problem(str(folder / SEALED), 0, 0, what, "put the folder itself there")
+        yield Problem(str(folder / SEALED), 0, 0, what, "put the folder itself there, not a link")
         return
     known = {copy_name(name, digest): digest for name, digest in seal.files.items()}
     known |= {one.former: one.former_sha256 for one in amendments if is_copy(one.former) and one.what != RUNS}
@@ -189,7 +189,7 @@ def link(before: str, run: RunEntry) -> str:
 
 
 def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
-    """Return runs with links added for new sealed ones, behind all that have one."""
+    """Return runs with chain links added for newly sealed runs, behind the earlier links."""
     done = [run for run in runs if run.chain_sha256]
     behind = runs.index(done[-1]) if done else -1
     kept = [run for run in runs if not (run.sha256 and not run.chain_sha256 and runs.index(run) < behind)]

@@ -28,7 +28,7 @@ Readings: TypeAlias = tuple[float | None, float | None, float | None]
 
 @dataclass(frozen=True)
 class SetUpReadings:
-    """A micrometer's readings at one mounting, in the file's unit to be written back unchanged.
+    """A micrometer's readings at one mounting, in the file's unit, so that they are written back unchanged.
 
     Attributes:
         mounting: None: that of the test's runs without a number.

@@ -68,7 +68,7 @@ class Beside:
 
     @property
     def place(self) -> complex:
-        """Return where it ends in the plane."""
+        """Return the place where the element ends in the plane."""
         return complex(*self.end[self.plane])
 
     def bent(self, place: complex) -> tuple[NDArray[np.float64], tuple[float, float, float, float]]:

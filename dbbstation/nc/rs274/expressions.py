@@ -28,7 +28,7 @@ DEEPEST = 50
 
 def _power(base: float, exponent: float) -> float:
     if base < 0.0 and exponent != int(exponent):
-        raise ValueError("a negative number to a broken power")
+        raise ValueError("a negative number to a fractional power")
     return float(base**exponent)
 
 

@@ -233,7 +233,7 @@ class Flow:
             BadLine: none runs.
         """
         if not self._frames or not self._frames[-1].by_number:
-            raise place.fault(1, "M99 in a main program repeats it for ever", "end it with M2 or M30")
+            raise place.fault(1, "M99 in a main program repeats the program endlessly", "end it with M2 or M30")
         self._leave(place)
 
     def _own(self) -> dict[int | str, float]:
@@ -271,7 +271,9 @@ class Flow:
         """Handle the program's number; a later one begins a subprogram, which runs only when called."""
         if word.rest:
             raise place.fault(
-                word.column + 1, "something behind the number of a program", "write it in a line of its own"
+                word.column + 1,
+                "there is more than the number of a program in this line",
+                "write it in a line of its own",
             )
         if self._begun:
             raise place.fault(1, f"the program runs into the subprogram O{word.label}", "end it with M2 or M30 before")
@@ -305,7 +307,7 @@ class Flow:
 
     def _leave(self, place: Place) -> None:
         if not self._frames:
-            raise place.fault(1, "the end of a subprogram that does not run", "remove it")
+            raise place.fault(1, "an end of a subprogram that was not called", "remove it")
         frame = self._frames[-1]
         if frame.again:
             frame.again -= 1

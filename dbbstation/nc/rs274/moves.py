@@ -75,7 +75,7 @@ class Moves(Modes):
 
     def _arc(self, block: ProgramBlock, target: NDArray[np.float64]) -> Arc:
         if self._left_contour:
-            raise block.place.fault(block.first_column, "an arc leads away from a contour (G40)", "leave it straight")
+            raise block.place.fault(block.first_column, "the move behind G40 is an arc", "leave it straight")
         arc = arc_of(
             block,
             self._state,
@@ -199,7 +199,7 @@ class Moves(Modes):
             raise self._unsure_feed
         if self._speed.mm_min <= 0.0:
             raise block.place.fault(
-                column, f"{name('G', self._motion or 0.0)} without a feed", "give F before or in it"
+                column, f"{name('G', self._motion or 0.0)} without a feed", "give F in this line or before"
             )
 
     def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> NDArray[np.float64]:
@@ -225,7 +225,7 @@ class Moves(Modes):
             or max((abs(value) for value in target[3:] if not math.isnan(value)), default=0.0) > FARTHEST_DEG
         ):
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
-            raise block.place.fault(block.first_column, what, "check its numbers, and G91 and G20 before it")
+            raise block.place.fault(block.first_column, what, "check the numbers, and whether G91 or G20 is in force")
         return np.array(target)
 
     def _cut_somewhere(self, block: ProgramBlock, unknown: list[str]) -> None:
@@ -250,7 +250,9 @@ class Moves(Modes):
         if partly and math.isnan(radius):
             raise unknown_place(block, ["X", "Y"])
         if partly and radius < LEAST_MM and (radius_word is not None or not self._absolute):
-            raise block.place.fault(block.first_column, "the origin has no angle (@, ^)", "write X and Y")
+            raise block.place.fault(
+                block.first_column, "polar coordinates (@, ^) from the origin need an angle", "write X and Y"
+            )
         if radius_word is not None:
             radius = radius_word.value * self._state.unit_mm + (0.0 if self._absolute else radius)
         if angle_word is not None:

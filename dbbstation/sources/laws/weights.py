@@ -45,9 +45,9 @@ def platform_masses(source: str, machine: Machine) -> Masses:
         raise ModelError(
             f"the error source {source} needs the platform's mass and centre of gravity, and the machine "
             f"{machine.name!r} has no `masses`",
-            remedy="add `masses: {platform_kg: ..., centre_of_gravity_above_tip_mm: ...}` to the machine file, "
-            "a weight off the drawing will do, as circles show its product with the compliance; or leave this source out: "
-            "the rest is fitted as before, and what gravity bends goes into joints that are wrong elsewhere",
+            remedy="add `masses: {platform_kg: ..., centre_of_gravity_above_tip_mm: ...}` to the machine file; "
+            "a weight from the drawing is enough, since circles determine its product with the compliance; or leave this source out, "
+            "and the fitted joints absorb gravity",
         )
     return machine.masses
 

@@ -145,7 +145,7 @@ def check_units(
         numbers = table.values[name][rows]
         if len(numbers) > 1 and float(np.ptp(numbers)) == 0.0:
             raise UnusableTravelError(
-                f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which no gauge reads",
+                f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which is impossible for a gauge",
                 "the column may hold nominal values: name another with --columns, or take the numbers as they are with --trust unit",
             )
         return

@@ -108,7 +108,7 @@ def check_span(theta_deg: Floats, stated_deg: float | None, circle: Circle) -> t
         path = "" if circle.overshoot_deg == 0.0 else f", with its overshoot {circle.swept_deg:g}"
         raise UnusableTravelError(
             f"the angles span {span:.0f} degrees, a turn of the plan has {FULL_TURN_DEG:g}{path}",
-            f"where that is right, say so: --angle-span-deg {span:.0f}; one turn of it counts. Else check plan and file",
+            f"if that is right, give --angle-span-deg {span:.0f}; one turn of it counts. Else check plan and file",
         )
     return (f"its angles span {span:.0f} degrees, as was confirmed: one turn of them counts",)
 

@@ -302,7 +302,7 @@ def test_no_currents_and_no_masses_are_refused_by_name(small):
     none = [replace(o, raw=replace(o.raw, logged={})) for o in recorded.observations]
     with pytest.raises(ModelError, match="drive-friction needs current, which is not given here"):
         calibrate(recorded.machine, none, sources())
-    with pytest.raises(CalibrationError, match=r"no motor has a current that could be used: motor 1: .* stands still"):
+    with pytest.raises(CalibrationError, match=r"no motor has a usable current: motor 1: .* stands still"):
         calibrate(recorded.machine, spoilt(recorded, lambda _, current: 0.0 * current), sources())
     bare = replace(recorded.machine, masses=None)
     with pytest.raises(ModelError, match=r"drive-friction needs .* has no `masses`"):

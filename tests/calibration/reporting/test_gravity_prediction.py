@@ -119,7 +119,7 @@ def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(machines):
     )
     for one, other in zip(predicted_circles(right, held_out), predicted_circles(heavy, held_out), strict=True):
         assert other.predicted_um == pytest.approx(one.predicted_um, abs=0.02)
-    with pytest.raises(ModelError, match=r"gravity needs .* a weight off the drawing will do"):
+    with pytest.raises(ModelError, match=r"gravity needs .* a weight from the drawing is enough"):
         calibrate(replace(seen.machine, masses=None), seen.observations, names)
 
 

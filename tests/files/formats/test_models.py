@@ -240,7 +240,7 @@ def test_a_model_is_read_by_its_path_alone_and_with_sources_of_ones_own(tmp_path
         read_model(path)
     with pytest.raises(InputError, match="strut-reference-length"):
         read_model(SMALL, {"scale-bow": bow})
-    with pytest.raises(ModelError, match="two of the error sources given are called scale-bow"):
+    with pytest.raises(ModelError, match="two of the given error sources are called scale-bow"):
         read_model(path, [bow, bow])
 
 

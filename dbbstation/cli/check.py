@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 def _anchor(text: str) -> str:
     if re.fullmatch(r"[0-9a-f]{16,64}", text.lower()):
         return text.lower()
-    raise ValueError("sixteen to sixty-four hex digits, as a report and `dbbstation check` show them")
+    raise ValueError(
+        "give sixteen to sixty-four hexadecimal digits, as printed by a report and `dbbstation check` show them"
+    )
 
 
 @made()
@@ -63,8 +65,7 @@ def check(
     r"""Validate machines, instruments, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
-    its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as
-    `dbbstation circles --findings` does without a model: what is wrong with one comes as a note.
+    its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as by `dbbstation circles --findings` without a model. Findings are printed as notes.
 
     Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
     is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.

@@ -1,4 +1,4 @@
-"""Commands made of tasks: options from the signature, then run, write and print, with one ending for all."""
+"""Commands made of tasks: options from the signature; then run, write and print."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class CommandOutput:
 
     @property
     def option(self) -> click.Parameter:
-        """Return it as click has it."""
+        """Return the click option of this parameter."""
         of = o.OUTPUTS[self.name]
         kind = "folder" if self.folder else "file"
         said = Option(of, kind=kind, metavar=self.metavar, parse=self.check, required=self.required)
@@ -247,7 +247,7 @@ _PATHS = {
 
 
 def option_of(one: TaskParameter) -> click.Parameter:
-    """Return a parameter as click has it."""
+    """Return the click option of a task's parameter."""
     option, kind = one.option, _kind_of(one)
     required = option.required or one.default is inspect.Parameter.empty
     if option.kind.startswith("argument"):

@@ -41,7 +41,7 @@ def emulate(
     wait: Annotated[
         bool,
         Option(
-            "Let machine time pass only in runs, as fast as samples are taken: for `measure --auto`, the same on any computer."
+            "Let machine time pass only during runs, as fast as samples are read. It serves `measure --auto`, the same on any computer."
         ),
     ] = False,
     noise_um: Annotated[float, Option("Standard deviation of the noise of a reading [µm].", least=0.0)] = 0.3,
@@ -79,7 +79,7 @@ def emulate(
         say(f"note: sends {sent_hz:g} readings a second, {chosen.instrument} has {usual_hz:g}")
     if protocol.voice("fault") is None:
         say(
-            f"note: {chosen.instrument} has no frame for a missing bar: it is silent until `mount` or `start` puts a ball up"
+            f"note: {chosen.instrument} has no frame for a missing bar: it sends nothing until `mount` or `start` puts a ball up"
         )
     model = _truth(read_machine(machine), truth, source_files, seed)
     virtual = VirtualMachine(model, read_plan(plan), seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))

@@ -63,7 +63,7 @@ def import_(
     trust: Annotated[
         tuple[Literal["unit", "centre"], ...],
         Option(
-            "Take numbers that do not look like their unit, or circles that look centred, as they are; the session notes that.",
+            "Accept numbers that seem to have another unit, or circles that seem centred. The session notes it.",
             whole=True,
         ),
     ] = (),
@@ -192,7 +192,7 @@ def _read(
 
 def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
     if not yes and not asker.terminal:
-        raise click.UsageError("nothing was written: give --yes to write what is shown, or --dry-run to look only")
+        raise click.UsageError("nothing was written: give --yes to write the session, or --dry-run to show it only")
     if not yes:
         click.confirm(printable(question), abort=True, err=True)
 

@@ -152,7 +152,7 @@ def sheet(
     if lost:
         echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
     if cmm_temp_c is None:
-        echo("the file does not say how warm the plate was on the CMM: give --cmm-temp-c")
+        echo("the file lacks the plate's temperature on the CMM: give --cmm-temp-c")
     echo_line(f"{len(balls)} balls written to {out}")
 
 
@@ -164,7 +164,7 @@ def holders(
     cmm_repeatability_um: Annotated[
         float,
         Option(
-            "Standard deviation of what the CMM reads of a ball that stays; its variance is taken off.",
+            "Standard deviation of CMM readings of an untouched ball; its variance is subtracted.",
             least=0.0,
             most=100.0,
         ),
@@ -174,10 +174,9 @@ def holders(
     force: o.Force = False,
     as_json: o.Json = False,
 ) -> None:
-    r"""Find how well holders put their ball back, from centres over repeated mountings [CAL III-B].
+    r"""Compute how well holders reproduce the ball's position, from repeated mountings [CAL III-B].
 
-    One row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual. Deviations from the mean of
-    each place count. The standard deviation per axis, with its chi-square interval, is what a jig file calls `repeatability_um`.
+    One row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual. The scatter is about the mean of each place. The standard deviation per axis, with its chi-square interval, is what a jig file calls `repeatability_um`.
 
     \b
     Examples:
@@ -192,7 +191,7 @@ def holders(
 
     if (before is None) != (out is None):
         raise click.UsageError(
-            "--before and --out belong together: the holders of one get the result, the other is written"
+            "give --before and --out together: the new file is the old one with the result in its holders"
         )
     if out is not None:
         refuse_existing_table(out, force=force)

@@ -56,15 +56,15 @@ class MappingOptions(AsWritten):
         ),
     ] = ()
     angle_zero_deg: Annotated[
-        float | None, Option("Machine's angle, from +X to +Y, at the files' 0.", least=-720.0, most=720.0)
+        float | None, Option("Angle of the machine, from +X to +Y, at angle 0 of the files.", least=-720.0, most=720.0)
     ] = None
     angle_grows: Annotated[
-        Literal["ccw", "cw", "travel"] | None, Option("Sense in which the files' angles grow, seen from +Z.")
+        Literal["ccw", "cw", "travel"] | None, Option("Direction in which the files' angles increase, seen from +Z.")
     ] = None
     angle_span_deg: Annotated[
         float | None,
         Option(
-            "Span of a run's angles, if it is neither a turn nor the plan's path; one turn of it counts.",
+            "Span of a run's angles, if it is neither one turn nor the plan's path. One turn of it is used.",
             least=300.0,
             most=3600.0,
         ),
@@ -87,7 +87,7 @@ class MappingOptions(AsWritten):
         float | None, Option("Length of the bar at which the deviation is 0 [mm].", least=20.0, most=2000.0)
     ] = None
     file_name: Annotated[
-        str | None, Option("Pattern of file names, such as '{test}_{direction}'.", metavar="PATTERN")
+        str | None, Option("Pattern that file names follow, such as '{test}_{direction}'.", metavar="PATTERN")
     ] = None
 
     @property

@@ -48,7 +48,9 @@ def measure(
         str | None,
         Option("Start each circle at this control address of `instrument emulate`, accept every run.", metavar="URL"),
     ] = None,
-    time_scale: Annotated[float, Option("The same factor as of `instrument emulate`.", least=0.01, most=200.0)] = 1.0,
+    time_scale: Annotated[
+        float, Option("The factor that was given to `instrument emulate`.", least=0.01, most=200.0)
+    ] = 1.0,
     rate_hz: RateHz = None,
     as_json: o.Json = False,
 ) -> None:
@@ -124,7 +126,7 @@ def measure(
     ):
         workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
         if workplace.writer.runs and job.details.noted:
-            echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
+            echo("note: the session exists and keeps its operator, bar and other notes", err=True)
         interrupted = _run(workplace, hands, as_json=as_json)
     if interrupted:
         raise click.Abort

@@ -33,7 +33,7 @@ class SessionOptions:
     bar_length_mm: Annotated[
         float | None,
         Option(
-            "Calibrated distance between the ball centres [mm]; held against the plan's radii, never added to readings.",
+            "Calibrated distance between the ball centres [mm], compared with the plan's radii, never added to readings.",
             setting="bar.calibrated_length_mm",
         ),
     ] = None
@@ -45,7 +45,7 @@ class SessionOptions:
         float | None, Option("Temperature of the bar at its calibration [degC].", setting="bar.temp_c")
     ] = None
     bar: Annotated[Path | None, Option("Calibration of the bar, from `dbbstation bar`.")] = None
-    bar_waiver: Annotated[str, Option("Why it is measured without a fresh calibration of the bar.")] = ""
+    bar_waiver: Annotated[str, Option("Reason for measuring without a fresh calibration of the bar.")] = ""
 
     def details(self, stroke_mm: float | None = None) -> SessionDetails:
         """Return what a session notes.
@@ -66,7 +66,7 @@ class SessionOptions:
             from dbbstation.files.formats.bar import read_bar
 
             if self.of_bar:
-                raise click.UsageError("--bar says everything of the bar: leave out --bar-length-mm and the like")
+                raise click.UsageError("--bar has all facts of the bar: leave out --bar-length-mm and similar options")
             bar = read_bar(self.bar).to_bar(stroke_mm)
         return SessionDetails(
             self.serial_number.strip(),
@@ -140,7 +140,7 @@ class RecordingOptions(SessionOptions):
     order: Annotated[
         Literal["plan", "holder", "drift"],
         Option(
-            "As the plan has its tests; by holder and ball, each put up once; or heights in turn, apart from drift."
+            "Order of tests: as in the plan; by holder, so that each ball is put up once; or heights in turn, against drift."
         ),
     ] = "plan"
     gate: Annotated[

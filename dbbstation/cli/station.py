@@ -75,7 +75,9 @@ def station(
     """
     if noted.job.endswith((".yaml", ".yml")):
         if virtual or any(given is not None for given in (plan, machine, out)):
-            raise click.UsageError("a job says what is measured: leave out --plan, --machine, --out and --virtual")
+            raise click.UsageError(
+                "the job file states what is measured: leave out --plan, --machine, --out and --virtual"
+            )
         _check_terminal()
         return _operate(Path(noted.job), noted.judging_model())
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
@@ -169,7 +171,7 @@ def _check_options(
     if not virtual and missing:
         raise click.UsageError(f"missing {', '.join(missing)}; or --virtual, to try it without hardware")
     if not virtual and time_scale != 1.0:
-        raise click.UsageError("--time-scale goes with --virtual: real machines take their time")
+        raise click.UsageError("--time-scale goes with --virtual: a real machine has its own speed")
 
 
 def _check_terminal() -> None:

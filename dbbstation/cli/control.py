@@ -73,7 +73,7 @@ def kinematics(
 ) -> None:
     r"""Write a LinuxCNC kinematics component that takes the real machine to the commanded pose.
 
-    It holds every source that depends on pose, strut length or thermometers. A source that depends on the way so far, such as
+    The component contains every source that depends on pose, strut length or thermometers. A source that depends on the way so far, such as
     play, is refused by name; --leave-out leaves it uncorrected.
 
     \b

@@ -41,7 +41,7 @@ def emulate(
     wait: Annotated[
         bool,
         Option(
-            "Let machine time pass only during runs, as fast as samples are read. It serves `measure --auto`, the same on any computer."
+            "Let machine time pass only during runs, as fast as samples are read, for `measure --auto`, the same on any computer."
         ),
     ] = False,
     noise_um: Annotated[float, Option("Standard deviation of the noise of a reading [µm].", least=0.0)] = 0.3,

@@ -64,7 +64,7 @@ class MappingOptions(AsWritten):
     angle_span_deg: Annotated[
         float | None,
         Option(
-            "Span of a run's angles, if it is neither one turn nor the plan's path. One turn of it is used.",
+            "Span of a run's angles, if it is neither one turn nor the plan's path; one turn is used.",
             least=300.0,
             most=3600.0,
         ),

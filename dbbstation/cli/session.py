@@ -199,7 +199,7 @@ def seal(
 ) -> None:
     r"""Seal a session that was recorded elsewhere.
 
-    A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
+    A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. Everything else in the file stays as it is. Copies of machine, plan and jig go into the folder
     `sealed`. Every command then notices a changed recording or plan, and a removed or exchanged run.
 
     \b

@@ -146,7 +146,7 @@ def test_bad_words_and_tables_of_mountings_are_answered(run, tmp_path):
     table = tmp_path / "m.csv"
     table.write_text("bore,x,y,z\n9,0,0,0\n4,1,1,1\n", encoding="utf-8")
     assert "which holder" in run("jig", "holders", table).err
-    assert "no place has two mountings" in run("jig", "holders", table, "--holder", "short").err
+    assert "each place has one mounting only" in run("jig", "holders", table, "--holder", "short").err
     assert run("jig", "holders", table, "--holder", "short", "--before", PLATE).code == USAGE
     assert run("jig", "holders", table, "--columns", "colour=x").code == USAGE
     table.write_text("bore,x,y,z\n9,0,0,0\n9,1e-3,0,0\n", encoding="utf-8")

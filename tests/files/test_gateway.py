@@ -156,7 +156,7 @@ def test_a_file_that_grows_while_it_is_read_is_counted(tmp_path):
     path.write_bytes(b"x" * 10)
     with opened(path, largest=20) as source:
         path.write_bytes(b"x" * 30)
-        with pytest.raises(TooLargeError, match="goes on beyond 20 bytes"):
+        with pytest.raises(TooLargeError, match="is longer than 20 bytes"):
             source.content()
     with pytest.raises(TooLargeError, match="has 30 bytes, at most 20 are read"):
         content_of(path, 20)

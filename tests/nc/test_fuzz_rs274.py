@@ -36,7 +36,7 @@ ONLY_BY_US = {
     "code that is not read": r"[GM][\d.]+ is not read",
     "word that is not read": "words with the letter|is not read",
     "P wanted twice": "both take P",
-    "polar coordinates": "polar coordinates|the origin has no angle",
+    "polar coordinates": "polar coordinates|from the origin need an angle",
     "skipped line": "a switch of the control skips",
     "value of the control": "is read before the program sets it|the diameter of tool",
     "word that does nothing": "nothing in this line uses",

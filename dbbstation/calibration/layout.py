@@ -94,7 +94,7 @@ class Layout:
 
     @property
     def bounded(self) -> NDArray[np.bool_]:
-        """Return which columns tolerances bound, shape (k,)."""
+        """Return whether a tolerance bounds each column, shape (k,)."""
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 
     def formula_variance(self, x: Floats) -> Floats:

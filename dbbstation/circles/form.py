@@ -80,8 +80,7 @@ alone, as what noise leaves in the form would be counted twice."""
 def _sharp(quick_um: Floats, low: int) -> Floats:
     """Return short local form, such as a reversal spike, shape (n,).
 
-    A Gaussian filter of four times the low undulations is applied; exceedances of even noise are form. Medians of three
-    exclude single readings.
+    A Gaussian filter of four times the low undulations is applied; exceedances of even noise are form. Medians of three readings suppress single outliers.
     """
     count = len(quick_um)
     passed = np.exp2(-((np.arange(count // 2 + 1.0) / (4.0 * low)) ** 2))

@@ -56,7 +56,7 @@ class Harmonic:
 
 
 def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: float) -> ReversalStep | None:
-    """Return the step at a place by lines on both sides; None for few samples or at the turn's ends, where it is closure.
+    """Return the step at a place by lines on both sides; None with few samples, or at the turn's ends, whose step is the closure.
 
     Args:
         deviation_um: shape (n,).

@@ -67,8 +67,7 @@ def check(
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
     its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as by `dbbstation circles --findings` without a model. Findings are printed as notes.
 
-    Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
-    is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
+    Given plans and one machine, the command also makes a dry run: it checks the whole path of every program that `dbbstation program` would write against travel and feeds, and lists all faults.
 
     The summary of a session ends with its anchor, the link of the last event of its log. Note it elsewhere, as reports do: with
     --anchor HASH, sixteen digits or more of it, the command reports later changes.

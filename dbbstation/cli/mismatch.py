@@ -99,8 +99,8 @@ def _print(result: MismatchResult) -> None:
     if held_out:
         echo(
             f"\nheld-out error: {held_out.as_simulated:.3g} as simulated, {held_out.before:.3g} refitted, "
-            f"{held_out.after:.3g} {unit} rms corrected; over {len(held_out.folds)} parts, everything chosen anew "
-            "without each of them"
+            f"{held_out.after:.3g} {unit} rms corrected; over {len(held_out.folds)} parts, each predicted by a "
+            "choice without it"
         )
     elif any(f.verdict == "identified" for f in there):
         echo("\nno parts were held out: predictions of the identified causes were not tested.")

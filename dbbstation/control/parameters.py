@@ -191,7 +191,7 @@ def _typed(own: MachineModel, points: Floats) -> Values:
 
 @dataclass(frozen=True, eq=False)
 class _AtLengths(Motion):
-    """Rows that are known by their strut lengths alone, shape (n, 6)."""
+    """Rows of which only the strut lengths are known, shape (n, 6)."""
 
     length_mm: Floats = field(default_factory=lambda: np.zeros((0, STRUTS)))
 

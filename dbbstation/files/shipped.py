@@ -17,7 +17,7 @@ def shipped_folder(name: str) -> Path:
     for folder in (package / name, package.parent / name):
         if folder.is_dir():
             return folder
-    raise InputError.of(package / name, "this folder of the installation is missing", "install dbbstation again")
+    raise InputError.of(package / name, "this folder is missing in the installation", "install dbbstation again")
 
 
 def package_text(name: str) -> str:

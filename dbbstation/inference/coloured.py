@@ -125,7 +125,7 @@ class Coloured:
         return self.sigma * float(np.sqrt(self._predictors[1][-1]))
 
     def with_innovation(self, innovation: float) -> Coloured:
-        """Return the noise scaled to an innovation."""
+        """Return the noise with another standard deviation of its innovations."""
         return replace(self, sigma=innovation / float(np.sqrt(self._predictors[1][-1])))
 
     @cached_property

@@ -195,7 +195,7 @@ def taken(base: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def solved(rest: NDArray[np.float64], of_base: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return explained squares from (m, p, d), `taken` and (m, p, p, d, d)."""
+    """Return squares that columns explain, from (m, p, d), `taken` and (m, p, p, d, d)."""
     many, size = len(rest), rest.shape[1] * rest.shape[2]
     normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)
     right = rest.reshape(many, size, 1)

@@ -6,7 +6,7 @@
            0.000000 > 02
            0.070721 < 2b 20 20 31 35 30 2e 30 30 30 33 20 20 20 20 0d 0a  | +  150.0003    ..
 
-Times are seconds since the log was opened; `>` went to the device, `<` came from it; what follows the bar is for people.
+Times are in seconds since the log was opened: `>` went to the device, `<` came from it; the text behind the bar is for people.
 """
 
 from __future__ import annotations
@@ -153,5 +153,5 @@ def _lines(path: Path) -> Generator[tuple[int, str]]:
     except OSError as error:
         raise InputError([unreadable(path, error)]) from error
     except UnicodeDecodeError:
-        raise InputError.of(path, "not UTF-8 text, so no byte log", line=number) from None
+        raise InputError.of(path, "not a byte log: not UTF-8 text", line=number) from None
     raise InputError.of(path, f"not a byte log: the first line is not {_HEAD!r}", line=1, column=1)

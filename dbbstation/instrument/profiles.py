@@ -91,7 +91,7 @@ class Profile(Schema):
 
 
 class ProtocolFile(Protocol):
-    """A protocol file: the protocol of the usual variant, named by `profile`, and the others."""
+    """A protocol file with all variants; `profile` names the usual one."""
 
     profiles: dict[Name, Profile] = Field(default_factory=dict)
 

@@ -297,7 +297,7 @@ class Protocol(Schema):
 
     @property
     def is_text(self) -> bool:
-        """Whether all that comes is text."""
+        """Return whether all frames are text."""
         return not any(frame.binary for frame in self.frames)
 
     def voice(self, status: Status) -> tuple[Frame, Code | Bit | None] | None:

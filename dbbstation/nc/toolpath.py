@@ -259,7 +259,7 @@ class Toolpath:
         return np.where(share[:, None] == 1.0, after, inside)
 
     def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Return rows and shares, shapes (k,), in pieces no longer than these steps."""
+        """Divide rows into pieces no longer than the steps; return row and share of each end, shapes (k,)."""
         return in_pieces(self.pieces(step_mm, step_deg))
 
     def pieces(self, step_mm: float, step_deg: float) -> NDArray[np.int64]:

@@ -97,7 +97,7 @@ def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
 def _shared(own_mm: Floats, other_mm: Floats, row: int) -> int:
     """Return the number of readings in common stretches.
 
-    Blocks of half the length that chance allows suffice, because a common stretch contains a whole one.
+    Blocks have half the length that chance allows, so that every longer common stretch contains a whole block.
     """
     block = (row + 1) // 2
     if min(len(own_mm), len(other_mm)) < row:

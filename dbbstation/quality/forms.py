@@ -1,7 +1,7 @@
 """Forms of runs that share causes, as one normal variable; a further run adds only its own rows.
 
 The covariance of forms is the sum of machine causes, causes shared by several runs, and each run's own. For each size
-of machine errors, a matrix whitens all forms. A further run adds rows to it, as to a Cholesky factor [Golub and Van
+of machine errors, a matrix whitens all forms. A further run adds rows to this matrix, as to a Cholesky factor [Golub and Van
 Loan, Matrix Computations, 4.2]. Runs are left out by a projection [Rasmussen and Williams, Gaussian Processes for
 Machine Learning (2006), section 5.4.2].
 """

@@ -1,4 +1,4 @@
-"""One panel of a figure, asked for."""
+"""One panel of a figure."""
 
 from __future__ import annotations
 

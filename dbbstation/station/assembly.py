@@ -90,7 +90,7 @@ class Job:
         free = free_bytes(self.folder)
         if free is not None and free < needed:
             what = f"the disk has {free / 1e6:.0f} MB free, the session needs {needed / 1e6:.0f} MB"
-            raise InputError.of(self.folder, what, "free some, or choose another folder")
+            raise InputError.of(self.folder, what, "free some, or use another folder")
 
 
 BYTES_PER_READING = 100

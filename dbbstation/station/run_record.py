@@ -113,7 +113,7 @@ class RunRecord:
     def stands(self, sample: Sample) -> bool:
         """Add a sample on the turn and return whether the gauge fails to follow the machine.
 
-        The length is then constant despite noise, or despite a due feed-out.
+        A stuck gauge gives a constant length where noise, or the due feed-out, would change it.
         """
         if self.fed_in_s is None or sample.phi_deg is None or sample.length_mm is None or sample.status != OK:
             return False

@@ -54,7 +54,7 @@ def program(
     are written or none. A program goes above its first point and comes down to it. The program waits for the bar to be put
     on, runs the path of a run and waits for the bar to be taken off.
 
-    With --model programs are compensated. Their points are as far apart as the control needs for the feed, within --chord-um. If that is not
+    With --model programs are compensated. The distance of points is what the control needs to keep the feed, within --chord-um. If that is not
     far enough, the output states about how much slower the control is. --strict refuses the program instead.
 
     \b

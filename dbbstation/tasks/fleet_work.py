@@ -105,7 +105,7 @@ def _refuse_other_inputs(inputs: Mapping[str, str]) -> None:
     for path, digest in inputs.items():
         if digest_of(Path(path)) != digest:
             what = "this file is another one where the work is done, or was changed since"
-            raise InputError.of(path, what, "let all computers see one folder, under one path")
+            raise InputError.of(path, what, "share one folder with all computers, under one path")
 
 
 Done = tuple[FleetFound, "dict[str, object]", "dict[str, bytes]"]

@@ -85,7 +85,7 @@ def current_channel(layout: Layout, observations: Sequence[Observation]) -> Curr
         notes.insert(0, f"{missing} of {len(observations)} runs have no motor currents: their circles count alone")
     if not any((np.count_nonzero(rows, axis=0) >= FEWEST).any() for rows in usable):
         raise CalibrationError(
-            "no motor has a current that could be used: " + "; ".join(notes),
+            "no motor has a usable current: " + "; ".join(notes),
             remedy="check how currents are logged, or leave drive-friction out and calibrate from circles",
         )
     return CurrentChannel(motions, current, usable, tuple(notes))
@@ -110,7 +110,7 @@ def current_blocks(layout: Layout, channel: CurrentChannel | None, x: Floats) ->
 def linearised(
     layout: Layout, channel: CurrentChannel, x: Floats
 ) -> tuple[list[tuple[int, Block]], list[list[Floats]]]:
-    """Return blocks with motors, and each motor's residual per run [A]."""
+    """Return information blocks of the motors, and each motor's residual per run [A]."""
     model = layout.model(x)
     whole = x - layout.nominal
 
@@ -178,7 +178,7 @@ def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, F
 def by_themselves(
     blocks: Sequence[Block], known: Columns, noise: float = 1.0, nominal: Sequence[Block] | None = None
 ) -> tuple[NDArray[np.int64], Solution]:
-    """Solve for columns that some blocks touch, by these alone."""
+    """Solve for the columns of some blocks, from these blocks alone."""
     columns = np.unique(np.concatenate([block.columns for block in blocks]))
     part = Columns(known.prior[columns], known.scale[columns], known.random[columns])
 

@@ -79,7 +79,7 @@ def in_words(layout: Layout, held: Floats) -> tuple[str, ...]:
 
 
 def of_circles(layout: Layout, held: Floats) -> Floats:
-    """Return directions without parts in motor currents, shape (g, f); purely electrical ones go."""
+    """Return directions without their parts in motor currents, shape (g, f), and drop purely electrical ones."""
     fitted = np.flatnonzero(~layout.known.random)
     drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
     if not drives or len(held) == 0:

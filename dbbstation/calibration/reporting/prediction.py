@@ -74,7 +74,7 @@ def smooth_circularity_um(raw: RawCircle, length_mm: Floats) -> float:
 
 
 def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[Floats]) -> list[float]:
-    """Return the same of several lengths, each of shape (n,) [mm] [µm]."""
+    """Return G of several series of lengths, each of shape (n,) [mm], in µm."""
     return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
 
 

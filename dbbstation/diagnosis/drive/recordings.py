@@ -120,7 +120,7 @@ class Recordings:
         return float(np.median(np.diff(one.kept))) / one.rate_hz
 
     def step_response(self, since: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the band's step response by samples since it."""
+        """Return the band's step response by samples since the step."""
         return np.interp(since * self.samples_apart_s, *self._response)
 
     @cached_property

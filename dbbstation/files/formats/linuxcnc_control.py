@@ -21,7 +21,11 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
         match = _PARAMETER.fullmatch(line)
         if match is None and line.strip():
             raise InputError.of(
-                file, "no line of a parameter file", "it needs a number and its value", line=number, column=1
+                file,
+                "this is not a line of a parameter file",
+                "a line needs a number and its value",
+                line=number,
+                column=1,
             )
         if match is not None:
             found[int(match[1])] = float(match[2])
@@ -44,7 +48,11 @@ def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
             continue
         if "T" not in words or _TOOL_WORD.sub("", said).strip():
             raise InputError.of(
-                file, "no line of a tool table", "it needs T and words such as Z52.1", line=number, column=1
+                file,
+                "this is not a line of a tool table",
+                "a line needs T and words such as Z52.1",
+                line=number,
+                column=1,
             )
         found[int(words["T"])] = words
     if not found:

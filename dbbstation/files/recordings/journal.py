@@ -58,7 +58,7 @@ def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str
 def run_foot(counts: Counts) -> bytes:
     """Return the last lines of a sealed run file, with its counts.
 
-    A file without them was interrupted.
+    A run file without these lines was interrupted.
     """
     lines = [f"# received: {counts.received}", f"# lost: {counts.lost}"]
     lines += [f"# rejected {reason}: {count}" for reason, count in counts.rejected.items()]

@@ -145,7 +145,7 @@ def _whole(pieces: Iterable[Lines]) -> Lines | None:
 
 
 def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[Lines]:
-    """Split a run file in pieces; nothing, with the reason in `faults`, without a header.
+    """Split a run file in pieces. A file without header gives no piece and a reason in `faults`.
 
     All pieces share one header, complete after the last piece.
     """

@@ -60,7 +60,7 @@ class BarDrift(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=BarDrift):
-    """The same part, heated through another one."""
+    """The growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=BarDrift):

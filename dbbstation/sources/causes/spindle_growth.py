@@ -81,7 +81,7 @@ class SpindleGrowth(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=SpindleGrowth):
-    """The same part, heated through another one."""
+    """The growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):

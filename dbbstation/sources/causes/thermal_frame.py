@@ -67,7 +67,7 @@ class ThermalFrame(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=ThermalFrame):
-    """The same part, heated through another one."""
+    """The growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=ThermalFrame):

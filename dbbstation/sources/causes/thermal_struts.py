@@ -71,7 +71,7 @@ class ThermalStruts(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=ThermalStruts):
-    """The same part, heated through another one."""
+    """The growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=ThermalStruts):

@@ -92,7 +92,7 @@ def test_a_helix_moves_the_other_axes_evenly():
     [
         ("G43 H1", 5, "the length of tool 1 is not known"),
         ("G1 X1 F100 M66", 12, "M66 is not read"),
-        ("G1 X1 E2 F100", 7, "letter E"),
+        ("G1 X1 E2 F100", 7, "nothing in this line uses E2"),
         ("G1 X1 X2 F100", 7, "a second X"),
         ("G1 X F100", 4, "the letter X has no number"),
         ("G1 X#5 F100", 5, "#5 is read before the program sets it"),
@@ -196,6 +196,12 @@ def test_moves_at_feed_before_the_first_place_and_an_end_by_a_rapid_are_stated(l
     for cut_short in (GRBL.removesuffix("G0 Z-990\n"), GRBL.replace("G0 X0 Y0", "G0 X0")):
         with pytest.raises(InputError):
             linuxcnc.toolpath(cut_short, "part.ngc", start=declared)
+
+
+def test_a_long_dwell_and_a_dwell_by_x_are_read_in_seconds():
+    path = read_program(f"{FIRST}G4 X1.5\nG4 P500\nG1 X1 F10\nM2\n", "part.ngc")
+    assert path.dwell_s[path.dwell_s > 0.0].tolist() == [1.5, 500.0]
+    assert path.notes == ("line 4 waits 500 s: LinuxCNC counts seconds, some controls milliseconds",)
 
 
 def test_a_feed_in_the_line_of_its_units_counts_only_if_a_cut_uses_it():

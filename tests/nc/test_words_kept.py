@@ -41,6 +41,7 @@ def written(linuxcnc, text: str) -> list[str]:
         "G59.3",
         "M7",
         "M62 P1",
+        "M67 E0 Q-1.5",
         "M101",
         "M199 P1.5 Q-2",
         "M30",

@@ -62,7 +62,7 @@ def arc_of(
     else:
         centre += np.array(state.offset)[axes]
     arc = Arc(start, target, (float(centre[0]), float(centre[1])), clockwise=clockwise, turns=turns, plane=plane)
-    if not arc.is_round():
+    if not arc.is_round(state.unit_mm):
         first, last = arc.radii_mm()
         what = f"start and end of the arc lie {first:.4f} and {last:.4f} mm from its centre"
         raise block.place.fault(column, what, "check end point and centre")

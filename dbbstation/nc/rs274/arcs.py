@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 CHORD_ERROR_MM = 5e-5
 """How far a chord may lie inside its arc: 0.05 µm, which is 3800 chords for a full turn of 150 mm."""
 
-RADIUS_ABSOLUTE_MM, RADIUS_RELATIVE, RADIUS_WORST = 0.02 * math.sqrt(2.0), 1e-3, 100.0
-"""Radii to start and end of an arc may differ: by less than the first, or by less than the second share of the radius
-while below the first times the third. Such an arc is a spiral. [LinuxCNC's own limits]"""
+RADIUS_ABSOLUTE_MM = {1.0: 0.02 * math.sqrt(2.0), 25.4: 0.0508 * math.sqrt(2.0)}
+RADIUS_RELATIVE, RADIUS_WORST = 1e-3, 100.0
+"""Radii to start and end of an arc may differ: by less than the first, in the unit of the program, or by less than the second share of
+the radius while below the first times the third. Such an arc is a spiral. [LinuxCNC's own limits]"""
 
 LEAST_RADIUS_MM = 0.00127
 """Arcs of a smaller radius are none. [LinuxCNC's own limit, RADIUS_TOLERANCE]"""
@@ -57,13 +58,13 @@ class Arc:
         ends = (math.hypot(pose[first] - x, pose[second] - y) for pose in (self.start, self.end))
         return next(ends), next(ends)
 
-    def is_round(self) -> bool:
+    def is_round(self, unit_mm: float) -> bool:
         """Return whether both ends lie on one circle within LinuxCNC's tolerance."""
         first, last = self.radii_mm()
-        off, radius = abs(first - last), max(first, last)
-        if min(first, last) < LEAST_RADIUS_MM or off > RADIUS_ABSOLUTE_MM * RADIUS_WORST:
+        off, radius, allowed_mm = abs(first - last), max(first, last), RADIUS_ABSOLUTE_MM[unit_mm]
+        if min(first, last) < LEAST_RADIUS_MM or off > allowed_mm * RADIUS_WORST:
             return False
-        return off <= RADIUS_ABSOLUTE_MM or off <= RADIUS_RELATIVE * radius
+        return off <= allowed_mm or off <= RADIUS_RELATIVE * radius
 
     @property
     def swept_rad(self) -> float:

@@ -36,7 +36,10 @@ class ModalGroup(StrEnum):
     OUTPUT = "output, or function of one's own"
 
 
-CYCLES = (73, 81, 82, 83, 85, 86, 89)
+TAPS = {74.0: "M4", 84.0: "M3"}
+"""Tapping cycles, and how the spindle turns before them."""
+
+CYCLES = (73, *TAPS, 81, 82, 83, 85, 86, 89)
 
 G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((0, 1, 2, 3, *CYCLES), ModalGroup.MOTION),
@@ -47,8 +50,8 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((43, 43.4, 49), ModalGroup.TOOL_LENGTH),
     **{float(name[1:]): ModalGroup.OFFSET for name in SYSTEMS},
     **dict.fromkeys((61, 61.1, 64), ModalGroup.PATH),
-    **dict.fromkeys((8, 15, 50, 50.1, 69), ModalGroup.NOTHING),
-    **dict.fromkeys((5, 5.1, 187), ModalGroup.SMOOTHING),
+    **dict.fromkeys((15, 50, 50.1, 69), ModalGroup.NOTHING),
+    **dict.fromkeys((5, 5.1, 8, 103, 187), ModalGroup.SMOOTHING),
     80: ModalGroup.CYCLE_END,
     **dict.fromkeys((90, 91), ModalGroup.DISTANCE),
     **dict.fromkeys((90.1, 91.1), ModalGroup.ARC_DISTANCE),
@@ -65,7 +68,7 @@ M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
     **dict.fromkeys((98, 99), ModalGroup.CALL),
     **dict.fromkeys((70, 71, 72, 73), ModalGroup.STATE),
-    **dict.fromkeys((62, 63, 64, 65, *range(100, 200)), ModalGroup.OUTPUT),
+    **dict.fromkeys((62, 63, 64, 65, 67, 68, *range(100, 198), 199), ModalGroup.OUTPUT),
 }
 
 STORED: dict[ModalGroup, str] = {
@@ -81,7 +84,7 @@ STORED: dict[ModalGroup, str] = {
 }
 """Groups that M70 to M73 store, in the order in which they come back, and what a program begins with; empty: not known."""
 
-LETTERS = frozenset("ABCDFGHIJKLMNPQRSTXYZ@^")
+LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTXYZ@^")
 
 CURVES = "post curves as lines or arcs"
 _TURNED = "post the program without rotation: the model is not turned with it"
@@ -89,13 +92,14 @@ _SPINDLE = "motion that follows the spindle has no path in time: run it without 
 _REMEDIES: dict[float, str] = {
     **dict.fromkeys((43.1, 43.2, 43.5), "post the program with G43 and H"),
     **dict.fromkeys((5.2, 5.3, 6.2), CURVES),
-    **dict.fromkeys((32, 33, 33.1, 74, 76, 84, 95, 96), _SPINDLE),
+    **dict.fromkeys((32, 33, 33.1, 76, 84.2, 84.3, 95, 96), _SPINDLE),
     **dict.fromkeys(
         (31, 38, 38.2, 38.3, 38.4, 38.5), "where probing ends is not known before: run it without compensation"
     ),
     **dict.fromkeys((28.1, 30.1), "set reference points by hand, not in the program"),
     **dict.fromkeys((51, 51.1, 68, 68.2), _TURNED),
-    7: "post the program with radii (G8)",
+    7: "post the program with radii",
+    **dict.fromkeys((54.1, 154), "post the program with G54 to G59.3"),
     **dict.fromkeys(
         (70, 71), "it is inch or millimetre on some controls, a cycle of lathes on others: write G20 or G21"
     ),

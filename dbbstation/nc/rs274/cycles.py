@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dbbstation.nc.rs274.codes import name
+from dbbstation.nc.rs274.codes import TAPS, name
 from dbbstation.nc.rs274.state import AXES, unknown_place
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class Step(NamedTuple):
     """A part of a cycle.
 
     Attributes:
-        what: `rapid` or `feed` to a depth, `dwell`, `stop` of the spindle, `turn` it again.
+        what: `rapid` or `feed` to a depth, `dwell`, or words of the spindle: `M5`, `M3`, `M4`, `M48`, `M49`.
         depth: along the axis of the cycle, in machine coordinates [mm].
     """
 
@@ -57,12 +57,13 @@ class ModalCycle:
     Attributes:
         numbers: Z, R and Q [mm] and P [s].
         begun_at: Z before the first of successive cycles, in machine coordinates [mm]; NaN if not known.
+        dwell_s: P of the last cycle that had one: a tapping cycle without P has it [LinuxCNC].
         to_clear: whether they end at R (G99); None: neither G98 nor G99 was read.
     """
 
     def __init__(self) -> None:
         self.numbers: dict[str, float] = {}
-        self.begun_at = math.nan
+        self.begun_at, self.dwell_s = math.nan, 0.0
         self.to_clear: bool | None = None
 
     def depths(self, code: float, block: ProgramBlock, state: ControlState, column: int, *, absolute: bool) -> Depths:
@@ -78,6 +79,7 @@ class ModalCycle:
         for letter, scale in (("Z", unit), ("R", unit), ("Q", unit), ("P", 1.0)):
             if letter in block.words:
                 numbers[letter] = scale * block.words.pop(letter).value
+        self.dwell_s = numbers.get("P", self.dwell_s)
         lacking = {"Z", "R", *(["Q"] if code in PECKS else [])} - numbers.keys()
         if lacking:
             what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
@@ -98,8 +100,13 @@ class ModalCycle:
         return Depths(clear, bottom, clear if self.to_clear else max(up, clear), numbers.get("Q", 0.0))
 
 
-def cycle_steps(code: float, depths: Depths) -> Iterator[Step]:
-    """Yield the steps of a cycle from the clear plane on."""
+def cycle_steps(code: float, depths: Depths, turning: str) -> Iterator[Step]:
+    """Yield the steps of a cycle from the clear plane on; `turning` is M3, M4 or empty."""
+    if code in TAPS:
+        back = TAPS[158.0 - code]
+        yield from (Step("M49"), Step("feed", depths.bottom), Step("M5"), Step(back), Step("dwell"))
+        yield from (Step("feed", depths.back), Step("M5"), Step(turning), Step("M48"))
+        return
     if code in PECKS:
         yield from _pecks(depths, to_clear=code == 83.0)  # noqa: PLR2004 - the code
     else:
@@ -108,12 +115,12 @@ def cycle_steps(code: float, depths: Depths) -> Iterator[Step]:
         yield Step("dwell")
     if code in {85.0, 89.0}:
         yield Step("feed", depths.clear if code == 85.0 else depths.back)  # noqa: PLR2004 - the code
-    if code == 86.0:  # noqa: PLR2004 - the code
-        yield Step("stop")
+    if code == 86.0 and turning:  # noqa: PLR2004 - the code
+        yield Step("M5")
     if code != 89.0:  # noqa: PLR2004 - the code
         yield Step("rapid", depths.back)
-    if code == 86.0:  # noqa: PLR2004 - the code
-        yield Step("turn")
+    if code == 86.0 and turning:  # noqa: PLR2004 - the code
+        yield Step(turning)
 
 
 def _pecks(depths: Depths, *, to_clear: bool) -> Iterator[Step]:

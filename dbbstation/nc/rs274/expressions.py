@@ -110,6 +110,10 @@ class ValueReader:
             )
         return self._function(word)
 
+    def expression(self) -> float:
+        """Return the value of an expression, which Fanuc's macros write without brackets behind =."""
+        return self._level(0)
+
     def bracket(self) -> float:
         """Return the value of an expression in brackets."""
         at = self.position

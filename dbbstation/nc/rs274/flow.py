@@ -41,6 +41,13 @@ _O_LINE = re.compile(
 _KEYWORDS = frozenset(
     "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue".split()  # noqa: SIM905 - words
 )
+_MACRO = re.compile(
+    r"(?im)^[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?(?P<word>WHILE|IF|GOTO|END(?=[ \t]*[0-9]+[ \t]*(?:[;(]|\r?$)))(?P<rest>[^\n]*)$"
+)
+_LOOP = re.compile(r"[ \t]*DO[ \t]*(?P<number>[0-9]+)[ \t]*\Z", re.IGNORECASE)
+_GOTO = re.compile(r"[ \t]*(?:GOTO)?[ \t]*(?P<number>[0-9]+)[ \t]*\Z", re.IGNORECASE)
+_THEN = re.compile(r"[ \t]*THEN(?=[ \t]*#)", re.IGNORECASE)
+_NUMBERED = re.compile(r"(?im)^[ \t]*N[ \t]*([0-9]+)")
 _SKIPPED = re.compile(r"[ \t]*/")
 _COMMENT = re.compile(r"\([^()]*\)|;.*")
 
@@ -88,6 +95,7 @@ class Flow:
     ) -> None:
         self._outer, self._setup = outer, setup or ControlSetup()
         self._o_lines: dict[int, OLine] = {}
+        self._macros: dict[int, OLine] = {}
         self._labels: dict[str, list[OLine]] = {}
         self._lines: list[str] = []
         self.files: tuple[tuple[int, str], ...] = ()
@@ -112,6 +120,10 @@ class Flow:
             one = self._o_line(match, line)
             self._o_lines[line] = one
             self._labels.setdefault(one.label, []).append(one)
+        for match in _MACRO.finditer(text):
+            line = 1 + before + text.count("\n", 0, match.start())
+            rest, column = _COMMENT.sub("", match["rest"]).rstrip(BLANKS), match.start("rest") - match.start()
+            self._macros[line] = OLine(line, "", match["word"].upper(), rest, column)
         self._letters: NDArray[np.uint8] | None = None
         self._begins = list[int]()
 
@@ -152,8 +164,13 @@ class Flow:
                     continue
                 line = f"{skipped[0][:-1]} {line[skipped.end() :]}"
             word = self._o_lines.get(self._next)
+            macro = self._macros.get(self._next)
             if word is not None:
                 self._run(word, place)
+            elif macro is not None:
+                line = self._run_macro(macro, place)
+                if line:
+                    yield line, place
             elif is_percent(line) and (self.percent or self._next > last):
                 self.closed = True
                 return
@@ -193,7 +210,7 @@ class Flow:
         for number, line in enumerate(self._lines[begin : self._own_lines], begin + 1):
             if self.percent and is_percent(line):
                 return
-            if number not in self._o_lines:
+            if number not in self._o_lines and number not in self._macros:
                 yield line, self._place(number)
 
     def value_of(self, which: int | str) -> float | None:
@@ -266,6 +283,55 @@ class Flow:
             raise place.fault(word.column, f"O-words have no {word.keyword!r}", "check its spelling")
         made = getattr(self, f"_{word.keyword or 'number'}", self._if)
         made(word, place)
+
+    def _run_macro(self, macro: OLine, place: Place) -> str:
+        """Run WHILE, IF, GOTO or END of Fanuc's macros; return the line behind a THEN that holds."""
+        self._begun = True
+        reader = self._reader(macro, place)
+        holds = macro.keyword not in {"WHILE", "IF"} or reader.bracket() != 0.0
+        rest = macro.rest[reader.position - macro.column :] if reader.position else macro.rest
+        then = _THEN.match(rest) if macro.keyword == "IF" else None
+        if then is not None:
+            return (
+                f"{'':{macro.column + len(macro.rest) - len(rest) + then.end()}}{rest[then.end() :]}" if holds else ""
+            )
+        target = (_LOOP if macro.keyword == "WHILE" else _GOTO).match(rest)
+        if target is None:
+            raise place.fault(
+                macro.column + 1, f"{macro.keyword} without what follows it", "write WHILE [#1 LT 5] DO1, or GOTO 10"
+            )
+        number = int(target["number"])
+        if macro.keyword == "WHILE":
+            self._next = self._next if holds else self._loop_line(macro, number, place, "END").line
+        elif macro.keyword == "END":
+            self._next = self._loop_line(macro, number, place, "WHILE").line - 1
+        elif holds:
+            self._next = self._numbered(number, place)
+        return ""
+
+    def _loop_line(self, macro: OLine, number: int, place: Place, keyword: str) -> OLine:
+        """Return the next END of a loop, or its WHILE before."""
+        form, back = (
+            (_GOTO, False) if keyword == "END" else (re.compile(rf".*\bDO[ \t]*{number}\Z", re.IGNORECASE), True)
+        )
+        near = [
+            one
+            for one in self._macros.values()
+            if one.keyword == keyword and (one.line < macro.line) == back and (found := form.match(one.rest))
+            if back or int(found["number"]) == number
+        ]
+        if not near:
+            raise place.fault(1, f"{macro.keyword} of loop {number} has no {keyword}", "add it")
+        return near[-1] if back else near[0]
+
+    def _numbered(self, number: int, place: Place) -> int:
+        """Return the index of the next line with a number; the search goes on at the begin [Fanuc, GOTO]."""
+        lines = [
+            at for at, line in enumerate(self._lines) if (found := _NUMBERED.match(line)) and int(found[1]) == number
+        ]
+        if not lines:
+            raise place.fault(1, f"GOTO {number}: no line has the number N{number}", "add it")
+        return next((at for at in lines if at >= self._next), lines[0])
 
     def _number(self, word: OLine, place: Place) -> None:
         """Handle the program's number; a later one begins a subprogram, which runs only when called."""

@@ -47,6 +47,9 @@ TURNS = 0b111000
 """A, B and C, which no tool changer is taken to move where they were declared."""
 
 
+LONG_S = 99.0
+"""Longer dwells are stated: they may be meant in milliseconds."""
+
 LAST_OWN = 5000
 """Parameters behind this are the control's own."""
 
@@ -198,7 +201,7 @@ class Modes:
         self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
         output = block.codes.get(ModalGroup.OUTPUT)
-        said += [] if output is None else [output, *(block.words.pop(letter, None) for letter in "PQ")]
+        said += [] if output is None else [output, *(block.words.pop(letter, None) for letter in "EPQ")]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
@@ -249,10 +252,15 @@ class Modes:
         return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + CENTRES + POLAR) else ""
 
     def _dwell_s(self, block: ProgramBlock) -> float:
-        word = block.words.pop("P", None)
+        word = block.words.pop("P", None) or block.words.pop("X", None)  # X as for Fanuc
         if word is None or word.value < 0.0:
             column = block.codes[ModalGroup.ONCE].column
             raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
+        if word.value > LONG_S:
+            said = (
+                f"line {block.place.line} waits {word.value:g} s: LinuxCNC counts seconds, some controls milliseconds"
+            )
+            self.path.notes += (said,)
         return word.value
 
     def _modes(self, block: ProgramBlock) -> None:
@@ -324,7 +332,7 @@ class Modes:
 
     def _smoothing(self, block: ProgramBlock) -> None:
         """Leave out high-speed modes of other controls (G5 P, G5.1 Q, G187); with axes G5 and G5.1 are curves."""
-        word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "PQ"]
+        word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQ"]
         if block.words.keys() & set(AXES + CENTRES):
             raise block.place.fault(word.column, f"{name('G', word.value)} with axes is not read", CURVES)
         text = " ".join(f"{each.letter}{each.value:g}" for each in (word, *said) if each is not None)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES, arc_of
 from dbbstation.nc.rs274.arcs import Arc
-from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
+from dbbstation.nc.rs274.codes import CYCLES, TAPS, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, NoRoomError, element_of, with_plane
 from dbbstation.nc.rs274.cycles import cycle_steps
 from dbbstation.nc.rs274.state import AXES, unknown_place
@@ -37,6 +37,8 @@ of 0.05 mm. All of it is inverted at once, for the sake of sources with a histor
 
 FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
 """No increment may lead farther than this, as no number may be larger."""
+
+FLOATING = "G74 and G84 tap with a floating chuck, as in LinuxCNC: the spindle turns back at the bottom, and F is kept"
 
 LEAST_F = 1e-3
 """A move of no way under G93 has a feed all the same."""
@@ -270,13 +272,15 @@ class Moves(Modes):
             raise block.place.fault(column, "a cycle beside a contour (G41, G42)", "write G40 before it")
         depths = self._cycle.depths(code, block, self._state, column, absolute=self._absolute)
         self._check_feed(block, column)
+        if code in TAPS:
+            self._check_tap(block, code)
         corner, self.path.corner_mm = self.path.corner_mm, 0.0  # LinuxCNC follows the exact path there
         for _ in range(1 if times is None else int(times.value)):
             if self._cycle.begun_at < depths.clear:
                 self._go(block, depth=depths.clear)
             self._rapid(block, self._target_of_cycle(block), [0, 1])
             self._go(block, depth=depths.clear)
-            for step in cycle_steps(code, depths):
+            for step in cycle_steps(code, depths, self._turning):
                 self._cycle_step(block, step.what, step.depth)
         self.path.corner_mm = corner
         for letter in (*named, *POLAR):
@@ -291,12 +295,18 @@ class Moves(Modes):
     def _cycle_step(self, block: ProgramBlock, what: str, depth: float) -> None:
         line = block.place.line
         if what == "dwell":
-            self.path.dwell(self._cycle.numbers.get("P", 0.0), line=line)
-        elif what in {"stop", "turn"}:
-            if self._turning:
-                self.path.say(RowKind.FUNCTION, "M5" if what == "stop" else self._turning, line=line)
-        else:
+            before_s = self._cycle.dwell_s if self._motion in TAPS else 0.0
+            self.path.dwell(self._cycle.numbers.get("P", before_s), line=line)
+        elif what in {"rapid", "feed"}:
             self._go(block, depth=depth, feed=what == "feed")
+        elif what not in {"M48", "M49"} or self._in_force[ModalGroup.OVERRIDE] == "M48":
+            self.path.say(RowKind.FUNCTION, what, line=line)
+
+    def _check_tap(self, block: ProgramBlock, code: float) -> None:
+        if self._turning != TAPS[code]:
+            what = f"{name('G', code)} while the spindle does not turn by {TAPS[code]}"
+            raise block.place.fault(block.first_column, what, f"write {TAPS[code]} before it")
+        self.path.notes += (FLOATING,) if FLOATING not in self.path.notes else ()
 
     def _go(self, block: ProgramBlock, *, depth: float, feed: bool = False) -> None:
         target = self._state.pose.copy()

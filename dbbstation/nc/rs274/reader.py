@@ -109,13 +109,14 @@ class _Interpreter(Moves):
                 raise BadLine(self.flow.cut_short())
             if not self.flow.closed:
                 self.path.notes += (NO_END,)
-        self._check_places(block)
+        if self._moved:
+            self._check_places(block)
 
     def _check_places(self, block: ProgramBlock) -> None:
         """Check that the program names every axis, and state where it does so late."""
         away = [math.isnan(value) and axis not in self._away for axis, value in enumerate(self._state.pose)]
         unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
-        if unknown and self._moved:
+        if unknown:
             raise self._unplaced or unknown_place(block, unknown, "")
         if self._unplaced is not None:
             problem = self._unplaced.problem

@@ -137,7 +137,7 @@ def _computed(match: re.Match[str], reader: ValueReader, place: Place) -> Word |
     if reader.blanks() != "=":
         raise place.fault(column, "a parameter (#) without a letter before it or = behind it", "write #1=5 or X#1")
     reader.position += 1
-    return ParameterSetting(which, reader.value(), column)
+    return ParameterSetting(which, reader.expression(), column)
 
 
 def _number(match: re.Match[str], place: Place) -> Word:

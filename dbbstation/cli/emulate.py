@@ -75,8 +75,12 @@ def emulate(
     usual = chosen.protocol()
     protocol = at_rate(usual, rate_hz)
     sent_hz, usual_hz = protocol.fastest_hz(baud) * time_scale, usual.fastest_hz(baud)
-    if not wait and sent_hz > usual_hz:
-        say(f"note: sends {sent_hz:g} readings a second, {chosen.instrument} has {usual_hz:g}")
+    pace = (
+        f"{protocol.fastest_hz(baud):g} readings per second of machine time"
+        if wait
+        else f"{sent_hz:g} readings a second"
+    )
+    say(f"note: sends {pace}; {chosen.instrument} has {usual_hz:g}")
     if protocol.voice("fault") is None:
         say(
             f"note: {chosen.instrument} has no frame for a missing bar: it sends nothing until `mount` or `start` puts a ball up"

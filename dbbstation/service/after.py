@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 USUAL = (SessionTask.CALIBRATE, SessionTask.DIAGNOSE, SessionTask.PROGRAMS, SessionTask.REPORT)
 """Steps on the session alone: an acceptance also needs one that was measured before."""
 
+_OF_OTHERS = {SessionTask.ACCEPTANCE, SessionTask.HISTORY}
+"""Steps whose result other sessions change."""
+
 KINEMATIC, JOINT, PROGRAMS, REPORT = "model.yaml", "joint-model.yaml", "programs", "report.html"
-ACCEPTANCE = "acceptance.html"
+ACCEPTANCE, FIGURES, HISTORY = "acceptance.html", "circles.pdf", "history.html"
 """Names in the folder of results."""
 
 
@@ -190,8 +193,6 @@ class After:
             settings=None if self._settings is None else self._settings.absolute(),
         )
         match step:
-            case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
-                return job
             case SessionTask.PROGRAMS:
                 plan, machine = self._files()
                 return job.model_copy(update={"plan": plan, "machine": machine, "model": self.model})
@@ -201,6 +202,8 @@ class After:
                 if self.former is None:
                     raise ValueError("no session was chosen for the comparison")
                 return job.model_copy(update={"before": self.former.folder})
+            case _:
+                return job
 
     def _files(self) -> tuple[Path, Path]:
         session = read_session(self.session)
@@ -210,7 +213,7 @@ class After:
         return {
             step.value: DoneStep(path=one.path.name, passed_s=one.passed_s, answer=one.answer)
             for step, one in self.results.items()
-            if one.progress is WorkProgress.DONE and one.path is not None and step is not SessionTask.ACCEPTANCE
+            if one.progress is WorkProgress.DONE and one.path is not None and step not in _OF_OTHERS
         }
 
     @staticmethod
@@ -221,4 +224,6 @@ class After:
             SessionTask.PROGRAMS: PROGRAMS,
             SessionTask.REPORT: REPORT,
             SessionTask.ACCEPTANCE: ACCEPTANCE,
+            SessionTask.FIGURES: FIGURES,
+            SessionTask.HISTORY: HISTORY,
         }[step]

@@ -26,7 +26,6 @@ from dbbstation.service.port_probe import ProbeOutcome, ports, probe
 from dbbstation.service.runner import Runner
 from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
-from dbbstation.service.shop_temperature import add_note, changed_since, note_temperature
 from dbbstation.service.virtual_place import virtual_place
 from dbbstation.service.work import BackgroundWork, WorkProgress
 
@@ -266,11 +265,6 @@ class Front:
             held = HeldLine(prepared.protocol, place.port, clock=place.clock, time_scale=line.time_scale)
             self._open.callback(held.close)
         self._remember(choice)
-        if choice.goes_on and choice.folder is not None:
-            if choice.ambient_temp_c is not None:
-                note_temperature(choice.folder, choice.ambient_temp_c)
-            for text in changed_since(read_session(choice.folder), choice.operator):
-                add_note(choice.folder, text)
         runner = Runner(opener(job, held, observers=observers), held)
         self._open.callback(runner.close)
         return Opened(replace(prepared, job=job), runner)

@@ -16,6 +16,8 @@ class SessionTask(StrEnum):
     PROGRAMS = "programs"
     REPORT = "report"
     ACCEPTANCE = "acceptance"
+    FIGURES = "figures"
+    HISTORY = "history"
 
 
 class SessionJob(BaseModel):

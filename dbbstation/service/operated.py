@@ -29,6 +29,7 @@ from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import add_note
 from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.station.opening import SHIFT_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -65,8 +66,8 @@ class Operated:
             job=job.order,
         )
 
-    def tolerances_file(self, session: Path) -> tuple[Path, bool]:
-        """Write the job's tolerances as settings beside a session; return the file and whether its limits changed.
+    def tolerances_file(self, session: Path) -> Path:
+        """Write the job's tolerances as settings beside a session, and note in it that they changed; return the file.
 
         Raises:
             OutputError: it cannot be written.
@@ -75,10 +76,11 @@ class Operated:
         path = session.absolute().parent / f"{session.name}-tolerances.yaml"
         text = yaml_text({"format": format_of(SettingsFile), **data})
         before = content_of(path).decode(errors="replace") if path.is_file() else text
-        if before != text:
-            add_note(session, f"the limits of the job were changed, before: {' '.join(before.split())}")
+        if before != text and (session / SESSION_FILE).is_file():
+            add_note(session, f"{_LIMITS}{' '.join(before.split())}")
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, text, force=True, rewrites=True)
-        return path, before != text
+        return path
 
     @property
     def model(self) -> Path | None:
@@ -110,10 +112,6 @@ class Operated:
         return unused_path(self.sessions, name)
 
 
-SHIFT_S = 8.0 * 3600.0
-"""A shift: whoever left the session has gone since, and ball and holder may have been touched [s]."""
-
-
 @dataclass(frozen=True)
 class Answered:
     """The answer on a session.
@@ -143,7 +141,8 @@ class JobAnswer:
         start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self._missing, job = tuple(missing), operated.job
-        tolerances, self._changed = operated.tolerances_file(session)
+        tolerances = operated.tolerances_file(session)
+        self._changed = any(note.text.startswith(_LIMITS) for note in read_session(session).notes)
         self._trouble = job.trouble
         self._after = After(session, operated.model, tolerances, start, job.place)
         self._after.do(SessionTask.REPORT)
@@ -155,7 +154,8 @@ class JobAnswer:
         if result.progress in {None, WorkProgress.RUNNING}:
             return None
         if result.progress is not WorkProgress.DONE:
-            return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
+            why = result.failure or "the report was ended before it was done"
+            return Answered(Conformity.UNDECIDED, (why,), (self._trouble or _SHOW,))
         answered = answer_of(as_objects(result.answer), self._missing, result.path, self._trouble)
         return replace(answered, reasons=(_CHANGED, *answered.reasons)) if self._changed else answered
 
@@ -199,6 +199,7 @@ def worst_of(one: ComparedTolerance) -> str:
     return f"{name}: {worst.um:.1f} µm at most ({run}), U {expanded:.1f} µm, limit {one.largest_um:g} µm, margin {margin:.1f} µm."
 
 
+_LIMITS = "the limits of the job were changed, before: "
 _SHOW = "Show this answer and its report to whoever prepared the job."
 _CHANGED = "The limits of the job were changed during this session; its notes have the former ones."
 _WITHIN = "Every circle is within the limits of the job, with its uncertainty."

@@ -15,8 +15,6 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.files.recordings.session import SessionFolder
-
 _NOTED: TypeAdapter[float] = TypeAdapter(TemperatureDegc)
 
 
@@ -26,11 +24,6 @@ def shop_degc(text: str) -> float | None:
         return _NOTED.validate_python(float(text.replace(",", ".")))
     except (ValueError, ValidationError):
         return None
-
-
-def note_temperature(folder: Path, degc: float) -> None:
-    """Note the shop's temperature [degC]; raises as `add_note`."""
-    add_note(folder, degc=degc)
 
 
 def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
@@ -45,18 +38,3 @@ def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
         runs = [run.started for run in writer.runs if run.started is not None]
         notes = [note.made for note in writer.session.notes]
         writer.note(Note(max([datetime.now(UTC), *runs, *notes]), text, degc))
-
-
-def changed_since(session: SessionFolder, operator: str) -> tuple[str, ...]:
-    """Return the changes since a session was noted: another operator, another shift, a clock that went back."""
-    by = [note.text.removeprefix(_OPERATOR) for note in session.notes if note.text.startswith(_OPERATOR)]
-    before = (by or [session.operator])[-1]
-    runs = [run.started for run in session.runs if run.started is not None]
-    behind_s = (max(runs) - datetime.now(UTC)).total_seconds() if runs and not session.virtual else 0.0
-    texts = [f"{_OPERATOR}{operator}"] if operator and operator != before else []
-    if behind_s > 0.0:
-        texts.append(f"the computer's clock is {behind_s:.0f} s behind the last run: it was set back")
-    return tuple(texts)
-
-
-_OPERATOR = "operator from here on: "

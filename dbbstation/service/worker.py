@@ -93,6 +93,8 @@ def done(job: SessionJob) -> Mapping[str, object]:
             return plain(_programs(job, settings))
         case SessionTask.REPORT | SessionTask.ACCEPTANCE:
             return plain(_reported(job, settings))
+        case SessionTask.FIGURES | SessionTask.HISTORY:
+            return plain(_drawn(job, settings))
 
 
 def _fitted(job: SessionJob) -> object:
@@ -155,6 +157,17 @@ def _reported(job: SessionJob, settings: Settings) -> object:
         provenance=lambda: _provenance("report", session, *given),
         progress=_stage,
     )
+
+
+def _drawn(job: SessionJob, settings: Settings) -> object:
+    from dbbstation.tasks.pages import draw_circles, draw_history  # noqa: PLC0415 - the same
+    from dbbstation.tasks.telling import Telling  # noqa: PLC0415 - the same
+
+    session, out, telling = _needed(job.session, "session"), Path(job.out), Telling(_stage, say=_note)
+    if job.task is SessionTask.FIGURES:
+        return draw_circles(session, out, lambda: _provenance("plot", session, "--out", out), telling, force=job.force)
+    words = ("history", job.beside, "--page", out)
+    return draw_history(job.beside, out, settings, lambda: _provenance(*words), telling, force=job.force)
 
 
 def _needed(path: Path | None, what: str) -> Path:

@@ -15,7 +15,7 @@ from dbbstation.plan.duration import circles_s
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.judging import RunJudge
-from dbbstation.station.opening import last_end, open_session
+from dbbstation.station.opening import changed_since, clock_watch, last_end, open_session
 from dbbstation.station.preflight import check_plan, check_range
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
@@ -159,4 +159,8 @@ def assemble(
     station.subscribe(storage)
     station.subscribe(judge)
     station.regularly(storage.sync_if_due)
+    if now is None:
+        station.regularly(clock_watch(station.send))
+    for note in changed_since(writer.session, details):
+        station.send(note)
     return Workplace(station, schedule, writer, judge, storage)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+import time
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.recordings.entries import RunState
-from dbbstation.files.recordings.event_log import EVENTS_FILE
+from dbbstation.files.recordings.event_log import CLOCK_S, EVENTS_FILE
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.files.recordings.session_writer import SessionWriter
+from dbbstation.station.commands import AddNote
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
@@ -96,6 +99,47 @@ def open_session(
         writer.close()
         raise
     return writer
+
+
+SHIFT_S = 8.0 * 3600.0
+"""A shift: whoever left the session has gone since, and ball and holder may have been touched [s]."""
+
+_OPERATOR = "operator from here on: "
+
+
+def changed_since(session: SessionFolder, details: SessionDetails) -> Iterator[AddNote]:
+    """Yield notes on what is not as a session has it: operator, temperature, shift, a clock that went back."""
+    by = [note.text.removeprefix(_OPERATOR) for note in session.notes if note.text.startswith(_OPERATOR)]
+    if details.operator not in {"", (by or [session.operator])[-1]}:
+        yield AddNote(f"{_OPERATOR}{details.operator}")
+    known = [session.ambient_temp_c, *(note.ambient_temp_c for note in session.notes)]
+    if details.ambient_temp_c not in {None, next((one for one in reversed(known) if one is not None), None)}:
+        yield AddNote(ambient_temp_c=details.ambient_temp_c)
+    noted = [run.started for run in session.runs if run.started is not None] + [note.made for note in session.notes]
+    if session.virtual or not noted:
+        return
+    since_s = (datetime.now(UTC) - max(noted)).total_seconds()
+    if since_s < -CLOCK_S:
+        yield AddNote(f"the computer's clock is {-since_s:.0f} s behind what was noted last: it was set back")
+    elif since_s > SHIFT_S:
+        yield AddNote(f"gone on with {since_s / 3600.0:.0f} h after what was noted last")
+
+
+def clock_watch(
+    tell: Callable[[AddNote], None],
+    wall: Callable[[], float] = time.time,
+    steady: Callable[[], float] = time.monotonic,
+) -> Callable[[], None]:
+    """Return a duty that tells when the computer's clock is set, or the computer has slept."""
+    ahead_s = [wall() - steady()]
+
+    def look() -> None:
+        now_s = wall() - steady()
+        step_s, ahead_s[0] = now_s - ahead_s[0], now_s
+        if abs(step_s) > CLOCK_S:
+            tell(AddNote(f"the computer's clock was set {'on' if step_s > 0.0 else 'back'} by {abs(step_s):.0f} s"))
+
+    return look
 
 
 def last_end(session: SessionFolder) -> datetime | None:

@@ -277,7 +277,8 @@ class StationApp(App[None]):
     def _measure(self, opened: Opened) -> None:
         self._opening = False
         plan = opened.prepared.job.plan
-        self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests)
+        trouble = "" if self._operated is None else self._operated.job.trouble
+        self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests, trouble=trouble)
         self.board, self._runner, self._leaving = Board(), opened.runner, False
         self._answering = False
         self._back_to_start()

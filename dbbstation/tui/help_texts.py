@@ -212,7 +212,7 @@ HELP = {
         "Results",
         (
             (
-                "Five steps on the accepted runs. Each is a command of the program in a process of its own, so that it can be ended; "
+                "Seven steps on the accepted runs. Each is a command of the program in a process of its own, so that it can be ended; "
                 "what it wrote before stays. Files go into a new folder beside the session."
             ),
             (
@@ -230,6 +230,8 @@ HELP = {
             "3": "Write compensated NC programs.",
             "4": "Write the report: the verdict against the shop's tolerances.",
             "5": "Acceptance: circles as measured before and now, against the shop's tolerances.",
+            "6": "Draw the circles.",
+            "7": "The history of all sessions in the same folder, machine by machine.",
             "k": "End the step that is being done.",
             "up": "The step above; its result stands below the list.",
             "down": "The step below.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from textual.content import Content
@@ -45,4 +46,6 @@ class NowLine(Panel):
 class OperatorNowLine(NowLine):
     """The same for an operator."""
 
-    _say = staticmethod(now_for_operator)
+    def __init__(self, trouble: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._say = partial(now_for_operator, trouble=trouble)

@@ -91,13 +91,19 @@ class JobScreen(RowScreen):
             if yes:
                 self.say(texts.NEW_CHECKS)
                 self._reception.do(
-                    lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
+                    lambda: self._checked(choice), lambda prepared: self._prepared(choice, prepared), self._failed
                 )
 
         if self._operated.left_long_ago(choice):
             self.app.push_screen(YesQuestion(texts.JOB_OLD), sure)
         else:
             sure(yes=True)
+
+    def _checked(self, choice: Choice) -> Prepared:
+        prepared = self._front.prepare(choice)
+        if choice.folder is not None:
+            self._operated.tolerances_file(choice.folder)  # a limit that changes from here on is noted
+        return prepared
 
     def _typed(self, name: str, text: str | None) -> None:
         if text is None or self._choice is None:
@@ -184,7 +190,7 @@ class OperateScreen(RunScreen):
 
     def compose(self) -> ComposeResult:
         yield TitleLine(self._show.plan, id="title")
-        yield OperatorNowLine(id="now")
+        yield OperatorNowLine(self._show.trouble, id="now")
         with Vertical(id="set-up-view"):
             yield ReadingPanel(clock=self._clock, id="reading")
             with Horizontal(id="table"):

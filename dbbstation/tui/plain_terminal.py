@@ -25,7 +25,7 @@ _ALIKE = dict(zip("µ°±…·→›▸▶–×●○✓√⇧│┃║▊▎▌
 def plain_driver(usual: type[Driver]) -> type[Driver]:
     """Return a driver with only this terminal's characters; each replaces one, so that the layout is kept."""
     encoding = getattr(sys.__stderr__, "encoding", None) or ""  # where Textual draws
-    every = "utf" not in encoding.lower()
+    every = "utf" not in encoding.lower() or _foreign_locale()
     if not every and os.environ.get("TERM") != "linux":
         return usual
 
@@ -34,6 +34,13 @@ def plain_driver(usual: type[Driver]) -> type[Driver]:
             super().write(plain(data) if every else without_braille(data))
 
     return PlainDriver
+
+
+def _foreign_locale() -> bool:
+    """Return whether the terminal was set to another encoding, where Python takes UTF-8 because it lacks the locale [PEP 538, 540]."""
+    taken = os.environ.get("LC_CTYPE", "")
+    named = os.environ.get("LC_ALL") or ("" if taken == "C.UTF-8" else taken) or os.environ.get("LANG") or taken
+    return bool(named) and "utf" not in named.lower() and bool(sys.flags.utf8_mode) and "PYTHONUTF8" not in os.environ
 
 
 def without_braille(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.facts.serialise import as_objects
+from dbbstation.report.history_words import changes_in_words, headline
 from dbbstation.results.levels_text import bars
 from dbbstation.results.words import (
     ending_sentences,
@@ -71,10 +72,22 @@ def _accepted(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objec
     yield from worst_lines(answer)
 
 
+def _drawn(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
+    yield texts.DRAWN.format(count=len(answer.drawn))
+
+
+def _over_time(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
+    for machine in answer.machines[:_MOST]:
+        yield f"{machine.machine}: {headline(machine)}"
+        yield from list(changes_in_words(machine, answer.coverage_factor))[:_MOST]
+
+
 _LINES: dict[SessionTask, Callable[[Any], Iterator[str]]] = {
     SessionTask.CALIBRATE: _calibrated,
     SessionTask.DIAGNOSE: _diagnosed,
     SessionTask.PROGRAMS: _programmed,
     SessionTask.REPORT: _reported,
     SessionTask.ACCEPTANCE: _accepted,
+    SessionTask.FIGURES: _drawn,
+    SessionTask.HISTORY: _over_time,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+from textual.binding import Binding
 from textual.content import Content
 from textual.widgets import OptionList
 
@@ -43,6 +44,9 @@ class ResultsScreen(RowScreen):
         ("3", "step('programs')", "Programs"),
         ("4", "step('report')", "Report"),
         ("5", "acceptance", "Acceptance"),
+        # The rows above name their keys; in the footer of a small terminal there is no room for them.
+        Binding("6", "step('figures')", "Figures", show=False),
+        Binding("7", "step('history')", "History", show=False),
         ("k", "cancel", "End"),
         ("escape,q", "back", "Back"),
     ]

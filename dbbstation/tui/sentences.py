@@ -30,10 +30,12 @@ def now(board: Board) -> str:
     return say(board) if say else f"The station is {board.state}."
 
 
-def now_for_operator(board: Board) -> str:
-    """Return the same for an operator, who can only repeat a faulty run."""
+def now_for_operator(board: Board, trouble: str = "") -> str:
+    """Return the same for an operator, who can only repeat a faulty run, and has the shop's own text for trouble."""
     completed = board.completed
-    if board.fault is not None or board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
+    if board.fault is not None:
+        return f"{_fault(board, commands=False)} {trouble}".rstrip()
+    if board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
         return now(board) if board.finished is None else _THROUGH
     found = completed.answer
     if board.doubted:
@@ -142,13 +144,13 @@ def _finished(board: Board) -> str:
     return f"The plan is through, {board.accepted} of {len(board.tasks)} runs accepted; {rest}. E works on the results, Q leaves."
 
 
-def _fault(board: Board) -> str:
+def _fault(board: Board, *, commands: bool = True) -> str:
     if board.fault is None:
         return ""
     error, interrupted = board.fault.error, board.fault.interrupted
     where = f" at {error.where}" if error.where else ""
     kept = f" {interrupted.label} is kept as far as it came." if interrupted else ""
-    remedy = f" What helps: {_ended(error.remedy)}" if error.remedy else ""
+    remedy = f" What helps: {_ended(error.remedy)}" if error.remedy and (commands or "`" not in error.remedy) else ""
     return f"FAULT{where}: {_ended(error.what)}{remedy}{kept} Then C connects again, Q leaves."
 
 

@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Shown:
-    """Plan and plate."""
+    """Plan and plate, and the shop's own text for an operator in trouble."""
 
     plan: str
     bores: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     cell_aspect: float = 2.0
     tests: Mapping[str, PlannedTest] = field(default_factory=dict)
+    trouble: str = ""

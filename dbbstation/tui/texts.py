@@ -253,6 +253,8 @@ STEPS: Mapping[SessionTask, tuple[str, str]] = {
     SessionTask.PROGRAMS: ("3", "Programs: compensated NC programs of the circles"),
     SessionTask.REPORT: ("4", "Report: verdict against the shop's tolerances"),
     SessionTask.ACCEPTANCE: ("5", "Acceptance: before and now, as measured"),
+    SessionTask.FIGURES: ("6", "Figures: the circles, drawn"),
+    SessionTask.HISTORY: ("7", "History: all sessions beside this one"),
 }
 STEP_WORDS: Mapping[WorkProgress | None, str] = {
     None: "not yet",
@@ -287,6 +289,7 @@ VERDICT_WORDS: Mapping[str, str] = {
 }
 CAUSES = "{verdict}: {names}"
 PROGRAMMED = "{count} programs for {dialect}, all within the machine's travel."
+DRAWN = "{count} circles are drawn."
 CORRECTED = "The greatest correction is {most:.1f} µm."
 REPORT_VERDICT: Mapping[str, str] = {
     "within": "PASS: no calibration is due.",

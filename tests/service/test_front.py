@@ -32,7 +32,7 @@ from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
-from dbbstation.service.shop_temperature import note_temperature, shop_degc
+from dbbstation.service.shop_temperature import add_note, shop_degc
 from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.tasks.declare import options_of
 from dbbstation.virtual.wire import VirtualInstrument
@@ -380,12 +380,12 @@ def test_a_temperature_is_never_noted_before_what_was_noted_already(tmp_path: Pa
     ahead = datetime.now(UTC) + timedelta(minutes=5)
     with SessionWriter.open(folder) as writer:
         writer.note(Note(ahead, ambient_temp_c=20.0))
-    note_temperature(folder, 20.9)
+    add_note(folder, degc=20.9)
     assert [(note.made >= ahead, note.ambient_temp_c) for note in read_session(folder).notes[1:]] == [
         (True, 20.0),
         (True, 20.9),
     ]
-    note_temperature(folder, 21.0)
+    add_note(folder, degc=21.0)
     assert shop_degc("20,9") == 20.9
     assert [shop_degc(text) for text in ("", "warm", "nan", "inf", "81", "-31")] == [None] * 6
 

@@ -87,5 +87,6 @@ def test_without_json_it_prints_what_to_copy(plan_file: Path) -> None:
         assert process.stdout is not None
         lines = [process.stdout.readline() for _ in range(2)]
         process.terminate()
-        process.communicate(timeout=20.0)
+        _, said = process.communicate(timeout=20.0)
+    assert "note: sends 250 readings a second; streaming-encoder has 250" in said
     assert [line.partition(": ")[0] for line in lines] == ["port", "control"]

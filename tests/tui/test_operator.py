@@ -6,6 +6,7 @@ import asyncio
 import os
 import shutil
 import time
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 from textual.widgets import Static
 
-from dbbstation.errors import InputError
+from dbbstation.errors import InputError, InstrumentError
 from dbbstation.facts.held import ReportVerdict, WorstCircle
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
@@ -28,28 +29,34 @@ from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
-from dbbstation.service.board import RunDecision
+from dbbstation.service.board import Board, RunDecision
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionJob
 from dbbstation.service.memory import Memory
 from dbbstation.service.messages import Message, Weight, message_of
 from dbbstation.service.operated import SHIFT_S, Answered, JobAnswer, answer_of, read_operated
-from dbbstation.service.shop_temperature import changed_since
 from dbbstation.service.work import WorkProgress
-from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Repeat
+from dbbstation.station.assembly import Job, assemble
+from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Quit, Repeat
+from dbbstation.station.events import Fault
+from dbbstation.station.opening import changed_since, clock_watch
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.sentences import now as sentence_now
+from dbbstation.tui.sentences import now_for_operator
 from tests.cli.conftest import call
 from tests.tui.happenings import Happening
 from tests.tui.test_app import Waits
 from tests.tui.test_session_flow import below, now, rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from textual.pilot import Pilot
+
+    from dbbstation.station.engine import Station
 
 FIXTURES = shipped_folder("fixtures")
 PLANS = shipped_folder("protocols") / "plans"
@@ -110,9 +117,7 @@ def test_a_job_is_checked_with_all_that_it_names(job_file: Path) -> None:
 def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path) -> None:
     session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-2026-11-20")
     operated = read_operated(job_file)
-    path, changed = operated.tolerances_file(session)
-    tolerances = read_settings([path]).tolerances
-    assert not changed
+    tolerances = read_settings([operated.tolerances_file(session)]).tolerances
     assert tolerances == (Tolerance(CircleFigure.CIRCULAR_DEVIATION, 400.0),)
     answer = JobAnswer(operated, session, (), Reported).look()
     assert answer == Answered(
@@ -318,20 +323,101 @@ async def looked(app: StationApp, pilot: Pilot[None], there: Callable[[], bool])
     raise AssertionError(now(app), rows(app))
 
 
-def test_another_operator_and_a_clock_set_back_are_noted() -> None:
-    later = datetime.now(UTC) + timedelta(hours=2)
-    session = SimpleNamespace(operator="bob", notes=(), virtual=False, runs=(SimpleNamespace(started=later),))
-    operator, clock = changed_since(session, "ann")
-    assert operator == "operator from here on: ann"
-    assert "it was set back" in clock
-    told = SimpleNamespace(**{**vars(session), "notes": (Note(later, operator),), "runs": ()})
-    assert changed_since(told, "ann") == ()
-    assert changed_since(told, "bob") == ("operator from here on: bob",)
+def test_another_operator_temperature_or_shift_and_a_clock_set_back_are_noted() -> None:
+    now = datetime.now(UTC)
+    later, long_ago = now + timedelta(hours=2), now - timedelta(hours=20)
+    session = SimpleNamespace(operator="bob", ambient_temp_c=20.0, notes=(), virtual=False, runs=())
+    ann = SessionDetails(operator="ann", ambient_temp_c=20.5)
+    operator, degc, clock = changed_since(SimpleNamespace(**vars(session) | {"runs": [Started(later)]}), ann)
+    assert operator == AddNote("operator from here on: ann")
+    assert degc == AddNote(ambient_temp_c=20.5)
+    assert "it was set back" in clock.text
+    (shift,) = changed_since(
+        SimpleNamespace(**vars(session) | {"runs": [Started(long_ago)]}), SessionDetails(operator="bob")
+    )
+    assert shift.text == "gone on with 20 h after what was noted last"
+    told = SimpleNamespace(**vars(session) | {"notes": (Note(now, operator.text), Note(now, "", 20.5))})
+    assert list(changed_since(told, ann)) == []
+    assert list(changed_since(told, SessionDetails(operator="bob"))) == [AddNote("operator from here on: bob")]
+
+
+class Started(SimpleNamespace):
+    def __init__(self, started: datetime) -> None:
+        super().__init__(started=started)
+
+
+def test_a_clock_that_is_set_while_the_station_runs_is_told_once() -> None:
+    told: list[AddNote] = []
+    ahead_s = iter([100.0, 100.0, 100.4, 100.8, 3700.8, 3700.8, 3580.8, 3580.8])
+    look = clock_watch(told.append, lambda: next(ahead_s), lambda: 0.0)
+    for _ in range(7):
+        look()
+    assert [one.text for one in told] == [
+        "the computer's clock was set on by 3600 s",
+        "the computer's clock was set back by 120 s",
+    ]
+
+
+def test_what_changed_is_noted_and_said_when_a_session_goes_on(tmp_path: Path) -> None:
+    with at_the_station(tmp_path, SessionDetails(operator="bob", ambient_temp_c=20.0)) as (station, _):
+        station.send(Quit())
+        station.run()
+    with at_the_station(tmp_path, SessionDetails(operator="ann", ambient_temp_c=20.4)) as (station, board):
+        station.send(Quit())
+        station.run()
+    assert [message.text for message in board.messages][:2] == ["noted: operator from here on: ann", "noted: 20.4 °C"]
+    session = read_session(tmp_path / "session")
+    assert (session.operator, session.ambient_temp_c) == ("bob", 20.0)
+    assert [(note.text, note.ambient_temp_c) for note in session.notes] == [
+        ("operator from here on: ann", None),
+        ("", 20.4),
+    ]
+
+
+@contextmanager
+def at_the_station(folder: Path, details: SessionDetails) -> Iterator[tuple[Station, Board]]:
+    machine = read_machine(FIXTURES / "machines" / "reference.yaml")
+    plan = read_inline_plan(PLANS / "ten-minute-check.yaml")
+    workplace = assemble(Job(machine, plan, folder / "session", details), SimpleNamespace(drain=list))
+    board = Board()
+    workplace.station.subscribe(board.take)
+    try:
+        yield workplace.station, board
+    finally:
+        workplace.close()
+
+
+def test_an_operator_in_trouble_reads_the_shops_own_text_and_no_command() -> None:
+    error = InstrumentError("no answer", where="COM3", remedy="`dbbstation instrument ports` lists the ports")
+    board = Happening().board()
+    board.take(Fault(error, None))
+    said = now_for_operator(board, "Do not cut, call 4711.")
+    assert said == "FAULT at COM3: no answer. Then C connects again, Q leaves. Do not cut, call 4711."
+    assert "`dbbstation instrument ports`" in sentence_now(board)
+
+
+def test_an_operator_goes_back_to_a_test() -> None:
+    happening = Happening().circle("t0", Direction.CCW).command(Accept())
+    runner = Waits(happening.events)
+    app = StationApp(happening.shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.push_screen(OperateScreen(app, happening.shown()))
+            app.look()
+            await pilot.pause()
+            await pilot.press("o")
+            assert isinstance(app.screen, OverviewScreen)
+            await pilot.press("up", "up", "left", "enter")
+            assert isinstance(app.screen, OperateScreen)
+
+    asyncio.run(run())
+    assert runner.sent == [GoTo("t0", Direction.CCW)]
 
 
 def test_a_limit_changed_within_a_session_is_said_and_noted(job_file: Path) -> None:
     session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-2026-11-20")
-    JobAnswer(read_operated(job_file), session, (), Reported).look()
+    read_operated(job_file).tolerances_file(session)  # as it is written when the session begins
     job_file.write_text(job_file.read_text(encoding="utf-8").replace("largest: 400", "largest: 500"), encoding="utf-8")
     answered = JobAnswer(read_operated(job_file), session, (), Reported).look()
     assert answered is not None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -33,6 +35,32 @@ def test_what_a_terminal_is_written(monkeypatch: pytest.MonkeyPatch, encoding: s
     driver = plain_driver(Usual)()
     driver.write("┌ 12 µm ⣿⠁⠀ █")
     assert driver.wrote == written
+
+
+@pytest.mark.parametrize(
+    ("locale", "ascii_only"),
+    [
+        ({"LANG": "de_DE.ISO-8859-1"}, True),
+        ({"LC_ALL": "C"}, True),
+        ({"LANG": "C"}, True),
+        ({"LANG": "C.UTF-8"}, False),
+        ({}, False),
+        ({"LANG": "C", "LC_ALL": "en_US.UTF-8"}, False),
+        ({"LANG": "C", "PYTHONUTF8": "1"}, False),
+    ],
+)
+def test_a_locale_that_python_lacks_is_not_taken_for_utf_8(locale: dict[str, str], *, ascii_only: bool) -> None:
+    """Python takes UTF-8 there, in its own process: asked of a new one."""
+    code = "from dbbstation.tui.plain_terminal import plain_driver as p; print(p(object) is not object)"
+    names = {name: value for name, value in os.environ.items() if name not in {"LANG", "LC_ALL", "LC_CTYPE"}}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**names, "TERM": "xterm", **locale},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (done.stdout.strip() == "True") is ascii_only
 
 
 def test_each_character_stays_one() -> None:

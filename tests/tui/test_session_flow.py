@@ -19,6 +19,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
+from dbbstation.service.after import After
 from dbbstation.service.choice import SetUpPart
 from dbbstation.service.front import Front
 from dbbstation.service.job import SessionTask
@@ -364,6 +365,31 @@ def test_work_can_be_ended_and_leaving_it_asks_first(front: Front) -> None:
     shutil.copytree(shipped_folder("fixtures") / "sessions" / "small", front.under / "small")
     play(front, keys)
     assert not list((front.under / "small-results").iterdir())
+
+
+def test_circles_are_drawn_and_the_history_is_told_from_the_screen(front: Front) -> None:
+    session = shutil.copytree(shipped_folder("fixtures") / "sessions" / "small", front.under / "small")
+
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "e")
+        await until(pilot, on(app, ResultsScreen))
+        after = app.screen._after
+        await press(app, "6")
+        await until(pilot, lambda: after.results[SessionTask.FIGURES].progress is WorkProgress.DONE)
+        assert "circles are drawn." in below(app)
+        await press(app, "7")
+        await until(pilot, lambda: after.results[SessionTask.HISTORY].progress is WorkProgress.DONE)
+        assert "PM600-0007: Cannot tell whether anything changed" in below(app)
+        await press(app, "escape")
+
+    play(front, keys)
+    results = session.with_name("small-results")
+    assert (results / "circles.pdf").read_bytes().startswith(b"%PDF")
+    assert "<svg" in (results / "history.html").read_text("utf-8")
+    # Other sessions change the history, and none of them the drawing.
+    again = After(session)
+    assert again.results[SessionTask.FIGURES].progress is WorkProgress.DONE
+    assert again.results[SessionTask.HISTORY].progress is None
 
 
 def test_an_error_of_the_virtual_machine_stays_on_the_screen(front: Front, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -390,7 +390,7 @@ class Bank:
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
         variants = tuple(
-            replace(variant, slack=own[width:], slack_sd=sd, slack_at=at)
+            replace(variant, slack=own[width:], slack_sd=sd, slack_at=at, tangents=len(tangents))
             for variant in _forms(law, own[:width], plausible, nonlinear, weight)
         )
         self._of_laws[name] = replace(self._of_laws[name], variants=variants)
@@ -469,6 +469,7 @@ def _forms(
             label=label,
             whole=columns,
             log_weight=log_weight + weight,
+            positive=tuple(law.positive[k] for k in part) if law.positive else (),
         )
         for part, weight, label in law.choices
     ]

@@ -1,7 +1,8 @@
-"""Effects shaped by a signal: saturation, dead zone, friction within a speed, scaled hysteresis, integral."""
+"""Effects shaped by a signal: saturation, dead zone, knee, friction within a speed, scaled hysteresis, integral."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import permutations
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 
 from dbbstation.inference.channel import Law
 from dbbstation.inference.memory import starts_of
-from dbbstation.inference.patterns import TRANSITS, Family, log_odds, odds_of_driven, play
+from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, odds_of_driven, play
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
@@ -21,10 +22,16 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 WIDTHS = {
-    Family.SATURATION: tuple(np.geomspace(0.05, 3.0, 5).tolist()),
+    Family.SATURATION: tuple(np.geomspace(0.02, 3.0, 6).tolist()),
     Family.DEAD_ZONE: tuple(np.geomspace(0.01, 0.8, 5).tolist()),
 }
 """Half widths that are tried at first, over the largest value: from what is nearly a step to what is nearly a straight line."""
+
+WIDEST = 0.95
+"""Half width of a sharp bend, over the largest value, at the most: beyond, no row is."""
+
+KNEES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
+"""Places of a knee that are tried at first, in shares of the range."""
 
 SPEEDS = tuple(np.geomspace(0.01, 0.5, 5).tolist())
 """Speeds within which friction turns over, over the largest: within a smaller one it turns at once, and is hysteresis."""
@@ -32,6 +39,9 @@ SPEEDS = tuple(np.geomspace(0.01, 0.5, 5).tolist())
 BENT = 0.1
 """Probability that an effect that follows a variable, or its direction, departs from a straight line, or a sign, in one of these ways so far
 that it is seen: as that of coming late enough."""
+
+MADE = 0.9
+"""Share of the simulated value's squares that straight lines over all variables make, from which on they say how it grows with each."""
 
 
 def bent_laws(
@@ -41,15 +51,22 @@ def bent_laws(
     blocks: Sequence[slice],
     size: float,
     unit: str,
+    simulated: NDArray[np.float64] | None = None,
 ) -> list[Law]:
-    """Return saturation and dead zone of each variable; over time also friction, integral and scaled hysteresis."""
+    """Return saturation, dead zone and knees of each variable; over time also friction, integral and scaled hysteresis.
+
+    Args:
+        simulated: what the difference is added to, shape (n,); its straight lines tell a limit from a dead zone.
+    """
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0]
-    found = []
-    for family, column in ((Family.SATURATION, _saturation), (Family.DEAD_ZONE, _dead_zone)):
-        found += [
-            _with_width(family, v, partial(column, v), WIDTHS[family], _largest(v), v.unit, size, unit, len(usable))
-            for v in usable
-        ]
+    bending = [v for v in usable if len(np.unique(v.values)) >= DISTINCT]
+    grows = _grows(bending, simulated, size)
+    found = [
+        _bend(family, v, grows[v.name], size, unit, len(bending))
+        for family in (Family.SATURATION, Family.DEAD_ZONE)
+        for v in bending
+    ]
+    found += [_knee(side, v, size, unit, 2 * len(bending)) for side in ("upper", "lower") for v in bending]
     if time is None or any(np.any(np.diff(time[rows]) <= 0.0) for rows in blocks):
         return found
     paths = [v for v in usable if v.is_path(blocks)]
@@ -57,8 +74,9 @@ def bent_laws(
     rate = {v.name: v.rates(time, blocks) for v in turning}
     found += [
         _with_width(
-            Family.FRICTION, v, partial(_friction, rate[v.name]), SPEEDS, float(np.abs(rate[v.name]).max()),
-            f"{v.unit or v.name}/{time_unit}", size, unit, len(turning),
+            f"{Family.FRICTION} of {v.name}", Family.FRICTION, v, partial(_friction, rate[v.name]),
+            tuple(share * float(np.abs(rate[v.name]).max()) for share in SPEEDS),
+            (("size", unit, ""),), ("turns over within", f"{v.unit or v.name}/{time_unit}"), size, len(turning),
         )
         for v in turning
     ]  # fmt: skip
@@ -67,8 +85,31 @@ def bent_laws(
     return found + [_scaled(a, b, blocks, size, unit, len(pairs)) for a, b in pairs]
 
 
-def _largest(variable: Variable) -> float:
-    return float(np.abs(_about(variable)).max())
+def _grows(
+    variables: Sequence[Variable], simulated: NDArray[np.float64] | None, size: float
+) -> dict[str, float]:
+    """Return whether the simulated value rises (1) or falls (-1) with each variable; 0 if not, or not known."""
+    found = dict.fromkeys((v.name for v in variables), 0.0)
+    if simulated is None or not variables or np.ptp(simulated) == 0.0:
+        return found
+    own = simulated - simulated.mean()
+    same = [v for v in variables if abs(float(np.corrcoef(v.values, simulated)[0, 1])) > 1.0 - SAME]
+    for v in same:
+        found[v.name] = float(np.sign(np.corrcoef(v.values, simulated)[0, 1]))
+    if same:
+        return found
+    columns = np.column_stack([(v.values - v.values.mean()) / np.std(v.values) for v in variables])
+    slopes = np.linalg.lstsq(columns, own, rcond=None)[0]
+    left = float(np.std(own - columns @ slopes))
+    # What is limited, or missing within a width, is no larger than what is simulated.
+    if left**2 <= (1.0 - MADE) * float(np.var(own)):
+        for v, slope in zip(variables, slopes.tolist(), strict=True):
+            found[v.name] = float(np.sign(slope)) if abs(slope) > max(left, 0.5 * size) else 0.0
+    return found
+
+
+SAME = 1e-6
+"""One less the correlation with the simulated value from which on a variable is that value."""
 
 
 def _about(variable: Variable) -> NDArray[np.float64]:
@@ -77,61 +118,98 @@ def _about(variable: Variable) -> NDArray[np.float64]:
     return variable.values - middle
 
 
-def _saturation(variable: Variable, point: tuple[float, ...]) -> NDArray[np.float64]:
-    return np.tanh(_about(variable) / point[0])[:, None]
+def _bend(family: Family, variable: Variable, grows: float, size: float, unit: str, members: int) -> Law:
+    """Return saturation or dead zone, by how the measured value depends on a variable.
 
-
-def _dead_zone(variable: Variable, point: tuple[float, ...]) -> NDArray[np.float64]:
+    A limit and a dead zone of one width make a straight line together. Where the simulation has that line, an object
+    with a limit lacks what is beyond the width, and one with a dead zone lacks what is within: the sign decides.
+    """
     values = _about(variable)
-    return (values - np.clip(values, -point[0], point[0]))[:, None]
+    largest = float(np.abs(values).max())
+    slope = f"{unit}/{variable.unit}" if variable.unit else unit
+
+    def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+        width = min(point[0], WIDEST * largest)
+        within = np.clip(values, -width, width)
+        if family is Family.DEAD_ZONE:
+            return np.column_stack([values - within, -within] if grows else [values - within]) * (grows or 1.0)
+        smooth = np.tanh(values / point[0])
+        limits = [smooth, within / width]
+        return np.column_stack([*limits, within - values, point[0] * smooth - values] if grows else limits) * (grows or 1.0)
+
+    names = (
+        (("slope beyond", slope, "which the simulation lacks"), ("slope within", slope, "which the simulation has straight"))
+        if family is Family.DEAD_ZONE
+        else (
+            ("limit", unit, "rounded"),
+            ("limit", unit, "sharp"),
+            ("slope", slope, "sharp, which the simulation has straight"),
+            ("slope", slope, "rounded, which the simulation has straight"),
+        )
+    )
+    own = names if grows else names[: 1 if family is Family.DEAD_ZONE else 2]
+    width = ("half width" if family is Family.DEAD_ZONE else "turns over within", variable.unit)
+    grid = tuple(share * largest for share in WIDTHS[family])
+    law = _with_width(f"{family} of {variable.name}", family, variable, columns, grid, own, width, size, members)
+    return replace(law, positive=(True,) * len(own)) if grows else law
+
+
+def _knee(side: str, variable: Variable, size: float, unit: str, members: int) -> Law:
+    """Return a straight line with another slope on one side of a place."""
+
+    def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+        beyond = variable.values - point[0]
+        return (np.maximum(beyond, 0.0) if side == "upper" else np.minimum(beyond, 0.0))[:, None]
+
+    slope = f"{unit}/{variable.unit}" if variable.unit else unit
+    grid = tuple(variable.low + share * variable.extent for share in KNEES)
+    return _with_width(
+        f"{side} {Family.KNEE} of {variable.name}", Family.KNEE, variable, columns, grid, (("slope beyond", slope, ""),),
+        ("knee", variable.unit), size, members,
+    )  # fmt: skip
 
 
 def _friction(rate: NDArray[np.float64], point: tuple[float, ...]) -> NDArray[np.float64]:
     return np.tanh(rate / point[0])[:, None]
 
 
-SCALES_WITH = frozenset({Kind.FORCE, Kind.SPEED, Kind.ANY})
-"""Kinds that a force may be in proportion to: a load, a current or a speed has a zero of its own, a place or a temperature has none."""
-
-_NUMBERS = {
-    Family.SATURATION: ("limit", "turns over within"),
-    Family.DEAD_ZONE: ("slope beyond", "half width"),
-    Family.FRICTION: ("size", "turns over within"),
-}
-
-
 def _with_width(
+    name: str,
     family: Family,
     variable: Variable,
     columns: Callable[[tuple[float, ...]], NDArray[np.float64]],
-    shares: Sequence[float],
-    largest: float,
-    width_unit: str,
+    grid: tuple[float, ...],
+    amplitudes: Sequence[tuple[str, str, str]],
+    width: tuple[str, str],
     size: float,
-    unit: str,
     members: int,
 ) -> Law:
-    """Return a law with one amplitude and one width, tried at shares of the largest value."""
-    slope = family is Family.DEAD_ZONE
+    """Return a law with one of some amplitudes, each with name, unit and label, and one width or place with its unit."""
+    weight = -float(np.log(len(amplitudes)))
+    choices = tuple(((k,), weight, label) for k, (_, _, label) in enumerate(amplitudes))
     return Law(
-        name=f"{family} of {variable.name}",
+        name=name,
         columns=columns,
-        plausible=np.array([size]),
-        parameters=_NUMBERS[family],
-        units=(f"{unit}/{variable.unit}" if slope and variable.unit else unit, width_unit),
-        grids=(tuple(share * largest for share in shares),),
+        plausible=np.full(len(amplitudes), size),
+        parameters=(*(one for one, _, _ in amplitudes), width[0]),
+        units=(*(unit for _, unit, _ in amplitudes), width[1]),
+        grids=(grid,),
         log_odds=log_odds(members) + float(np.log(0.5 * BENT)) + odds_of_driven([variable]),
+        choices=choices if len(choices) > 1 else (),
         reach=size,
         family=family,
         variables=(variable,),
     )
 
 
-def integral_of(variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
-    """Return a variable's integral about its mean by trapezoids, zero at each block's first row, shape (n,)."""
+SCALES_WITH = frozenset({Kind.FORCE, Kind.SPEED, Kind.ANY})
+"""Kinds that a force may be in proportion to: a load, a current or a speed has a zero of its own, a place or a temperature has none."""
+
+def integral_of(values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
+    """Return an integral by trapezoids, zero at each block's first row, shape (n,)."""
     found = np.zeros(len(time))
     for rows in blocks:
-        own = variable.travel(rows) - float(np.mean(variable.values))
+        own = values[rows]
         found[rows] = np.concatenate([[0.0], np.cumsum(0.5 * (own[1:] + own[:-1]) * np.diff(time[rows]))])
     return found
 
@@ -145,19 +223,26 @@ def _integral(
     unit: str,
     members: int,
 ) -> Law:
-    """Return a law for what accumulates, such as mass or heat, with each run's initial value."""
+    """Return a law for what accumulates, such as mass or heat, with each run's initial value.
+
+    A signal's own zero is seldom its unit's: a flow that leaves, a bias, a room. It makes a steady drift beside.
+    """
     starts = starts_of(blocks) if len(blocks) > 1 else 0
-    samples = np.zeros((len(time), 1 + starts))
-    samples[:, 0] = integral_of(variable, time, blocks)
+    middle = 0.5 * (variable.low + variable.high)
+    travel = np.concatenate([variable.travel(rows) for rows in blocks])
+    samples = np.zeros((len(time), 2 + starts))
+    samples[:, 0] = integral_of(travel - middle, time, blocks)
+    samples[:, 1] = integral_of(np.ones(len(time)), time, blocks)
     for k, rows in enumerate(blocks if starts else ()):
-        samples[rows, 1 + (k if starts > 1 else 0)] = 1.0
+        samples[rows, 2 + (k if starts > 1 else 0)] = 1.0
     return Law(
         name=f"{Family.INTEGRAL} of {variable.name}",
         columns=lambda _point: samples,
-        plausible=np.full(1 + starts, size),
-        parameters=("rate", *(f"start {k + 1}" for k in range(starts))),
-        units=(f"{unit}/({variable.unit or variable.name} {time_unit})", *[unit] * starts),
+        plausible=np.full(2 + starts, size),
+        parameters=("rate", "drift", *(f"start {k + 1}" for k in range(starts))),
+        units=(f"{unit}/({variable.unit or variable.name} {time_unit})", f"{unit}/{time_unit}", *[unit] * starts),
         log_odds=log_odds(members) + float(np.log(0.5 * BENT)) + odds_of_driven([variable]),
+        zero_from=middle,
         reach=size,
         family=Family.INTEGRAL,
         variables=(variable,),

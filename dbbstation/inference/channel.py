@@ -77,7 +77,9 @@ class Law:
         discrepancy: columns of departure, shape (n, q), from effect, shape (n,), nonlinear parameters and amplitudes, shape (p,),
             with `form_uncertainty` as standard deviation; default: the effect times smooth functions of `follows`.
         at: columns about amplitudes, shape (p,), exact there; None if the effect is proportional.
-        choices: alternative forms: columns, log probability, label; not with `positive`.
+        choices: alternative forms: columns, log probability, label.
+        zero_from: middle of the variable that the first amplitude acts on and from which the second, over the first, moves
+            the zero; None: no such zero.
         reach: largest effect of each amplitude, one standard deviation, in the residual's unit; None: `plausible` holds
             everywhere.
         family: of patterns; None for a client's physics.
@@ -101,6 +103,7 @@ class Law:
     log_odds: float = NAMED_ODDS
     at: Callable[[tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]] | None = None
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    zero_from: float | None = None
     reach: float | None = None
     family: Family | None = None
     variables: tuple[Variable, ...] = ()

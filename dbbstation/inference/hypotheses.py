@@ -382,7 +382,7 @@ class _Search:
     def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:
         more, known = 0.0, beside.log_evidence(members)
         for k, member in enumerate(members):
-            if not len(member.variant.slack):
+            if len(member.variant.slack) == member.variant.tangents:
                 continue
             tried = [
                 member

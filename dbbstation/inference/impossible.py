@@ -17,7 +17,7 @@ NEGATIVE_SIGMA = 3.0
 
 def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.float64]) -> str:
     """Return why amplitudes are impossible, or an empty text."""
-    for k, positive in enumerate(law.positive):
+    for k, positive in enumerate(law.positive[: len(values)]):
         value = float(values[k])
         sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
         if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k])):

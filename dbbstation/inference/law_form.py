@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.followed import followed_by
+from dbbstation.inference.impossible import impossible
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
 from dbbstation.inference.triangle import left_by
 from dbbstation.inference.verdict import ABSENT, SURE
@@ -108,7 +109,8 @@ def _candidates(
     rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & set(wanted) and c.name not in taken]
     scan = comparison.scan(others, rivals)
     worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-    best = {scan.causes[k].name: k for k in np.argsort(-worth)[: BOUNDS.candidates].tolist()}
+    possible = [k for k in np.argsort(-worth).tolist() if _is_possible(settled, scan.best[k], others)]
+    best = {scan.causes[k].name: k for k in possible[: BOUNDS.candidates]}
     best |= {scan.causes[k].name: k for k in range(len(worth)) if len(names) == 1 and scan.causes[k].name in names}
     found: dict[str, tuple[Member, ...]] = {name: (scan.best[k],) for name, k in best.items()}
     # A set that was compared has what its formulas may be off by in it.
@@ -124,6 +126,15 @@ def _candidates(
         odds = sum(m.cause.log_prior_odds + m.variant.log_weight for m in own)
         values[name] = comparison.log_evidence((*own, *others)) - comparison.log_evidence(others) + odds
     return found, values
+
+
+def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> bool:
+    """Return whether a law has no amplitude that it cannot have."""
+    if not any(member.variant.positive):
+        return True
+    found, width = settled.comparison.estimates([member, *others]), len(member.variant.columns)
+    law = settled.bank.laws[member.cause.name]
+    return not impossible(law, found.values[:width], np.diag(found.covariance)[:width])
 
 
 def _is_worse(best: NDArray[np.float64], other: NDArray[np.float64], parts: Sequence[NDArray[np.bool_]] | None) -> bool:

@@ -59,6 +59,7 @@ class Variant:
         slack: columns, shape (d,).
         slack_sd: at amplitudes `slack_at`, shape (d,).
         slack_at: rms amplitude in plausible ones.
+        tangents: first columns of slack, of nonlinear parameters, which are not formula inaccuracy.
         positive: shape (p,); may be empty.
     """
 
@@ -72,6 +73,7 @@ class Variant:
     slack: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     slack_sd: NDArray[np.float64] = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
+    tangents: int = 0
     positive: tuple[bool, ...] = ()
 
 
@@ -113,7 +115,10 @@ class Member:
     @cached_property
     def sd(self) -> NDArray[np.float64]:
         """Return prior standard deviations."""
-        return np.concatenate([self.variant.plausible * self.scale, self.variant.slack_sd * self.slack_scale])
+        slack = self.variant.slack_sd * self.slack_scale
+        # A parameter is as unknown as it is where a formula is closer than stated.
+        slack[: self.variant.tangents] /= self.slack_share
+        return np.concatenate([self.variant.plausible * self.scale, slack])
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,6 +55,11 @@ def values_of_law(
     for k, name in enumerate(law.parameters[every:]):
         known = len(member.variant.slack) > k
         found[name] = Value(shaped[k], float(sigma[width + k] / per) if known else np.nan, law.units[every + k])
+    if law.zero_from is not None and values[0]:
+        moved_by = float(values[1] / values[0])
+        slopes = np.array([moved_by, -1.0]) / values[0]
+        u = float(np.sqrt(max(slopes @ covariance[:2, :2] @ slopes, 0.0)))
+        found["zero"] = Value(law.zero_from - moved_by, u, law.variables[0].unit)
     return found
 
 

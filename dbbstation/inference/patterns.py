@@ -48,6 +48,7 @@ class Family(StrEnum):
     INTEGRAL = "integral"
     SATURATION = "saturation"
     DEAD_ZONE = "dead zone"
+    KNEE = "knee"
     FRICTION = "friction"
     SCALED = "scaled hysteresis"
     DRIFT = "drift"

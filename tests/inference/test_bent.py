@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from dbbstation.inference.bent import bent_laws, integral_of
 from dbbstation.inference.impossible import beyond_reach
@@ -41,6 +42,8 @@ def test_columns_are_their_formulas():
         ("saturation of q", 7.0): np.tanh(data.q / 7.0),
         ("dead zone of q", 7.0): np.where(np.abs(data.q) > 7.0, data.q - 7.0 * np.sign(data.q), 0.0),
         ("friction of q", 2.5): np.tanh(rate / 2.5),
+        ("upper knee of q", 7.0): np.where(data.q > 7.0, data.q - 7.0, 0.0),
+        ("lower knee of q", 7.0): np.where(data.q < 7.0, data.q - 7.0, 0.0),
         ("saturation of temperature", 0.5): np.tanh(
             (data.temperature - 0.5 * (data.temperature.min() + data.temperature.max())) / 0.5
         ),
@@ -55,10 +58,10 @@ def test_columns_are_their_formulas():
 def test_the_integral_of_a_sine_is_a_cosine():
     time = np.linspace(0.0, 6.0 * np.pi, 2001)
     wave = Variable("x", "A", Kind.ANY, np.sin(time))
-    found = integral_of(wave, time, (slice(0, 2001),))
+    found = integral_of(wave.values, time, (slice(0, 2001),))
     assert found == pytest.approx(1.0 - np.cos(time), abs=2e-5)
     # Each run begins at zero again.
-    both = integral_of(wave, time, (slice(0, 1000), slice(1000, 2001)))
+    both = integral_of(wave.values, time, (slice(0, 1000), slice(1000, 2001)))
     assert both[1000] == 0.0
     assert both[1000:] == pytest.approx(found[1000:] - found[1000], abs=1e-12)
 
@@ -67,7 +70,7 @@ def test_rows_without_order_have_no_direction_and_no_past():
     data = table(1, rows=200)
     variables = channel(data, blocks=1).variables
     found = bent_laws(variables, None, "s", (slice(0, 200),), 0.2, "mm")
-    assert {law.family for law in found} == {Family.SATURATION, Family.DEAD_ZONE}
+    assert {law.family for law in found} == {Family.SATURATION, Family.DEAD_ZONE, Family.KNEE}
 
 
 MISSING = {
@@ -76,8 +79,13 @@ MISSING = {
     "scaled hysteresis of q by load": (lambda d: 0.08 * direction(d.q) * d.load, {"size per unit": 0.08}),
     "integral of q": (
         lambda d: 0.005 * np.concatenate([[0.0], np.cumsum(0.5 * (d.q[1:] + d.q[:-1]) * np.diff(d.t))]),
-        {"rate": 0.005},
+        {"rate": 0.005, "zero": 0.0},
     ),
+    "integral of temperature": (
+        lambda d: 0.05 * integral_of(d.temperature - 21.0, d.t, (slice(0, len(d.t)),)),
+        {"rate": 0.05, "zero": 21.0},
+    ),
+    "upper knee of q": (lambda d: -0.05 * np.maximum(d.q - 9.0, 0.0), {"slope beyond": -0.05, "knee": 9.0}),
 }
 
 
@@ -97,6 +105,45 @@ def test_a_table_that_lacks_one_names_it_with_its_numbers(name):
     values = named_values(settled, member, estimates.values[:width], estimates.covariance[:width, :width])
     for number, true in numbers.items():
         assert abs(values[number].value - true) < 4.0 * values[number].uncertainty + 0.02 * abs(true)
+
+
+def test_a_simulated_straight_line_tells_a_dead_zone_from_a_limit():
+    """Measured is flat within 7 where the simulation goes straight on, or beyond it: the difference has the other form."""
+    data = table(1, rows=400)
+    variables, blocks = channel(data, blocks=1).variables, (slice(0, 400),)
+    within = np.clip(data.q, -7.0, 7.0)
+    for slope in (2.0, -2.0):
+        simulated = slope * data.q + 0.3 * data.load
+        laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", simulated)}
+        for name, measured in (("dead zone of q", slope * (data.q - within)), ("saturation of q", slope * within)):
+            law = laws[name]
+            columns = law.columns((7.0,))
+            amplitudes = [float(c @ (measured - slope * data.q) / (c @ c)) for c in columns.T]
+            left = [np.abs(a * c - (measured - slope * data.q)).max() for a, c in zip(amplitudes, columns.T, strict=True)]
+            assert min(left) < 1e-12
+            assert amplitudes[int(np.argmin(left))] == pytest.approx(abs(slope))
+            assert all(law.positive)
+    # What the simulation does not have in a straight line has no sign.
+    laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", np.cos(data.t))}
+    assert not laws["dead zone of q"].positive
+
+
+def test_u_of_a_width_is_that_of_least_squares():
+    data = table(5, lambda d: 0.3 * np.tanh(d.q / 12.0), rows=700)
+    whole = replace(channel(data, blocks=1), laws=(laws_of(data)["saturation of q"],))
+    settled = settle(whole, beginnings=ONE, thorough=False)
+    (member,) = settled.best.members
+    estimates = settled.comparison.estimates([member])
+    value = named_values(settled, member, estimates.values, estimates.covariance)["turns over within"]
+    base = whole.base.samples
+
+    def left(p):
+        return whole.residual - base @ p[2:] - p[0] * np.tanh(data.q / p[1])
+
+    fitted = least_squares(left, [0.3, 12.0, *np.zeros(base.shape[1])])
+    covariance = np.linalg.inv(fitted.jac.T @ fitted.jac) * 2.0 * fitted.cost / (len(data.q) - len(fitted.x))
+    assert value.value == pytest.approx(fitted.x[1], abs=0.5 * value.uncertainty)
+    assert value.uncertainty == pytest.approx(np.sqrt(covariance[1, 1]), rel=0.2)
 
 
 def test_an_effect_many_times_the_difference_is_refused():

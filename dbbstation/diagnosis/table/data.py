@@ -91,7 +91,7 @@ class Table:
         )
         laws = [self._law(source) for source in sources]
         if (size := float(np.std(residual))) > 0.0:
-            laws += bent_laws(follows, time, time_unit, self.blocks, size, self.unit)
+            laws += bent_laws(follows, time, time_unit, self.blocks, size, self.unit, self.simulated)
             if time is not None:
                 laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
         return Channel(

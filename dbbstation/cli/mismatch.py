@@ -129,9 +129,6 @@ def _print_first(result: MismatchResult) -> None:
 
 def _print_whether(result: MismatchResult) -> None:
     unit, noise, rms = result.unit, result.noise, result.residual_rms
-    offset = result.offset
-    if offset and offset.significant:
-        echo(f"Measured less simulated is {offset.in_words} on average; this is fitted and is not counted below.")
     # The levels above tell whether something differs; what follows them is its size.
     differs = result.levels.differs.answer
     if differs == "cannot tell":

@@ -85,9 +85,7 @@ def bent_laws(
     return found + [_scaled(a, b, blocks, size, unit, len(pairs)) for a, b in pairs]
 
 
-def _grows(
-    variables: Sequence[Variable], simulated: NDArray[np.float64] | None, size: float
-) -> dict[str, float]:
+def _grows(variables: Sequence[Variable], simulated: NDArray[np.float64] | None, size: float) -> dict[str, float]:
     """Return whether the simulated value rises (1) or falls (-1) with each variable; 0 if not, or not known."""
     found = dict.fromkeys((v.name for v in variables), 0.0)
     if simulated is None or not variables or np.ptp(simulated) == 0.0:
@@ -135,10 +133,15 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
             return np.column_stack([values - within, -within] if grows else [values - within]) * (grows or 1.0)
         smooth = np.tanh(values / point[0])
         limits = [smooth, within / width]
-        return np.column_stack([*limits, within - values, point[0] * smooth - values] if grows else limits) * (grows or 1.0)
+        return np.column_stack([*limits, within - values, point[0] * smooth - values] if grows else limits) * (
+            grows or 1.0
+        )
 
     names = (
-        (("slope beyond", slope, "which the simulation lacks"), ("slope within", slope, "which the simulation has straight"))
+        (
+            ("slope beyond", slope, "which the simulation lacks"),
+            ("slope within", slope, "which the simulation has straight"),
+        )
         if family is Family.DEAD_ZONE
         else (
             ("limit", unit, "rounded"),
@@ -204,6 +207,7 @@ def _with_width(
 
 SCALES_WITH = frozenset({Kind.FORCE, Kind.SPEED, Kind.ANY})
 """Kinds that a force may be in proportion to: a load, a current or a speed has a zero of its own, a place or a temperature has none."""
+
 
 def integral_of(values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
     """Return an integral by trapezoids, zero at each block's first row, shape (n,)."""

@@ -24,6 +24,10 @@ POINTS_PER_WIDTH = 3
 WIDTHS = 4.0
 
 
+HARMONICS = (2, 3, 5, 8)
+"""Multiples of a pitch that are tried as one wave with it, up to which: what is periodic is seldom a sine, and its shape is not known."""
+
+
 class Form(ABC):
     """A family of curves with p amplitudes."""
 
@@ -93,26 +97,28 @@ class Walk(Form):
 
 @dataclass(frozen=True, eq=False)
 class Wave(Form):
-    """Cosine and sine of a frequency [1 / unit]."""
+    """Cosine and sine of a frequency [1 / unit], and of its multiples."""
 
     frequency: float
+    harmonics: int = 1
 
     @property
     def count(self) -> int:
-        return 2
+        return 2 * self.harmonics
 
     def text(self, unit: str) -> str:
-        return f"period {1.0 / self.frequency:.6g} {unit}"
+        more = f" and {self.harmonics - 1} harmonics" if self.harmonics > 1 else ""
+        return f"period {1.0 / self.frequency:.6g} {unit}{more}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        phase = 2.0 * np.pi * self.frequency * values
-        return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+        phase = 2.0 * np.pi * self.frequency * np.asarray(values)
+        return np.stack([f(k * phase) for k in range(1, self.harmonics + 1) for f in (np.cos, np.sin)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         periods = (high - low) * self.frequency
         periods = periods if periods <= _MOST_PERIODS else 1.0
         span = periods / self.frequency
-        return np.linspace(low, low + span, max(2, int(np.ceil(periods * POINTS_PER_WAVE)) + 1))
+        return np.linspace(low, low + span, max(2, int(np.ceil(periods * self.harmonics * POINTS_PER_WAVE)) + 1))
 
 
 _MOST_PERIODS = 100.0

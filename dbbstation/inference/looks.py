@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.curves import Spline
-from dbbstation.inference.forms import Bump, StepForm, Wave
+from dbbstation.inference.forms import HARMONICS, Bump, StepForm, Wave
 from dbbstation.inference.patterns import Family, Pattern, log_odds
 from dbbstation.inference.sums import FINER, Sums, bumps, peaks, steps
 from dbbstation.inference.variables import Kind
@@ -26,7 +26,7 @@ PLACED = (Family.WAVE, Family.BUMP, Family.STEP)
 """Patterns whose place, width or frequency is a nonlinear parameter."""
 
 ROWS_PER_PIECE = 4
-"""Rows in a piece of a variable, at the least, on average."""
+"""Rows in a piece of a variable, at the least, on average; waves over what is no time have one, since a pitch of four rows is a wave."""
 
 PIECES_PER_WAVE = 4
 """Pieces in the shortest wave."""
@@ -51,14 +51,17 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
     found: list[Pattern] = []
     for variable in variables:
         values = variable.values[kept]
-        pieces = min(BOUNDS.pieces, len(np.unique(values)) // 2, len(values) // ROWS_PER_PIECE)
+        distinct = len(np.unique(values))
+        pieces = min(BOUNDS.pieces, distinct // 2, len(values) // ROWS_PER_PIECE)
         if pieces < 2 * PIECES_PER_WAVE:
             continue
         sums = _sums(left, values, pieces, size)
+        fine = pieces if variable.kind is Kind.TIME else min(BOUNDS.pieces, distinct)
         # Where noise is not white, a first look does not know how much of each form whitening leaves.
         roughly = left.whitening is not None
         most = BOUNDS.strongest_coloured if roughly else BOUNDS.strongest
-        found += _waves(variable, sums, float(np.ptp(values)), pieces, most, roughly=roughly)
+        finely = sums if fine == pieces else _sums(left, values, fine, size)
+        found += _waves(variable, finely, float(np.ptp(values)), fine, most, roughly=roughly)
         finer = [n for n in FINER_CURVES if n * PIECES_PER_WAVE <= pieces]
         found += [
             _pattern(variable, Family.CURVE, Spline(variable.low, variable.high, n), 1.0, f"{n} points") for n in finer
@@ -111,7 +114,13 @@ def _waves(
     found = sums.finer(
         [float(grid[k]) for k in peaks(explained, 2 * strongest) if explained[k] >= least], variable.extent
     )
-    return [_pattern(variable, Family.WAVE, wave, tried) for _, wave in found[:strongest]]
+    waves = [wave for _, wave in found[:strongest]]
+    if variable.kind is not Kind.TIME:
+        # What is found may be the pitch, or a multiple of it.
+        pitches = [wave.frequency / k for wave in waves[: BOUNDS.strongest] for k in (1, 2, 3)]
+        most = pieces / (2.0 * extent)
+        waves += [Wave(f, h) for f in pitches if f > 2.0 / extent for h in HARMONICS if h * f < most]
+    return [_pattern(variable, Family.WAVE, wave, tried) for wave in waves]
 
 
 def _least(tried: float) -> float:
@@ -149,7 +158,11 @@ def _moved(form: Form, finer: float, extent: float) -> list[Form]:
     if isinstance(form, StepForm):
         return [StepForm(form.at + away * finer * form.width, form.width) for away in steps]
     if isinstance(form, Wave):
-        return [Wave(max(form.frequency + away * finer * FINER[0] / extent, 0.25 / extent)) for away in steps]
+        finer /= form.harmonics
+        return [
+            Wave(max(form.frequency + away * finer * FINER[0] / extent, 0.25 / extent), form.harmonics)
+            for away in steps
+        ]
     return [form]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.bank import amplitudes_of
+from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
 from dbbstation.inference.settle import growth, moved
 
@@ -79,7 +80,7 @@ def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Va
 _NAMES = {
     "once per turn": ("cosine", "sine"),
     "twice per turn": ("cosine", "sine"),
-    "wave": ("cosine", "sine"),
+    "wave": ("cosine", "sine", *(f"{name} {k}" for k in range(2, max(HARMONICS) + 1) for name in ("cosine", "sine"))),
     "hysteresis": ("half width",),
     "speed": ("per speed",),
     "lag": ("delay",),

@@ -133,7 +133,10 @@ class MismatchResult(Framed):
 
     def sentences(self) -> list[str]:
         """Return the answer in three levels, in words; a notebook shows it above the table."""
-        return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
+        found = level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
+        if self.offset is not None and self.offset.significant:
+            found[0] += f" On average they differ by {self.offset.in_words}, which is fitted and not counted here."
+        return found
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
         write_table(path, table_csv(list(self.table), list(self.table.values())), provenance, force=force)

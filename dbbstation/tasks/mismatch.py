@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
@@ -223,7 +224,7 @@ def mismatch(
 def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
     corrected = found.table.simulated + found.correction
     columns: dict[str, tuple[str | float, ...]] = {name: tabulated.columns[name] for name in tabulated.names}
-    unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""
+    unit = "".join(f"_{word}" for word in re.findall(r"\w+", found.table.unit.replace("µ", "u").lower()))
     for name, values in ((CORRECTED, corrected), (LEFT, found.table.measured - corrected)):
         columns[_unused(f"{name}{unit}", columns)] = tuple(values.tolist())
     return columns

@@ -401,6 +401,8 @@ class _Reader:
     def _meaning(self, name: str) -> Meaning:
         stated = (self._asked.variables or {}).get(name)
         found = stated or meaning_of(name)
+        if any(name in file.instants for file in self._files):
+            return Meaning("s", Kind.TIME)
         return Meaning(found.unit, Kind.TIME) if name == self._asked.time else found
 
     def _variable(self, name: str, values: Floats, *, quiet: bool = False) -> Variable | None:
@@ -424,7 +426,10 @@ class _Reader:
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, Floats]) -> bool:
+        """Return whether a column derives from the measured value, beside the simulated one or alone."""
         asked = self._asked
+        if _is_a_line(kept[asked.simulated], variable.values):
+            return False  # such as a speed, to which a simulated friction is proportional
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.measured], kept[asked.simulated]])
         values, *_ = np.linalg.lstsq(both, variable.values, rcond=None)
         left = variable.values - both @ values

@@ -119,7 +119,9 @@ def test_a_simulated_straight_line_tells_a_dead_zone_from_a_limit():
             law = laws[name]
             columns = law.columns((7.0,))
             amplitudes = [float(c @ (measured - slope * data.q) / (c @ c)) for c in columns.T]
-            left = [np.abs(a * c - (measured - slope * data.q)).max() for a, c in zip(amplitudes, columns.T, strict=True)]
+            left = [
+                np.abs(a * c - (measured - slope * data.q)).max() for a, c in zip(amplitudes, columns.T, strict=True)
+            ]
             assert min(left) < 1e-12
             assert amplitudes[int(np.argmin(left))] == pytest.approx(abs(slope))
             assert all(law.positive)

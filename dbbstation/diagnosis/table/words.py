@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from dbbstation.inference.read_off import CauseFinding
 
 MEANINGS: dict[Family, str] = {
-    Family.LINEAR: "It grows in proportion: a scale, a stiffness or an expansion that the simulation has wrong or lacks.",
+    Family.LINEAR: "It grows in proportion: a scale, a stiffness, an expansion or, along another axis, a squareness that the simulation has wrong or lacks.",
     Family.ONCE: "It closes once per turn: something is off centre, or an axis is tilted.",
     Family.TWICE: "It closes twice per turn: something is oval, or an axis wobbles.",
-    Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction.",
+    Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction. Positive is more while this variable rises.",
     Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
     Family.LAG: "The measured value runs after the simulated one (negative: ahead of it).",
     Family.MEMORY: "It follows this variable late: a body warms up, a material creeps, a sensor or a filter lags.",

@@ -6,6 +6,7 @@ import difflib
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -46,6 +47,7 @@ class TableFile:
         lines: number of each row's line, shape (n,).
         cells: texts by column, n each, with a decimal point.
         values: numbers by column, shape (n,); NaN for empty cells and texts.
+        instants: columns of dates and times, of which the numbers are seconds after the first.
     """
 
     file: str
@@ -54,6 +56,7 @@ class TableFile:
     lines: NDArray[np.int64]
     cells: dict[str, tuple[str, ...]]
     values: dict[str, Floats] = field(default_factory=dict)
+    instants: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -124,7 +127,10 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
     values = {name: _numbers(column, language) for name, column in columns.items()}
     if language.decimal != PLAIN.decimal:
         columns = {name: _plain(column, values[name], language) for name, column in columns.items()}
-    return TableFile(file, header, tuple(names), np.array(places, dtype=np.int64), columns, values)
+    texts = [name for name in names if not np.isfinite(values[name]).any()]
+    instants = {name: at for name in texts if (at := _seconds(columns[name])) is not None}
+    places_of = np.array(places, dtype=np.int64)
+    return TableFile(file, header, tuple(names), places_of, columns, values | instants, frozenset(instants))
 
 
 class AnyFrame(Protocol):
@@ -160,9 +166,8 @@ def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table")
     ]
     if faults or not length:
         raise InputError(faults[:MOST_FAULTS] or [Problem(file, 0, 0, "there are no rows")])
-    for name, one in arrays.items():
-        if one.dtype.kind in "mM":
-            arrays[name] = (one - one[0]) / np.timedelta64(1, "s")
+    instants = frozenset(name for name, one in arrays.items() if one.dtype.kind in "mM")
+    arrays |= {name: (arrays[name] - arrays[name][0]) / np.timedelta64(1, "s") for name in instants}
     cells = {
         name: tuple("" if value is None or value != value else str(value) for value in one.tolist())  # noqa: PLR0124 - NaN
         for name, one in arrays.items()
@@ -171,7 +176,17 @@ def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table")
         name: one.astype(float) if one.dtype.kind in "biuf" else _numbers(cells[name], PLAIN)
         for name, one in arrays.items()
     }
-    return TableFile(file, 0, tuple(arrays), np.arange(1, length + 1), cells, values)
+    return TableFile(file, 0, tuple(arrays), np.arange(1, length + 1), cells, values, instants)
+
+
+def _seconds(cells: Sequence[str]) -> NDArray[np.float64] | None:
+    """Return seconds after the first of dates and times [ISO 8601]; NaN if empty, None if any is another text."""
+    try:
+        at = [None if cell.lower() in NO_NUMBER else datetime.fromisoformat(cell) for cell in cells]
+        first = next(one for one in at if one is not None)
+        return np.array([np.nan if one is None else (one - first).total_seconds() for one in at])
+    except (ValueError, TypeError, StopIteration):  # some with a time zone and some without differ by nothing known
+        return None
 
 
 def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:

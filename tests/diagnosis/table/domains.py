@@ -84,7 +84,12 @@ def clip_above(rng: np.random.Generator, t: Values) -> Scene:
     limit = float(np.quantile(x, rng.uniform(0.7, 0.9)))
     columns = {"pump_bar": 3.0 + smooth(rng, len(t), 20), "room_c": 21.0 + smooth(rng, len(t), 40)}
     return Scene(
-        columns, x, np.minimum(x, limit) - x, frozenset({SIMULATED}), ("upper knee of", "saturation of"), {"knee": limit}
+        columns,
+        x,
+        np.minimum(x, limit) - x,
+        frozenset({SIMULATED}),
+        ("upper knee of", "saturation of"),
+        {"knee": limit},
     )
 
 
@@ -92,7 +97,13 @@ def clip_both(rng: np.random.Generator, t: Values) -> Scene:
     x = 10.0 * smooth(rng, len(t), 12)
     low, high = np.quantile(x, rng.uniform(0.1, 0.25)), np.quantile(x, rng.uniform(0.75, 0.9))
     columns = {"pump_bar": 3.0 + smooth(rng, len(t), 20), "room_c": 21.0 + smooth(rng, len(t), 40)}
-    return Scene(columns, x, np.clip(x, low, high) - x, frozenset({SIMULATED}), ("saturation of", "upper knee of", "lower knee of"))
+    return Scene(
+        columns,
+        x,
+        np.clip(x, low, high) - x,
+        frozenset({SIMULATED}),
+        ("saturation of", "upper knee of", "lower knee of"),
+    )
 
 
 def valve(rng: np.random.Generator, t: Values) -> Scene:
@@ -100,7 +111,12 @@ def valve(rng: np.random.Generator, t: Values) -> Scene:
     half = float(rng.uniform(0.15, 0.4) * np.abs(u).max())
     columns = {"command_v": u, "oil_c": 40.0 + 3.0 * smooth(rng, len(t), 40)}
     return Scene(
-        columns, 5.0 * u, 5.0 * (dead(u, half) - u), frozenset({"command_v", SIMULATED}), ("dead zone of",), {"half width": half}
+        columns,
+        5.0 * u,
+        5.0 * (dead(u, half) - u),
+        frozenset({"command_v", SIMULATED}),
+        ("dead zone of",),
+        {"half width": half},
     )
 
 
@@ -109,7 +125,12 @@ def stop(rng: np.random.Generator, t: Values) -> Scene:
     half = float(rng.uniform(0.2, 0.5) * np.abs(x).max())
     columns = {"travel_um": x, "load_n": force}
     return Scene(
-        columns, 0.3 * force, 0.5 * dead(x, half), frozenset({"travel_um"}), ("dead zone of",), {"half width": half, "slope": 0.5}
+        columns,
+        0.3 * force,
+        0.5 * dead(x, half),
+        frozenset({"travel_um"}),
+        ("dead zone of",),
+        {"half width": half, "slope": 0.5},
     )
 
 
@@ -122,7 +143,9 @@ def magnet(rng: np.random.Generator, t: Values) -> Scene:
 
 
 def tank(rng: np.random.Generator, t: Values) -> Scene:
-    flow = np.maximum(2.0 + np.repeat(rng.integers(0, 4, len(t) // 8 + 1), 8)[: len(t)] + 0.1 * smooth(rng, len(t), 3), 0.0)
+    flow = np.maximum(
+        2.0 + np.repeat(rng.integers(0, 4, len(t) // 8 + 1), 8)[: len(t)] + 0.1 * smooth(rng, len(t), 3), 0.0
+    )
     columns = {"leak_l_min": flow, "room_c": 20.0 + smooth(rng, len(t), 30)}
     zero, rate = float(rng.uniform(0.0, 3.0)), -0.05
     return Scene(
@@ -136,7 +159,12 @@ def gyro(rng: np.random.Generator, t: Values) -> Scene:
     columns = {"rate_v": rate, "supply_bar": 5.0 + 0.1 * smooth(rng, len(t), 30)}
     gain, zero = 0.04, float(rng.normal(0.0, 2.0))
     return Scene(
-        columns, gathered(rate, t), gain * gathered(rate + zero, t), frozenset({"rate_v", SIMULATED}), ("integral of rate", "linear in simulated"), {"rate": gain}
+        columns,
+        gathered(rate, t),
+        gain * gathered(rate + zero, t),
+        frozenset({"rate_v", SIMULATED}),
+        ("integral of rate", "linear in simulated"),
+        {"rate": gain},
     )
 
 
@@ -146,7 +174,12 @@ def warming(rng: np.random.Generator, t: Values) -> Scene:
     columns = {"oil_c": oil, "place_um": 100.0 * smooth(rng, len(t), 6)}
     effect = 0.8 * (late(oil, t, constant) - 30.0)
     return Scene(
-        columns, 2.0 * smooth(rng, len(t), 9), effect, frozenset({"oil_c"}), ("memory of oil",), {"time constant": constant, "gain": 0.8}
+        columns,
+        2.0 * smooth(rng, len(t), 9),
+        effect,
+        frozenset({"oil_c"}),
+        ("memory of oil",),
+        {"time constant": constant, "gain": 0.8},
     )
 
 
@@ -175,7 +208,13 @@ def spring(rng: np.random.Generator, t: Values) -> Scene:
     x = 10.0 * smooth(rng, len(t), 7)
     columns = {"stretch_um": x, "spin_rpm": 100.0 + 9.0 * smooth(rng, len(t), 12)}
     return Scene(
-        columns, 2.0 * x, 0.002 * x**3, frozenset({"stretch_um", SIMULATED}), ("curve over stretch", f"curve over {SIMULATED}"), {}, {"stiffness": x}
+        columns,
+        2.0 * x,
+        0.002 * x**3,
+        frozenset({"stretch_um", SIMULATED}),
+        ("curve over stretch", f"curve over {SIMULATED}"),
+        {},
+        {"stiffness": x},
     )
 
 
@@ -192,7 +231,12 @@ def barometer(rng: np.random.Generator, t: Values) -> Scene:
     pressure, height = 1000.0 + 12.0 * rng.standard_normal(len(t)), rng.uniform(0.0, 800.0, len(t))
     columns = {"pressure_hpa": pressure, "height_m": height}
     return Scene(
-        columns, 300.0 + 0.1 * height, 0.27 * (pressure - 1000.0), frozenset({"pressure_hpa"}), ("linear in pressure",), {"size": 0.27}
+        columns,
+        300.0 + 0.1 * height,
+        0.27 * (pressure - 1000.0),
+        frozenset({"pressure_hpa"}),
+        ("linear in pressure",),
+        {"size": 0.27},
     )
 
 

@@ -15,7 +15,7 @@ from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, 
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -51,18 +51,17 @@ def bent_laws(
     blocks: Sequence[slice],
     size: float,
     unit: str,
-    simulated: NDArray[np.float64] | None = None,
+    grows: Mapping[str, float] | None = None,
 ) -> list[Law]:
     """Return saturation, dead zone and knees of each variable; over time also friction, integral and scaled hysteresis.
 
     Args:
-        simulated: what the difference is added to, shape (n,); its straight lines tell a limit from a dead zone.
+        grows: whether the simulated value rises with each variable [`grows_with`], which tells a limit from a dead zone.
     """
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0]
-    bending = [v for v in usable if len(np.unique(v.values)) >= DISTINCT]
-    grows = _grows(bending, simulated, size)
+    bending = [v for v in usable if v.distinct >= DISTINCT]
     found = [
-        _bend(family, v, grows[v.name], size, unit, len(bending))
+        _bend(family, v, (grows or {}).get(v.name, 0.0), size, unit, len(bending))
         for family in (Family.SATURATION, Family.DEAD_ZONE)
         for v in bending
     ]
@@ -70,7 +69,7 @@ def bent_laws(
     if time is None or any(np.any(np.diff(time[rows]) <= 0.0) for rows in blocks):
         return found
     paths = [v for v in usable if v.is_path(blocks)]
-    turning = [v for v in paths if v.kind in TRAVELS and np.ptp(v.directions(blocks)) > 0.0]
+    turning = [v for v in paths if v.kind in TRAVELS and (v.range or np.ptp(v.directions(blocks)) > 0.0)]
     rate = {v.name: v.rates(time, blocks) for v in turning}
     found += [
         _with_width(
@@ -85,10 +84,11 @@ def bent_laws(
     return found + [_scaled(a, b, blocks, size, unit, len(pairs)) for a, b in pairs]
 
 
-def _grows(variables: Sequence[Variable], simulated: NDArray[np.float64] | None, size: float) -> dict[str, float]:
+def grows_with(variables: Sequence[Variable], simulated: NDArray[np.float64], size: float) -> dict[str, float]:
     """Return whether the simulated value rises (1) or falls (-1) with each variable; 0 if not, or not known."""
+    variables = [v for v in variables if v.kind is not Kind.TIME and v.distinct >= DISTINCT]
     found = dict.fromkeys((v.name for v in variables), 0.0)
-    if simulated is None or not variables or np.ptp(simulated) == 0.0:
+    if not variables or np.ptp(simulated) == 0.0:
         return found
     own = simulated - simulated.mean()
     same = [v for v in variables if abs(float(np.corrcoef(v.values, simulated)[0, 1])) > 1.0 - SAME]
@@ -110,20 +110,15 @@ SAME = 1e-6
 """One less the correlation with the simulated value from which on a variable is that value."""
 
 
-def _about(variable: Variable) -> NDArray[np.float64]:
-    """Return values about zero if they have both signs, else about the middle of their range."""
-    middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
-    return variable.values - middle
-
-
 def _bend(family: Family, variable: Variable, grows: float, size: float, unit: str, members: int) -> Law:
     """Return saturation or dead zone, by how the measured value depends on a variable.
 
     A limit and a dead zone of one width make a straight line together. Where the simulation has that line, an object
     with a limit lacks what is beyond the width, and one with a dead zone lacks what is within: the sign decides.
     """
-    values = _about(variable)
-    largest = float(np.abs(values).max())
+    # About zero if it has both signs, else about the middle of its range.
+    middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
+    values, largest = variable.values - middle, max(variable.high - middle, middle - variable.low)
     slope = f"{unit}/{variable.unit}" if variable.unit else unit
 
     def columns(point: tuple[float, ...]) -> NDArray[np.float64]:

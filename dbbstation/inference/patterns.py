@@ -138,7 +138,7 @@ def patterns(
         time: shape (n,); None: unordered, without direction and speed.
         simulated: None: lateness is not tested.
     """
-    usable = [v for v in variables if len(np.unique(v.values)) >= 2]  # noqa: PLR2004 - a constant has no effect
+    usable = [v for v in variables if v.distinct >= 2]  # noqa: PLR2004 - a constant has no effect
     found = [pattern for v in usable for pattern in _over(v)]
     if time is not None:
         for variable in usable:
@@ -153,7 +153,8 @@ def patterns(
     found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
     if len(blocks) > 1:
         found.append(_of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
-    return [pattern for pattern in found if np.ptp(pattern.samples, axis=0).max(initial=0.0) > 0.0]
+    others = any(v.range is not None for v in variables)
+    return [pattern for pattern in found if others or np.ptp(pattern.samples, axis=0).max(initial=0.0) > 0.0]
 
 
 DRIVEN_ODDS = -float(np.log(19.0))
@@ -190,7 +191,7 @@ def _over(variable: Variable) -> list[Pattern]:
         for order, name in ((1, Family.ONCE), (2, Family.TWICE)):
             wave = turn(variable, order)
             found.append(Pattern(name, (variable,), wave.columns(variable.values), wave, ("", ""), (1.0, 1.0)))
-    if len(np.unique(variable.values)) >= DISTINCT:
+    if variable.distinct >= DISTINCT:
         spline = Spline(variable.low, variable.high, CURVES)
         found.append(Pattern(Family.CURVE, (variable,), spline.columns(variable.values), spline))
     return found
@@ -198,10 +199,10 @@ def _over(variable: Variable) -> list[Pattern]:
 
 def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
     sign = variable.directions(blocks)
-    if not (sign > 0.0).any() or not (sign < 0.0).any():
+    if variable.range is None and not ((sign > 0.0).any() and (sign < 0.0).any()):
         return []
     found = [_hysteresis(variable, blocks, sign)]
-    if len(np.unique(variable.values)) >= DISTINCT:
+    if variable.distinct >= DISTINCT:
         spline = Spline(variable.low, variable.high, CURVES)
         found.append(Pattern(Family.BY_DIRECTION, (variable,), spline.columns(variable.values) * sign[:, None], spline))
     return found

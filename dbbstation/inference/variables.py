@@ -37,6 +37,9 @@ CONTINUOUS = 0.1
 """Share of its range that a variable that is sampled along a path changes from one row to the next, at the most, half of the time;
 one that jumps from pose to pose has no speed."""
 
+MANY = 10
+"""Different values that suffice for every effect."""
+
 STILL = 1e-9
 """Share of its range by which a variable must change from one row to the next to have moved."""
 
@@ -48,6 +51,7 @@ class Variable:
     Attributes:
         period: one turn of an angle, in its unit; else None.
         driven: results from the simulation, so may be caused by the difference.
+        range: of the rows that effects were fitted to, if these are others.
     """
 
     name: str
@@ -56,16 +60,22 @@ class Variable:
     values: NDArray[np.float64]
     period: float | None = None
     driven: bool = False
+    range: tuple[float, float] | None = None
 
     @property
     def low(self) -> float:
-        """Return the least value."""
-        return float(self.values.min())
+        """Return the least value that effects are fitted to."""
+        return float(self.values.min()) if self.range is None else self.range[0]
 
     @property
     def high(self) -> float:
-        """Return the greatest value."""
-        return float(self.values.max())
+        """Return the greatest value that effects are fitted to."""
+        return float(self.values.max()) if self.range is None else self.range[1]
+
+    @property
+    def distinct(self) -> int:
+        """Return the number of different values; of other rows than the fitted ones it says nothing."""
+        return len(np.unique(self.values)) if self.range is None else len(self.values) + MANY
 
     @property
     def extent(self) -> float:

@@ -13,8 +13,11 @@ from dbbstation.tasks.declare import File, Files, Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping
+    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.table.applied import AppliedCorrection
     from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.diagnosis.table.units import Meaning
     from dbbstation.files.recordings.table_csv import Columns
@@ -128,6 +131,16 @@ def mismatch(
             above=0.0,
         ),
     ] = None,
+    apply: Annotated[
+        Tables | None,
+        Option(
+            "Other rows of the same columns, measured values not needed: --table then has their corrected simulation and its u.",
+            kind="path",
+            metavar="OTHER.csv",
+            objects=True,
+            not_with=("simulator",),
+        ),
+    ] = None,
     offset: Annotated[bool, Option("Do not fit a constant difference.")] = True,
     held_out: o.HeldOut = True,
     decimal: o.Decimal = None,
@@ -169,11 +182,19 @@ def mismatch(
         CalibrationError: rounding hides what so large a difference follows.
         StoppedError: `stop` returned True.
     """
+    from dbbstation.diagnosis.table.applied import applied
     from dbbstation.diagnosis.table.mismatch import find_mismatch
     from dbbstation.files.formats.number_language import number_language
     from dbbstation.results.of_mismatch import mismatch_result
     from dbbstation.tasks.load import paths_of
-    from dbbstation.tasks.tables import TableOptions, load_sources, load_tables, stated_uncertainties, stated_variables
+    from dbbstation.tasks.tables import (
+        TableOptions,
+        load_rows,
+        load_sources,
+        load_tables,
+        stated_uncertainties,
+        stated_variables,
+    )
 
     telling = Telling(progress, stop, say)
     numbers = number_language(decimal, separator)
@@ -213,19 +234,43 @@ def mismatch(
     telling.note(*tabulated.notes)
     sources, lacking = load_sources(paths_of(source_files), tabulated.table.columns)
     telling.note(*(f"{name} cannot be asked: {why}" for name, why in lacking.items()))
+    others = (
+        None if apply is None else load_rows(apply if isinstance(apply, tuple) else (apply,), asked, tabulated.table)
+    )
     found = find_mismatch(
         tabulated.table, sources, hold_out=held_out, lacking=lacking, matters=matters, progress=telling.stage
     )
-    return mismatch_result(
-        found, table=_corrected(tabulated, found), drawing=partial(_drawn, found), notes=tuple(telling.notes)
-    )
+    if others is None:
+        table = _corrected(tabulated, found)
+    else:
+        correction = applied(found, others.table, sources)
+        telling.note(*others.notes, *_limits_of(correction))
+        table = _with_correction(others, correction.values, correction.uncertainty)
+    return mismatch_result(found, table=table, drawing=partial(_drawn, found), notes=tuple(telling.notes))
+
+
+def _limits_of(correction: AppliedCorrection) -> Iterator[str]:
+    if correction.left_out:
+        yield f"other rows are not corrected for {', '.join(correction.left_out)}"
+    for name, count in correction.beyond.items():
+        yield f"`{name}` is beyond the fitted rows in {count} of {len(correction.values)} rows: the correction is no more than a guess there"
 
 
 def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
-    corrected = found.table.simulated + found.correction
+    return _with_correction(tabulated, found.correction, None)
+
+
+def _with_correction(
+    tabulated: Tabulated, correction: NDArray[Any], u: NDArray[Any] | None
+) -> dict[str, tuple[str | float, ...]]:
+    table = tabulated.table
+    corrected = table.simulated + correction
     columns: dict[str, tuple[str | float, ...]] = {name: tabulated.columns[name] for name in tabulated.names}
-    unit = "".join(f"_{word}" for word in re.findall(r"\w+", found.table.unit.replace("µ", "u").lower()))
-    for name, values in ((CORRECTED, corrected), (LEFT, found.table.measured - corrected)):
+    unit = "".join(f"_{word}" for word in re.findall(r"\w+", table.unit.replace("µ", "u").lower()))
+    more = {CORRECTED: corrected, LEFT: table.measured - corrected, f"u_{CORRECTED}": u}
+    for name, values in more.items():
+        if values is None or not len(values) or all(value != value for value in values.tolist()):  # noqa: PLR0124 - NaN
+            continue
         columns[_unused(f"{name}{unit}", columns)] = tuple(values.tolist())
     return columns
 

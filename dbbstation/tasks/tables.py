@@ -167,6 +167,46 @@ def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabula
     return _Reader(files, asked, units[asked.measured] or units[asked.simulated]).read()
 
 
+def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table) -> Tabulated:
+    """Read other rows of the columns of a table; they need no measured values.
+
+    Raises:
+        InputError: a column that is not there, or no row with all values.
+    """
+    clock = like.clock.name if like.clock is not None else None
+    derivatives = {name: f"{DERIVATIVE}{name}" for name in like.derivatives}
+    needed = [asked.simulated, *(v.name for v in like.variables), *derivatives.values(), *filter(None, [asked.run])]
+    files = [
+        read_table(one, needed, asked.numbers) if isinstance(one, Path) else given_table(one, needed) for one in tables
+    ]
+    reader = _Reader(files, asked, like.unit)
+    values = {name: np.concatenate([file.values[name] for file in files]) for name in reader.names}
+    rows, blocks, names = reader.order(values, [name for name in needed if name != asked.run], clock)
+    if not len(rows):
+        raise InputError.of(files[0].file, "no row has all values", "fill them in", line=files[0].header)
+    kept = {name: column[rows] for name, column in values.items()}
+    variables = tuple(replace(v, values=kept[v.name], range=(v.low, v.high)) for v in like.variables)
+    table = replace(
+        like,
+        measured=kept.get(asked.measured, np.full(len(rows), np.nan)),
+        simulated=kept[asked.simulated],
+        variables=variables,
+        derivatives={name: kept[column] for name, column in derivatives.items()},
+        columns=kept,
+        blocks=blocks,
+        names=names,
+        clock=next((v for v in variables if v.name == clock), None),
+        like=like,
+    )
+    texts = {name: [cell for file in files for cell in file.cells[name]] for name in reader.names}
+    return Tabulated(
+        table,
+        tuple(reader.names),
+        {name: tuple(column[k] for k in rows.tolist()) for name, column in texts.items()},
+        tuple(reader.notes),
+    )
+
+
 LARGEST_SIZE = 1e60
 """Greatest number that is compared, and its inverse the least beside 0: no quantity in any unit is beyond, and their fourth
 powers still have room in a double."""
@@ -227,21 +267,21 @@ def load_sources(
 class _Reader:
     def __init__(self, files: Sequence[TableFile], asked: TableOptions, unit: str) -> None:
         self._files, self._asked, self._unit = files, asked, unit
-        self._notes: list[str] = []
+        self.notes: list[str] = []
         shared = set(files[0].names).intersection(*(file.names for file in files))
-        self._names = [name for name in files[0].names if name in shared]
+        self.names = [name for name in files[0].names if name in shared]
         elsewhere = dict.fromkeys(name for file in files for name in file.names if name not in shared)
         if elsewhere:
-            self._notes.append(f"not in every file and left out: {', '.join(elsewhere)}")
+            self.notes.append(f"not in every file and left out: {', '.join(elsewhere)}")
 
     def read(self) -> Tabulated:
         """Return the table."""
         asked = self._asked
-        values = {name: np.concatenate([file.values[name] for file in self._files]) for name in self._names}
+        values = {name: np.concatenate([file.values[name] for file in self._files]) for name in self.names}
         chosen, derivatives = self._chosen(values), self._derivatives(values)
         clock = self._clock(chosen)
         used = [asked.measured, asked.simulated, *chosen, *derivatives, *([clock] if clock else [])]
-        rows, blocks, names = self._order(values, used, clock)
+        rows, blocks, names = self.order(values, used, clock)
         if len(rows) < FEWEST_ROWS:
             file = self._files[0]
             what = f"{len(rows)} rows with all values are too few to compare, {FEWEST_ROWS} are needed"
@@ -253,7 +293,7 @@ class _Reader:
         at = self._variable(clock, kept[clock], quiet=True) if clock else None
         self._note_order(clock, at, blocks)
         others = self._once([v for v in varying if clock is None or v.name != clock])
-        cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self._names}
+        cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self.names}
         table = Table(
             measured=kept[asked.measured],
             simulated=kept[asked.simulated],
@@ -272,19 +312,19 @@ class _Reader:
         )
         self._refuse_unknown(table)
         texts = {name: tuple(column[k] for k in rows.tolist()) for name, column in cells.items()}
-        return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
+        return Tabulated(table, tuple(self.names), texts, tuple(self.notes))
 
     def _note_order(self, clock: str | None, at: Variable | None, blocks: Sequence[slice]) -> None:
         if clock is not None and at is None:
-            self._notes.append(
+            self.notes.append(
                 f"`{clock}` is the same in all rows: their order is unknown; give --time rows if they are in order"
             )
         elif at is not None and (still := sum(int(np.sum(np.diff(at.values[own]) == 0.0)) for own in blocks)):
-            self._notes.append(
+            self.notes.append(
                 f"`{clock}` stands still in {still} rows: delays, memories and integrals are not compared"
             )
         if self._asked.run is not None and len(blocks) == 1:
-            self._notes.append(f"`{self._asked.run}` has one run only: no other run tests what is found")
+            self.notes.append(f"`{self._asked.run}` has one run only: no other run tests what is found")
 
     def _refuse_unknown(self, table: Table) -> None:
         there = ", ".join(table.derivatives) or "none"
@@ -301,7 +341,7 @@ class _Reader:
             raise InputError(faults)
 
     def _derivatives(self, values: Mapping[str, Floats]) -> list[str]:
-        found = [name for name in self._names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]
+        found = [name for name in self.names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]
         return [name for name in found if self._is_numeric(name, values[name])]
 
     def _chosen(self, values: Mapping[str, Floats]) -> list[str]:
@@ -309,10 +349,10 @@ class _Reader:
         if asked.variables is not None:
             return list(asked.variables)
         taken = {asked.measured, asked.simulated, asked.run}
-        others = [name for name in self._names if name not in taken and not name.startswith(DERIVATIVE)]
+        others = [name for name in self.names if name not in taken and not name.startswith(DERIVATIVE)]
         siblings = [name for name in others if self._is_another_pair(name)]
         if siblings:
-            self._notes.append(f"measured or simulated themselves and left out: {', '.join(siblings)}")
+            self.notes.append(f"measured or simulated themselves and left out: {', '.join(siblings)}")
         return [name for name in others if name not in siblings and self._is_numeric(name, values[name])]
 
     def _is_another_pair(self, name: str) -> bool:
@@ -323,7 +363,7 @@ class _Reader:
         for own, other in (marks, marks[::-1]):
             if own & set(words) and len(other) == 1:
                 partner = [next(iter(other)) if word in own else word for word in words]
-                if any(_words(one) == partner for one in self._names if one != name):
+                if any(_words(one) == partner for one in self.names if one != name):
                     return True
         return False
 
@@ -340,13 +380,13 @@ class _Reader:
     def _is_numeric(self, name: str, column: Floats) -> bool:
         bad = sum(len(file.faults_of(name)) for file in self._files)
         if all(file.is_text(name) for file in self._files):
-            self._notes.append(f"`{name}` has no numbers and is left out")
+            self.notes.append(f"`{name}` has no numbers and is left out")
             return False
         missing = int((~np.isfinite(column)).sum())
         if bad or missing > len(column) // 10:
             first = next((fault for file in self._files for fault in file.faults_of(name)), None)
             where = f", the first in line {first.line} of {first.file}" if first else ""
-            self._notes.append(f"`{name}` lacks a number in {missing} of {len(column)} rows{where}, and is left out")
+            self.notes.append(f"`{name}` lacks a number in {missing} of {len(column)} rows{where}, and is left out")
             return False
         return True
 
@@ -356,13 +396,13 @@ class _Reader:
             return None if asked.time == ROWS else asked.time
         return next((name for name in chosen if self._meaning(name).kind is Kind.TIME), None)
 
-    def _order(
+    def order(
         self, values: Mapping[str, Floats], used: Sequence[str], clock: str | None
     ) -> tuple[NDArray[np.int64], tuple[slice, ...], tuple[str, ...]]:
         """Return complete rows, by block in time order, with the blocks and their names."""
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
         if not good.all():
-            self._notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
+            self.notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
         order: list[NDArray[np.int64]] = []
         names: list[str] = []
         first = 0
@@ -382,7 +422,7 @@ class _Reader:
                     names.append(f"{name} part {k + 1}" if len(parts) > 1 else name)
             first += len(file)
         if sorted_blocks:
-            self._notes.append(f"rows were put in the order of `{clock}`")
+            self.notes.append(f"rows were put in the order of `{clock}`")
         ends = np.cumsum([0, *(len(part) for part in order)])
         blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         return np.concatenate([np.zeros(0, dtype=np.int64), *order]), blocks, tuple(names)
@@ -409,7 +449,7 @@ class _Reader:
         meaning = self._meaning(name)
         if np.ptp(values) == 0.0:
             if not quiet:
-                self._notes.append(f"`{name}` is the same in all rows and is left out")
+                self.notes.append(f"`{name}` is the same in all rows and is left out")
             return None
         known = meaning if meaning.unit or meaning.kind is not Kind.ANY else PLAIN
         return Variable(name, known.unit, known.kind, values, known.period, meaning.driven)
@@ -422,7 +462,7 @@ class _Reader:
                 kept.append(variable)
                 continue
             scaled = "" if np.array_equal(same.values, variable.values) else ", but for scale and origin,"
-            self._notes.append(f"`{variable.name}` has the values of `{same.name}` in all rows{scaled} and is left out")
+            self.notes.append(f"`{variable.name}` has the values of `{same.name}` in all rows{scaled} and is left out")
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, Floats]) -> bool:
@@ -435,7 +475,7 @@ class _Reader:
         left = variable.values - both @ values
         if float(left @ left) > SAME * float(np.sum((variable.values - variable.values.mean()) ** 2)):
             return False
-        self._notes.append(f"`{variable.name}` is measured and simulated value over again, and is left out")
+        self.notes.append(f"`{variable.name}` is measured and simulated value over again, and is left out")
         return True
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from dbbstation.inference.bent import bent_laws, integral_of
+from dbbstation.inference.bent import bent_laws, grows_with, integral_of
 from dbbstation.inference.impossible import beyond_reach
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
@@ -114,7 +114,8 @@ def test_a_simulated_straight_line_tells_a_dead_zone_from_a_limit():
     within = np.clip(data.q, -7.0, 7.0)
     for slope in (2.0, -2.0):
         simulated = slope * data.q + 0.3 * data.load
-        laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", simulated)}
+        grows = grows_with(variables, simulated, 0.2)
+        laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", grows)}
         for name, measured in (("dead zone of q", slope * (data.q - within)), ("saturation of q", slope * within)):
             law = laws[name]
             columns = law.columns((7.0,))
@@ -126,7 +127,8 @@ def test_a_simulated_straight_line_tells_a_dead_zone_from_a_limit():
             assert amplitudes[int(np.argmin(left))] == pytest.approx(abs(slope))
             assert all(law.positive)
     # What the simulation does not have in a straight line has no sign.
-    laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", np.cos(data.t))}
+    grows = grows_with(variables, np.cos(data.t), 0.2)
+    laws = {law.name: law for law in bent_laws(variables, data.t, "s", blocks, 0.2, "mm", grows)}
     assert not laws["dead zone of q"].positive
 
 

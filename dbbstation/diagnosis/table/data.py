@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.law import law_of
-from dbbstation.inference.bent import bent_laws
+from dbbstation.inference.bent import bent_laws, grows_with
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.memory import memory_laws
 from dbbstation.inference.variables import Kind, Variable
@@ -38,6 +38,7 @@ class Table:
         derivatives: of the simulated value by parameter name, shape (n,).
         columns: numeric, by name, shape (n,).
         known: prior standard uncertainty by name.
+        like: rows that effects were fitted to, if these are others.
     """
 
     measured: NDArray[np.float64]
@@ -54,6 +55,7 @@ class Table:
     known: Mapping[str, float] = field(default_factory=dict)
     free: frozenset[str] = frozenset()
     has_offset: bool = True
+    like: Table | None = None
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -78,20 +80,25 @@ class Table:
         """Return the channel of measured minus simulated values."""
         columns = {OFFSET: np.ones(len(self)), **self.derivatives} if self.has_offset else dict(self.derivatives)
         samples = np.column_stack([np.zeros((len(self), 0)), *columns.values()])
-        simulated = Variable(self.simulated_name, self.unit, Kind.ANY, self.simulated)
+        fitted = self.like or self
+        limits = None if self.like is None else (float(fitted.simulated.min()), float(fitted.simulated.max()))
+        simulated = Variable(self.simulated_name, self.unit, Kind.ANY, self.simulated, range=limits)
         time = None if self.clock is None else self.clock.values
         if time is None and self.in_row_order:
             time = np.arange(len(self), dtype=np.float64)
         follows = self.variables
-        if np.ptp(self.simulated) > 0.0 and not any(_is_same(v.values, self.simulated) for v in follows):
+        if fitted.simulated_is_variable:
             follows = (*follows, simulated)
         residual, time_unit = (
             self.measured - self.simulated,
             self.clock.unit if self.clock is not None and self.clock.unit else "row",
         )
         laws = [self._law(source) for source in sources]
-        if (size := float(np.std(residual))) > 0.0:
-            laws += bent_laws(follows, time, time_unit, self.blocks, size, self.unit, self.simulated)
+        if (size := float(np.std(fitted.measured - fitted.simulated))) > 0.0:
+            own = Variable(self.simulated_name, self.unit, Kind.ANY, fitted.simulated)
+            over = (*fitted.variables, own) if fitted.simulated_is_variable else fitted.variables
+            grows = grows_with(over, fitted.simulated, size)
+            laws += bent_laws(follows, time, time_unit, self.blocks, size, self.unit, grows)
             if time is not None:
                 laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
         return Channel(
@@ -111,6 +118,11 @@ class Table:
             step=step_of(self.measured),
             noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
+
+    @property
+    def simulated_is_variable(self) -> bool:
+        """Return whether the simulated value varies and is no variable over again."""
+        return np.ptp(self.simulated) > 0.0 and not any(_is_same(v.values, self.simulated) for v in self.variables)
 
     def _law(self, source: TableSource) -> Law:
         parameters = source.parameters()

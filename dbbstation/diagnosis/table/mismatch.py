@@ -257,16 +257,19 @@ def choose_without(
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=BOUNDS.work_without)
 
 
-def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:
+def fitted_together(settled: Settled) -> Solution:
+    """Return base and best members fitted to all kept rows, the base first."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
-    noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
+    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
+    both = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
+    block = compress(np.arange(columns.shape[1]), columns, bank.target)
+    return solve([block], both, settled.noise.innovation, channel.held)
+
+
+def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:
+    channel, size = settled.channel, settled.channel.base.samples.shape[1]
     alone = channel.fitted(channel.target, _noise_alone(channel))
-    beside = solve([compress(np.arange(size), bank.base, bank.target)], known, noise, channel.held)
-    if members:
-        columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
-        both = with_random(known, np.concatenate([member.sd for member in members]))
-        block = compress(np.arange(columns.shape[1]), columns, bank.target)
-        beside = solve([block], both, noise, channel.held)
+    beside = fitted_together(settled)
     before, after = np.diag(alone.covariance), np.diag(beside.covariance)[:size]
     moved = weighted_jackknife(
         beside.x[:size],

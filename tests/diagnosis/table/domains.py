@@ -384,7 +384,7 @@ def figures(rows: list[dict[str, object]]) -> dict[str, list[object]]:
     for group in ("memory", "concealed"):
         found[f"{group}: right law"] = rate("effect", lambda r: bool(r["right_law"]), group)
     off = [abs(value) for r in rows for value in (r["off_u"] if isinstance(r["off_u"], dict) else {}).values()]
-    within = sum(one <= 2.0 for one in off)  # noqa: PLR2004 - expanded by two
+    within = sum(one <= 2.0 for one in off)
     found["constants within 2 u"] = [within, len(off), interval(within, len(off))]
     return found
 

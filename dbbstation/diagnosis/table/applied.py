@@ -1,0 +1,147 @@
+"""A correction for other rows of the same columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.computing.threads import with_one_thread
+from dbbstation.diagnosis.table.mismatch import fitted_together
+from dbbstation.errors import CalibrationError
+from dbbstation.inference.bank import TANGENT, amplitudes_of, spacing_of
+from dbbstation.inference.folds import parts_of
+from dbbstation.inference.followed import followed_by
+from dbbstation.inference.jackknife import refits_without, weighted_jackknife
+from dbbstation.inference.levels import ONCE
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.settle import growth, moved, static_patterns
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.table.contract import TableSource
+    from dbbstation.diagnosis.table.data import Table
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+    from dbbstation.inference.channel import Channel
+    from dbbstation.inference.model_comparison import Member
+    from dbbstation.inference.patterns import Pattern
+
+
+@dataclass(frozen=True, eq=False)
+class AppliedCorrection:
+    """What is added to simulated values of other rows.
+
+    Attributes:
+        values: shape (n,).
+        uncertainty: standard, of the correction without a row's noise, shape (n,).
+        left_out: effects that other rows cannot have, such as a drift.
+        beyond: rows outside the fitted range by variable.
+    """
+
+    values: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+    left_out: tuple[str, ...]
+    beyond: dict[str, int]
+
+
+@with_one_thread
+def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) -> AppliedCorrection:
+    """Return the correction of other rows, a table `like` the fitted one.
+
+    Effects over variables that the correction is made of, the constant and refitted parameters are added. What follows
+    the clock or the run stays behind, and so does a memory of what was before the first row.
+
+    Raises:
+        CalibrationError: these rows do not show an effect's direction or rate.
+    """
+    settled, channel = found.settled, other.channel(sources)
+    bank, corrects = settled.bank, found.levels.corrects
+    fitted = fitted_together(settled)
+    columns = [channel.base.samples]
+    values, over, left_out = np.zeros(len(other)), set[str](), list[str]()
+    first = channel.base.samples.shape[1]
+    for member in settled.best.members:
+        own = slice(first, first + len(member.columns))
+        first = own.stop
+        follows = followed_by(bank, member.cause.name)
+        if follows <= ONCE or (corrects and not follows & corrects):
+            left_out.append(member.cause.name)
+            columns.append(np.zeros((len(other), len(member.columns))))
+            continue
+        over |= follows
+        effect, slopes = _effect(found, channel, member, fitted.x[own])
+        values += effect
+        columns.append(slopes)
+    every = np.hstack(columns)
+    base = channel.base.samples @ fitted.x[: channel.base.samples.shape[1]]
+    refits = refits_without(settled, [rows for _, rows in parts_of(settled.channel)])
+    variances = _variances(every, fitted.covariance)
+    u = weighted_jackknife(
+        np.zeros(len(other)),
+        variances,
+        np.array([every @ (one.x - fitted.x) for one in refits]),
+        np.array([_variances(every, one.covariance) for one in refits]),
+    )
+    beyond = {
+        v.name: int(np.sum((v.values < v.low) | (v.values > v.high))) for v in channel.variables if v.name in over
+    }
+    return AppliedCorrection(
+        base + values,
+        np.maximum(u, np.sqrt(variances)),
+        tuple(left_out),
+        {name: count for name, count in beyond.items() if count},
+    )
+
+
+def _variances(rows: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.maximum(np.sum(rows @ covariance * rows, axis=1), 0.0))
+
+
+FORMED = frozenset({Family.LINEAR, Family.ONCE, Family.TWICE, Family.CURVE, Family.WAVE, Family.BUMP, Family.STEP})
+"""Patterns that are their form over one variable and nothing else."""
+
+
+def _effect(
+    found: Mismatch, channel: Channel, member: Member, values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a member's effect in other rows, shape (n,), and its slopes by amplitudes and slack, shape (n, p)."""
+    name, bank, width = member.cause.name, found.settled.bank, len(member.variant.columns)
+    slopes = np.zeros((len(channel.residual), len(values)))
+    if name not in bank.laws:
+        slopes[:, :width] = _samples(bank.patterns[name], channel, member.variant.label)
+        return slopes @ values, slopes
+    law = next((one for one in channel.laws if one.name == name), None)
+    if law is None:
+        raise _unknown(name)
+    fitted, used = bank.laws[name], amplitudes_of(member.variant)
+    own = np.array([k for k in range(width) if not fitted.parameters[used[k]].startswith("start ")], dtype=np.int64)
+    per = growth(member, values)
+    point = moved(fitted, member, values, per)
+    slopes[:, own] = law.columns(point)[:, used[own]]
+    effect = slopes[:, :width] @ values[:width]
+    for k, grid in enumerate(fitted.grids if len(member.variant.slack) else ()):
+        step = TANGENT * spacing_of(grid, point[k])
+        ends = [tuple(v + sign * step * (i == k) for i, v in enumerate(point)) for sign in (1.0, -1.0)]
+        up, down = (law.columns(end)[:, used[own]] @ values[own] for end in ends)
+        slopes[:, width + k] = (up - down) / (2.0 * step * per)
+    return effect, slopes
+
+
+def _samples(pattern: Pattern, channel: Channel, label: str) -> NDArray[np.float64]:
+    if pattern.family in FORMED and pattern.form is not None:
+        (variable,) = (v for v in channel.variables if v.name == pattern.variables[0].name)
+        return pattern.form.columns(variable.values)
+    same = next((one for one in static_patterns(channel) if one.name == pattern.name), None)
+    if same is None:
+        raise _unknown(pattern.name)
+    part = next((part for part, _, one in pattern.choices if one == label), None)
+    return same.samples if part is None else same.samples[:, list(part)]
+
+
+def _unknown(name: str) -> CalibrationError:
+    what = f"`{name}` is part of the correction, and these rows do not say it"
+    return CalibrationError(what, remedy="give rows in the order of measuring, at least as close as the others")

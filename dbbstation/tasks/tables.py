@@ -17,6 +17,7 @@ from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_
 from dbbstation.errors import ArgumentError, InputError, Problem
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, given_table, read_table
 from dbbstation.files.table_sources import own_table_sources
+from dbbstation.inference.triangle import left_by
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
@@ -466,14 +467,12 @@ class _Reader:
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, Floats]) -> bool:
-        """Return whether a column derives from the measured value, beside the simulated one or alone."""
+        """Return whether a column derives from the measured value, and not from the simulated one alone, as a speed of friction."""
         asked = self._asked
-        if _is_a_line(kept[asked.simulated], variable.values):
-            return False  # such as a speed, to which a simulated friction is proportional
-        both = np.column_stack([np.ones(len(variable.values)), kept[asked.measured], kept[asked.simulated]])
-        values, *_ = np.linalg.lstsq(both, variable.values, rcond=None)
-        left = variable.values - both @ values
-        if float(left @ left) > SAME * float(np.sum((variable.values - variable.values.mean()) ** 2)):
+        both = np.column_stack([np.ones(len(variable.values)), kept[asked.simulated], kept[asked.measured]])
+        alone, beside = (float(np.sum(np.square(left_by(columns, variable.values)))) for columns in (both[:, :2], both))
+        whole = SAME * float(np.sum((variable.values - variable.values.mean()) ** 2))
+        if alone <= whole or beside > whole:
             return False
         self.notes.append(f"`{variable.name}` is measured and simulated value over again, and is left out")
         return True

@@ -325,3 +325,35 @@ def test_the_table_says_where_it_comes_from(run, warm, tmp_path):
     told = json.loads((tmp_path / "out.csv.provenance.json").read_text())
     assert list(told["inputs"].values()) == [hashlib.sha256(warm.read_bytes()).hexdigest()]
     assert told["command"].startswith("dbbstation mismatch")
+
+
+def test_dates_are_a_clock_and_a_column_in_proportion_to_the_simulation_stays(run, tmp_path):
+    """Friction over a speed: simulated is viscous, so that the speed is that value but for scale."""
+    rng = np.random.default_rng(7)
+    speed = np.sin(np.arange(240) / 11.0) + 0.4 * np.sin(np.arange(240) / 4.3)
+    measured = 0.5 * speed + 0.3 * np.sign(speed) + 0.7 + 0.03 * rng.standard_normal(240)
+    lines = [
+        f"2026-03-01T08:{k // 60:02d}:{k % 60:02d}Z,{m:.5f},{0.5 * v:.6f},{v:.6f}"
+        for k, (m, v) in enumerate(zip(measured, speed, strict=True))
+    ]
+    path, other, out = tmp_path / "friction.csv", tmp_path / "other.csv", tmp_path / "out.csv"
+    head = "logged,torque_n_m,viscous_n_m,speed_rad_s"
+    path.write_text("\n".join([head, *lines[:160]]) + "\n")
+    # Other rows have no measured values.
+    rest = [",".join(cell for k, cell in enumerate(line.split(",")) if k != 1) for line in (head, *lines[160:])]
+    other.write_text("\n".join(rest) + "\n")
+    asked = ("--measured", "torque_n_m", "--simulated", "viscous_n_m", "--no-held-out")
+    outcome = run("mismatch", path, *asked, "--apply", other, "--table", out)
+    assert outcome.code == DONE
+    assert "On average they differ by 0.7" in outcome.out.splitlines()[0]
+    assert "saturation of speed_rad_s" in outcome.out
+    assert "logged" not in outcome.err
+    data = run("mismatch", path, *asked, "--json").data
+    assert [(v["name"], v["kind"], v["unit"]) for v in data["variables"]][0] == ("logged", "time", "s")
+    written = rows_of(out.read_text())
+    assert list(written[0]) == [*rest[0].split(","), "corrected_n_m", "u_corrected_n_m"]
+    corrected, u = (np.array([float(row[name]) for row in written]) for name in ("corrected_n_m", "u_corrected_n_m"))
+    off = corrected - 0.7 - 0.5 * speed[160:] - 0.3 * np.sign(speed[160:])
+    away = np.abs(speed[160:]) > 0.2
+    assert np.sqrt(np.mean(np.square(off / u)[away])) < 2.5
+    assert np.abs(off[away]).max() < 0.05

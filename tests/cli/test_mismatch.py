@@ -349,7 +349,7 @@ def test_dates_are_a_clock_and_a_column_in_proportion_to_the_simulation_stays(ru
     assert "saturation of speed_rad_s" in outcome.out
     assert "logged" not in outcome.err
     data = run("mismatch", path, *asked, "--json").data
-    assert [(v["name"], v["kind"], v["unit"]) for v in data["variables"]][0] == ("logged", "time", "s")
+    assert next((v["name"], v["kind"], v["unit"]) for v in data["variables"]) == ("logged", "time", "s")
     written = rows_of(out.read_text())
     assert list(written[0]) == [*rest[0].split(","), "corrected_n_m", "u_corrected_n_m"]
     corrected, u = (np.array([float(row[name]) for row in written]) for name in ("corrected_n_m", "u_corrected_n_m"))

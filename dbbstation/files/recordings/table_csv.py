@@ -179,7 +179,7 @@ def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table")
     return TableFile(file, 0, tuple(arrays), np.arange(1, length + 1), cells, values, instants)
 
 
-def _seconds(cells: Sequence[str]) -> NDArray[np.float64] | None:
+def _seconds(cells: Sequence[str]) -> Floats | None:
     """Return seconds after the first of dates and times [ISO 8601]; NaN if empty, None if any is another text."""
     try:
         at = [None if cell.lower() in NO_NUMBER else datetime.fromisoformat(cell) for cell in cells]

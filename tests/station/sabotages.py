@@ -243,7 +243,7 @@ class Shop:
             and t_s - running.begin_s > self.cut_at_s
         ):
             self.cut_at_s = None
-            self.wire.drop_samples(round(LOST_S * self.protocol.fastest_hz(None)))
+            self.wire._to_drop += round(LOST_S * self.protocol.fastest_hz(None))  # its thread is here, and has the lock
         return self.cell.length_mm_at(t_s)
 
     def __call__(self, event: events.Event) -> None:
@@ -467,14 +467,16 @@ def main() -> None:
         sys.stdout.write(f"{name:32} {'  '.join(f'{cell:>10}' for cell in cells)}\n")
     if given.out:
         kept = {
-            "question": "What does an operator see of sound and of sabotaged circles?",
-            "data": "Ten-minute check on virtual machines through a serial line, at 1000 and 6000 mm/min; one circle spoilt: the first, the second direction, or the last.",
+            "question": "What does an operator see of sound and of sabotaged circles?"
+            if given.direct
+            else "What does an operator see of them through a serial line?",
+            "data": f"Ten-minute check on virtual machines, {'readings handed over' if given.direct else 'through a serial line'}, at 1000 and 6000 mm/min; one circle spoilt: the first, the second direction, or the last.",
             "command": f"python -m tests.station.sabotages{' --direct' if given.direct else ''} --sound {given.sound} --seeds {given.seeds}",
             "date": f"{datetime.now().astimezone():%Y-%m-%d}",
             "seed": 1,
             "columns": ["found", "first cause right", "other circles blamed"],
             "figures": rows,
-            "limits": "",
+            "limits": "Another start angle puts one more circle in doubt in each session.",
         }
         given.out.write_text(json.dumps(kept, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""Programs of our own writing in the habits of sixteen posts: how they begin, change tools, write arcs and holes, and end."""
+"""Programs of our own writing in the habits of twenty-three posts: how they begin, change tools, write arcs and holes, and end."""
 
 from __future__ import annotations
 
@@ -174,6 +174,72 @@ POSTS = (
         decimals=4,
         zeros=False,
         cycles=False,
+        percent=False,
+    ),
+    Post(
+        "fusion-grbl",
+        "(1001)\n(T1 D=1.4 CR=0 - ZMIN=-3 - flat end mill)\nG90 G94\nG17\nG21",
+        "(2D Contour{t})\nT{t}\nS{s} M3\nG54\nG0 X{x} Y{y}\nZ15\nG1 Z5 F1000",
+        "G0 Z15\nM5\nM30",
+        zeros=False,
+        cycles=False,
+        percent=False,
+    ),
+    Post(
+        "gcodetools",
+        "(Header)\nM3\n(Header end.)\nG21 (All units in mm)",
+        "(Start cutting path id: path{t})\n(Change tool to Default tool)\nG00 Z15.000000\nG00 X{x} Y{y}",
+        "(End cutting path id: path1)\nG00 Z15.000000\n(Footer)\nM5\nG00 X0.0000 Y0.0000\nM2\n(Using default footer.)",
+        decimals=6,
+        modal=False,
+        cycles=False,
+        planes=False,
+        percent=False,
+    ),
+    Post(
+        "pcb2gcode",
+        "( pcb2gcode 2.5.0 )\nG94 ( Millimeters per minute. )\nG21 ( Units. )\nG90\nG00 S10000 ( RPM. )\nG64 P0.01016\nG01 F200.00000 ( Feedrate. )",
+        "G00 Z15.00000 (Retract)\nT{t}\nM5      (Spindle stop.)\nG04 P1.00000\n(MSG, Change tool bit to cutter {t})\nM6\nM0\n"
+        "M3 ( Spindle on. )\nG04 P0 ( no time )\nG00 Z15.00000\nG0 X{x} Y{y}",
+        "G00 Z15.000 ( retract )\nM5\nG04 P1.000000\nM9\nM2",
+        decimals=5,
+        cycles=False,
+        planes=False,
+        percent=False,
+    ),
+    Post(
+        "grblgru",
+        "( Created by GrblGru )\nG21\nG1 F200 Z25\nG4 P2\nG90 F100",
+        "( Spindle on )\nM3\nS{s}\nF2000 G90 G1 Z15.000\nX{x} Y{y}",
+        "F2000 Z15.000\nM5\nG0 X0.000 Y0.000",
+        cycles=False,
+        planes=False,
+        percent=False,
+    ),
+    Post(
+        "cambam",
+        "( Made using CamBam )\n( {name} )\n( T1 : 3.0 )\nG21 G90 G64 G40\nG0 Z15.0",
+        "( T{t} : 3.0 )\nT{t} M6\n( Profile1 )\nG17\nM3 S{s}\nG0 X{x} Y{y}",
+        "G0 Z15.0\nM5\nM30",
+        decimals=4,
+        zeros=False,
+        modal=False,
+        percent=False,
+    ),
+    Post(
+        "freecad-grbl",
+        "(Exported by FreeCAD)\n(Post Processor: grbl_post)\n(Begin preamble)\nG17 G90\nG21\n(Begin operation: G54)\nG54",
+        "(Begin toolchange)\n( M6 T{t} )\nM3 S{s}\n(Begin operation: {name})\nG0 Z15.000\nG0 X{x} Y{y}",
+        "(Begin postamble)\nM5\nG17 G90\nM2",
+        modal=False,
+        cycles=False,
+        percent=False,
+    ),
+    Post(
+        "hand-linuxcnc",
+        "#<_safe> = 20.0 ; above clamps\nG21 G90 G17\nF600",
+        "G10 L1 P{t} Z-3.5 R3.0 ; set tool\nT{t}\nM06\nG43 H{t}\nM3 S{s}\nG54\nG0 Z#<_safe>\nG0 X{x} Y{y}",
+        "G0 Z#<_safe>\nM5\nM2 ; end program",
         percent=False,
     ),
 )

@@ -27,6 +27,8 @@ class Post:
     inches: bool = False
     percent: bool = True
     subprograms: bool = False
+    goes_on: bool = False
+    """Moves behind G80 have no G0."""
 
 
 POSTS = (
@@ -37,6 +39,7 @@ POSTS = (
         "M9\nM5\nG53 G0 Z-940.\nG53 G0 X0. Y0.\nM30",
         zeros=False,
         radius=False,
+        goes_on=True,
     ),
     Post(
         "mastercam",
@@ -73,6 +76,7 @@ POSTS = (
         zeros=False,
         decimals=4,
         numbers=5,
+        goes_on=True,
         inches=True,
     ),
     Post(
@@ -155,6 +159,7 @@ POSTS = (
         "M9\nG28 G91 Z0.\nG90\nG49\nG187\nM5\nM30",
         zeros=False,
         numbers=5,
+        goes_on=True,
     ),
     Post(
         "hand-fanuc",
@@ -368,7 +373,7 @@ class _Author:
         )
         self.lines += [f"X{self.number(x + 6.0 * place)}" for place in (1, 2)]
         self.lines += ["G80"]
-        self.last = ""
+        self.last = "G0" if self.post.goes_on else ""
 
     def peck(self, x: float, y: float) -> None:
         if not self.post.cycles:
@@ -379,7 +384,7 @@ class _Author:
             f"G99 {code} X{self.number(x)} Y{self.number(y)} Z{self.number(-6.0)} R{self.number(1.5)} Q{self.number(2.5)} F{self.number(120.0)}"
         )
         self.lines += [f"Y{self.number(y + 5.0)}", "G80"]
-        self.last = ""
+        self.last = "G0" if self.post.goes_on else ""
         return self.up()
 
     def entry(self, x: float, y: float) -> None:

@@ -60,8 +60,11 @@ def verdicts(request, tmp_path_factory):
         own, we = folder / str(which[0]), ours(which[1])
         own.mkdir()
         # LinuxCNC wants an end, or percent signs.
-        needs_end = isinstance(we, Toolpath) and NO_END in we.notes
-        return *which, we, events(f"%\n{which[1]}\n%\n" if needs_end else which[1], own)
+        notes = we.notes if isinstance(we, Toolpath) else ()
+        text = f"%\n{which[1]}\n%\n" if NO_END in notes else which[1]
+        # LinuxCNC has no motion behind G80.
+        text = re.sub(r"(?i)(G80\b.*)", r"\1\nG0", text) if any("behind G80" in note for note in notes) else text
+        return *which, we, events(text, own)
 
     with ThreadPoolExecutor(2) as threads:
         return list(threads.map(both, drawn))

@@ -41,8 +41,9 @@ THREE_AXES = np.array([np.nan] * 3 + [0.0] * 3)
 
 
 def as_linuxcnc_takes_it(text: str) -> str:
-    """With an end, and without G80 beside G0, which it refuses and other controls read; at rest in all axes before."""
+    """With an end, with G0 behind G80 and not beside it, where other controls have both; at rest in all axes before."""
     text = text if re.search(r"M0?2|M30|\A%", text) else f"%\n{text}%\n"
+    text = re.sub(r"(?m)^((?:N\d+ ?)?G80)$", r"\1\nG0", text)
     text = re.sub(r"(?m)^(N\d+ ?)?G0?0 (.*)G80(.*)$", r"\1G80\nG0 \2\3", text)
     text = re.sub(r"(?m)^(N\d+ ?)?(G05.1|G187).*$| G50\b| D3\d\b", "", text)
     return re.sub(r"(?m)^(N\d+ ?)?(G0 G20 .*)$", r"\2", text)

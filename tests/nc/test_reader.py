@@ -104,7 +104,6 @@ def test_a_helix_moves_the_other_axes_evenly():
         ("G1 X5", 4, "G1 without a feed"),
         ("G1 X5 F-3", 7, "negative"),
         ("G4", 1, "seconds"),
-        ("X5 G80", 1, "X without a motion code"),
         ("G2 X5 F100", 4, "needs I and J, or R"),
         ("G2 X5 I2 R3 F100", 10, "not both"),
         ("G2 X50 R3 F100", 8, "no arc of R3"),
@@ -196,6 +195,15 @@ def test_moves_at_feed_before_the_first_place_and_an_end_by_a_rapid_are_stated(l
     for cut_short in (GRBL.removesuffix("G0 Z-990\n"), GRBL.replace("G0 X0 Y0", "G0 X0")):
         with pytest.raises(InputError):
             linuxcnc.toolpath(cut_short, "part.ngc", start=declared)
+
+
+def test_behind_g80_holds_the_rapid_from_before_the_cycle():
+    cycle = "G98 G81 X1 Y1 Z-1005 R-999 F100\nG80\nZ-985\nM2\n"
+    path = read_program(FIRST + cycle, "part.ngc")
+    assert path.kind[-1] == RowKind.RAPID
+    assert path.notes == ("line 5: Z behind G80 is taken for a rapid, as before the cycle",)
+    with pytest.raises(InputError, match=r"part\.ngc:6:1: Z without a motion code"):
+        read_program(f"{FIRST}G1 X1 F100\n{cycle}", "part.ngc")
 
 
 def test_a_long_dwell_and_a_dwell_by_x_are_read_in_seconds():

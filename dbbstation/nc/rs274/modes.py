@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES
-from dbbstation.nc.rs274.codes import CURVES, STORED, ModalGroup, name
+from dbbstation.nc.rs274.codes import CURVES, CYCLES, STORED, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.flow import Flow
@@ -108,6 +108,8 @@ class Modes:
         self._given = not np.isnan(pose).any()
         self._fixed = bits_of(~np.isnan(pose)) & TURNS
         self._motion: float | None = None
+        self._before_cycle: float | None = None
+        self._since_cycle = False
         self._speed = Feed(0.0, 0.0)
         self._per_move = False
         self._absolute = True
@@ -271,7 +273,10 @@ class Modes:
         self._absolute_centres = self._absolute_centres if centres is None else centres == 90.1  # noqa: PLR2004
         self._cycle.to_clear = self._cycle.to_clear if back is None else back == 99.0  # noqa: PLR2004
         if ModalGroup.CYCLE_END in block.codes:
-            self._motion, self._cycle.numbers = None, {}
+            # LinuxCNC has no motion from here on, other controls the one before the cycle.
+            before = self._before_cycle if self._motion in CYCLES else self._motion
+            self._motion, self._cycle.numbers = RAPID if before == RAPID else None, {}
+            self._since_cycle = self._motion is not None
         if ModalGroup.PATH in block.codes:
             self._path_control(block)
         if ModalGroup.SMOOTHING in block.codes:

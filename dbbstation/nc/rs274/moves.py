@@ -59,6 +59,11 @@ class Moves(Modes):
         if self._motion is None:
             what = f"{named[0]} without a motion code"
             raise block.place.fault(block.first_column, what, "write G0 or G1 before it")
+        if self._since_cycle:
+            self.path.notes += (
+                f"line {block.place.line}: {named[0]} behind G80 is taken for a rapid, as before the cycle",
+            )
+            self._since_cycle = False
         target = self._target(block, in_machine=in_machine)
         if self._cutter is not None:
             self._go_beside(self._cutter, block, target)
@@ -149,10 +154,10 @@ class Moves(Modes):
 
     def _begin_motion(self, motion: float) -> None:
         if motion in CYCLES and self._motion not in CYCLES:
-            self._cycle.begun_at = float(self._state.pose[2])
+            self._cycle.begun_at, self._before_cycle = float(self._state.pose[2]), self._motion
         if motion != self._motion:
             self._cycle.numbers = {}
-        self._motion = motion
+        self._motion, self._since_cycle = motion, False
 
     def _goes_nowhere(self, block: ProgramBlock, motion: float | None, once: float | None) -> bool:
         """Return whether a line without axes is a move: an arc by its centre; for LinuxCNC also a motion code alone."""

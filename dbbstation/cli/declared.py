@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 import re
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 import click
 
 from dbbstation.cli.figure_option import format_of, known_format
-from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
 from dbbstation.tasks import options as o
@@ -24,8 +24,36 @@ from dbbstation.tasks.declare import Option, TaskParameter, annotations_of, opti
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
+    from click import Context, Parameter
+
     from dbbstation.errors import StationError
     from dbbstation.tasks.declare import Declared
+
+
+class Finite(click.FloatRange):
+    """A finite number, with a range as of `click.FloatRange`.
+
+    `nan` is in every range, and `inf` in open ones.
+    """
+
+    def __init__(self, *limits: Any, **more: Any) -> None:  # noqa: ANN401 - as click has it
+        super().__init__(*limits, **more)
+        if self.min is None and self.max is None:
+            self.name = "float"  # what help texts show
+
+    def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> float:  # noqa: ANN401 - as click has it
+        """Return the number.
+
+        Raises:
+            BadParameter: it is no number, not finite, or out of range.
+        """
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return number
+
+    def _describe_range(self) -> str:
+        return "" if self.min is None and self.max is None else super()._describe_range()
 
 
 def save(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
-from dbbstation.cli.number_options import shops_numbers
+from dbbstation.cli.output import say
+from dbbstation.cli.shop import shop_settings
 from dbbstation.files.formats.number_language import SEPARATORS, number_language
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -22,6 +23,22 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.tasks.importing.proposal import Proposed
+
+
+def shops_numbers() -> NumberLanguage | None:
+    """Return the number format of the shop's settings, with a note; None if not set.
+
+    For commands in which a file decides first.
+    """
+    from dbbstation.files.formats.number_language import number_language
+
+    values = shop_settings().values
+    found = {key: values[name] for key in ("decimal", "separator") if (name := f"numbers.{key}") in values}
+    if not found:
+        return None
+    texts = ", ".join(f"--{key} {setting.value}" for key, setting in found.items())
+    say(f"settings: {texts} (from {next(iter(found.values())).file})")
+    return number_language(*(str(found[key].value) if key in found else None for key in ("decimal", "separator")))
 
 
 @dataclass(frozen=True, kw_only=True)

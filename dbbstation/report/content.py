@@ -8,11 +8,11 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import BudgetTerm
+from dbbstation.facts.serialise import as_objects
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.report.causes_part import TitledPolar, cause_rows, cured_polars
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
-from dbbstation.report.model_part import not_visible, parameters, quality_of_fit
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.shown import ReportContent, ShownBudget, ShownCauses, ShownFindings, ShownModel, ShownSession
@@ -27,6 +27,9 @@ from dbbstation.results.report import (
 )
 from dbbstation.results.report_verdict import verdict_of
 from dbbstation.results.tolerances import tolerated_circles, tolerated_pairs
+from dbbstation.results.words import unseen_sentence, weak_sentence
+from dbbstation.sources.contract import Owner
+from dbbstation.text.digits import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -40,6 +43,45 @@ if TYPE_CHECKING:
     from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.ranked import Ranked
+
+
+def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
+    """Return source, parameter, value, U and unit; a dash for unknown U."""
+    u = identified.uncertainties
+    rows = []
+    for fitted in identified.model.sources:
+        if fitted.source.belongs_to is not Owner.MACHINE:
+            continue
+        named = fitted.source.parameters(identified.model.machine)
+        for parameter, value in zip(named, fitted.values, strict=True):
+            known = u.get((fitted.source.name, fitted.shared, parameter.name))
+            shown = (f"{float(value):.5g}", "-")
+            if known is not None:
+                shown = to_its_place(float(value), coverage_factor * float(known))
+            rows.append((fitted.source.name, parameter.name, *shown, parameter.unit))
+    return tuple(rows)
+
+
+def quality_of_fit(identified: IdentifiedModel) -> str:
+    """Return a fit's residual beside noise, in words; may be empty."""
+    report = identified.report
+    keys = ("nominal_rms_um", "residual_within_mounting_rms_um", "noise_um")
+    nominal, left, noise = (report.get(key) for key in keys)
+    if not (isinstance(nominal, float) and isinstance(left, float) and isinstance(noise, float)):
+        return ""
+    return (
+        f"In its own recordings the model leaves {left:.2f} µm rms within each mounting, the nominal machine {nominal:.1f} µm in all; "
+        f"one reading has {noise:.2f} µm of noise."
+    )
+
+
+def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
+    """Return what a model's recordings could not see, or saw least."""
+    seen = as_objects(identified.report.get("observability"))
+    return (
+        *map(unseen_sentence, identified.directions_lost),
+        *map(weak_sentence, getattr(seen, "weak_directions", ())),
+    )
 
 
 NUMBER_DIGITS = 10

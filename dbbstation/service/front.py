@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import StationError
+from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import as_objects
+from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
@@ -24,7 +25,6 @@ from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import ProbeOutcome, ports, probe
 from dbbstation.service.runner import Runner
-from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.virtual_place import virtual_place
 from dbbstation.service.work import BackgroundWork, WorkProgress
@@ -37,6 +37,24 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.session_list import SessionLine
     from dbbstation.station.events import Observer
+
+
+def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
+    """Return instrument and port for an existing session."""
+    try:
+        session = read_session(folder)
+    except InputError:  # what is wrong with it is said where it is opened
+        return given
+    if session.virtual:
+        noted = session.instrument
+        if remembered.virtual or noted is None:
+            return remembered if remembered.virtual else given
+        port = noted.port if time_scale_of(noted.port) is not None else virtual_port()
+        return Line(instrument=noted.name, profile=noted.profile, port=port)
+    if session.runs and given.virtual:
+        return given.model_copy(update={"port": "", "baud": None})
+    return given
+
 
 SEED = 3
 """Of the virtual machine's errors: the same machine every time, so that a session can be gone on with."""

@@ -8,34 +8,119 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.plan.duration import circles_s
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
+from dbbstation.station.events import RunCompleted, RunId, Sample
 from dbbstation.station.judging import RunJudge
 from dbbstation.station.opening import changed_since, clock_watch, last_end, open_session
-from dbbstation.station.preflight import check_plan, check_range
+from dbbstation.station.run_record import circle_figures
 from dbbstation.station.schedule import Schedule
-from dbbstation.station.sequencer import Sequencer
+from dbbstation.station.sequencer import Sequencer, Waiting
 from dbbstation.station.storage import Storage, time_of_day
-from dbbstation.station.unjudged import unjudged
 from dbbstation.system.mounts import free_bytes
+from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import ReadBy
+    from dbbstation.files.recordings.entries import ReadBy, RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
     from dbbstation.plan.plan import Plan
+    from dbbstation.quality.finding import Finding
     from dbbstation.station.engine import ReadingSource
     from dbbstation.station.programs import RunProgram
+    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import Recording
+
+
+def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
+    """Dry-run a plan.
+
+    Raises:
+        InputError: readings cannot show a test's begin and end; names every such test.
+        TravelError: a circle leaves the machine's travel; names test, direction, pose and limit.
+    """
+    faults = [
+        Problem(
+            file,
+            0,
+            0,
+            f"test {test.name} has no feed-in: a recording of it cannot be cut",
+            "give `feed_in_mm` in its path, 1.5 mm is usual",
+        )
+        for test in plan.tests.values()
+        if test.circle.feed_in_mm <= 0.0
+    ]
+    if faults:
+        raise InputError(faults)
+    plan.check(machine)
+
+
+def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None:
+    """Check the lengths of a plan's circles against the instrument's range.
+
+    Raises:
+        InputError: a circle or feed-in lies outside; names every such test.
+    """
+    low_mm, high_mm = range_mm
+    faults = []
+    for test in plan.tests.values():
+        bar_mm, outside_mm = test.circle.bar_mm, test.circle.bar_mm + test.circle.feed_in_mm
+        if low_mm <= bar_mm and outside_mm <= high_mm:
+            continue
+        what = (
+            f"test {test.name}: the bar goes from {bar_mm:g} to {outside_mm:g} mm with its feed-in, and the instrument"
+        )
+        remedy = "take an instrument or a profile with more range, or a shorter `feed_in_mm` in its path"
+        faults.append(Problem(file, 0, 0, f"{what} reads {low_mm:g} to {high_mm:g} mm", remedy))
+    if faults:
+        raise InputError(faults)
+
+
+def unjudged(
+    session: SessionFolder, judge: Callable[[RunId, Recording], tuple[Finding, ...]] = lambda _run, _recording: ()
+) -> list[Waiting]:
+    """Return unjudged runs in recording order."""
+    return [_waiting(session, entry, judge) for entry in session.runs if entry.state is RunState.COMPLETE]
+
+
+def _waiting(
+    session: SessionFolder, entry: RunEntry, judge: Callable[[RunId, Recording], tuple[Finding, ...]]
+) -> Waiting:
+    run = RunId(entry.test, entry.direction, entry.repeat, entry.mounting or 0)
+    try:
+        recording = session.load(entry).recording
+    except InputError as error:
+        return Waiting(RunCompleted(run, 0, 0, None, str(error)), ())
+    circle = session.circle(entry)
+    lost = entry.counts.lost if entry.counts is not None else 0
+    found, problem = circle_figures(recording, circle, lost, lost, session.plan.largest_loss_percent)
+    samples = () if found is None else _on_turn(cut(recording, circle))
+    findings = () if found is None else judge(run, recording)
+    doubtful = 0 if entry.counts is None else entry.counts.rejected.get(DOUBTFUL, 0)
+    return Waiting(RunCompleted(run, len(recording), lost, found, problem, findings, doubtful), samples)
+
+
+def _on_turn(raw: RawCircle) -> tuple[Sample, ...]:
+    step = max(len(raw) // MOST_SHOWN, 1)
+    rows = zip(raw.t_s[::step].tolist(), raw.length_mm[::step].tolist(), raw.phi_deg[::step].tolist(), strict=True)
+    return tuple(Sample(t_s, length_mm, phi_deg=phi_deg) for t_s, length_mm, phi_deg in rows)
+
+
+MOST_SHOWN = 3600
+"""Samples of a turn that are drawn again, about: ten for each degree."""
 
 
 @dataclass(frozen=True, eq=False)

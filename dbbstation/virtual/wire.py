@@ -15,14 +15,48 @@ from dbbstation.instrument.fields import Content
 from dbbstation.system.pseudo_terminal import HAS_PTY
 from dbbstation.virtual.wire_clock import ScaledClock
 from dbbstation.virtual.wire_ends import open_end
-from dbbstation.virtual.wire_uart import heard_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Self
 
-    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.instrument.protocol import LineSettings, Protocol
     from dbbstation.virtual.wire_ends import End
+
+
+TOLERANCE = 0.04
+"""A UART samples the last bit of ten in its middle: half a bit in ten, less some sampling error, is what it bears."""
+
+
+def heard_at(raw: bytes, line: LineSettings, *, sent_baud: int, heard_baud: int) -> bytes:
+    """Return what a receiver at `heard_baud` makes of `raw` sent at `sent_baud`."""
+    if abs(heard_baud / sent_baud - 1.0) <= TOLERANCE:
+        return raw
+    bits = [bit for byte in raw for bit in _sent_bits(byte, line)]
+    step = sent_baud / heard_baud  # of sent bits per received bit
+
+    def level(at: float) -> int:
+        return bits[int(at)] if at < len(bits) else 1
+
+    heard = bytearray()
+    at = 0.0
+    while at < len(bits):
+        if level(at) == 1:
+            at = float(int(at) + 1)
+            continue
+        heard.append(sum(level(at + (1.5 + place) * step) << place for place in range(line.data_bits)))
+        # The receiver looks for the next falling edge from the middle of the first stop bit on.
+        at += (line.bits_per_character - line.stop_bits + 0.5) * step
+        while at < len(bits) and level(at) == 0:
+            at = float(int(at) + 1)
+    return bytes(heard)
+
+
+def _sent_bits(byte: int, line: LineSettings) -> list[int]:
+    data = [byte >> place & 1 for place in range(line.data_bits)]
+    parity = {"none": [], "even": [sum(data) % 2], "odd": [1 - sum(data) % 2]}[line.parity]
+    return [0, *data, *parity, *[1] * line.stop_bits]
+
 
 _TICK_S = 0.001
 """Real seconds between looks at the line while bytes are under way; bytes due in between go together."""
@@ -91,12 +125,6 @@ class VirtualInstrument:
         self._fault = False
         self._counter = 0
         self._next_sample_s = 0.0
-        self._silent = False
-        self._parity_shows = False
-        self._to_cut: int | None = None
-        self._silent_after_cut = False
-        self._to_drop = 0
-        self._damage: Callable[[bytes], bytes] | None = None
 
     def start(self) -> None:
         """Open the line and switch on; sets `port`."""
@@ -130,47 +158,6 @@ class VirtualInstrument:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-
-    # Faults, for tests and for showing what they look like.
-
-    def go_silent(self) -> None:
-        """Send nothing after the current frame, as if switched off."""
-        with self._lock:
-            self._silent = True
-            self._outgoing = deque(frame for frame in self._outgoing if frame.sent)
-
-    def speak_again(self) -> None:
-        """End the silence."""
-        with self._lock:
-            self._silent = False
-
-    def hang_up(self) -> None:
-        """Close the line in use, as if unplugged."""
-        self.stop()
-
-    def send_garbage(self, raw: bytes) -> None:
-        """Send noise bytes."""
-        with self._lock:
-            self._send(raw, self.clock())
-
-    def cut_next_frame(self, keep: int, *, then_silent: bool = False) -> None:
-        """Send only `keep` bytes of the next frame, then nothing with `then_silent`."""
-        with self._lock:
-            self._to_cut, self._silent_after_cut = keep, then_silent
-
-    def damage_next_frame(self, damage: Callable[[bytes], bytes]) -> None:
-        """Send the next frame changed by `damage`; may be called in `length_mm_at`."""
-        self._damage = damage
-
-    def drop_samples(self, count: int) -> None:
-        """Skip samples; the counter goes on."""
-        with self._lock:
-            self._to_drop += count
-
-    def show_parity(self) -> None:
-        """Put even parity into the eighth bit, as 8 data bits see 7 with parity."""
-        with self._lock:
-            self._parity_shows = True
 
     def _run(self, end: End) -> None:
         try:
@@ -262,32 +249,20 @@ class VirtualInstrument:
 
     def _send_sample(self, at_s: float, start_s: float) -> None:
         counter, self._counter = self._counter, self._counter + 1
-        if self._to_drop:
-            self._to_drop -= 1
-            return
         raw = b""
         # A device without a way to say that it has no value says nothing.
         with suppress(InstrumentError):
             length_mm = self._length_mm_at(at_s)
             self._fault = length_mm is None
             raw = encode(self.protocol, length_mm, counter=counter)
-        if self._damage is not None:
-            raw, self._damage = self._damage(raw), None
-        if self._to_cut is None:
-            self._send(raw, start_s)
-            return
-        self._send(raw[: self._to_cut], start_s)
-        self._to_cut = None
-        self._silent = self._silent_after_cut
+        self._send(raw, start_s)
 
     def _send(self, raw: bytes, start_s: float) -> None:
-        if self._silent or not raw:
+        if not raw:
             return
         if self._outgoing:
             last = self._outgoing[-1]
             start_s = max(start_s, last.start_s + len(last.raw) * self._character_s)
-        if self._parity_shows:
-            raw = bytes(byte | (byte.bit_count() % 2) << 7 for byte in raw)
         self._outgoing.append(_Outgoing(raw, start_s))
 
     def _transmit(self, end: End, now_s: float) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import Finite
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -7,7 +7,7 @@ import json
 import click
 import pytest
 
-from dbbstation.cli.number_types import Finite
+from dbbstation.cli.declared import Finite
 from dbbstation.files.recordings.entries import count_in
 from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call

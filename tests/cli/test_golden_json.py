@@ -8,7 +8,7 @@ import pytest
 
 from dbbstation.results.schemas import RESULTS
 from dbbstation.service.job import SessionTask
-from dbbstation.tui.result_lines import result_lines
+from dbbstation.tui.results_screen import result_lines
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
 from tests.cli.json_schema import faults
 from tests.once import OF_TABLES, computed_once

@@ -11,7 +11,7 @@ from dbbstation.cli import DONE
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
-from dbbstation.tui.result_lines import result_lines
+from dbbstation.tui.results_screen import result_lines
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 SETTINGS = """format: dbb-settings/1

@@ -18,7 +18,7 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import pose_errors, position_uncertainty_mm, predicted_poses
-from dbbstation.report.model_part import parameters
+from dbbstation.report.content import parameters
 from dbbstation.results.of_diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import sources_named

@@ -15,7 +15,7 @@ from dbbstation.files.formats.simulator import parse_simulator
 from dbbstation.files.keys import key_of
 from dbbstation.history.trend import TrendOptions
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
-from dbbstation.service.worked_out import counted
+from dbbstation.service.after import counted
 from dbbstation.simulators.loading import LoadedSimulator
 from dbbstation.tasks import fleet as fleet_module
 from dbbstation.tasks.fleet_work import FleetOptions

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbbstation.instrument.checksums import Algorithm, checksum
+from dbbstation.instrument.checksum_part import Algorithm, checksum
 
 
 # Check values over "123456789" as the catalogue of parametrised CRC algorithms (G. Cook) gives them.

@@ -10,8 +10,8 @@ import pytest
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
-from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
+from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol

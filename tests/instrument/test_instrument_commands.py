@@ -18,8 +18,8 @@ from dbbstation.cli.replay import replay
 from dbbstation.errors import InstrumentError, OutputError
 from dbbstation.instrument import link
 from dbbstation.instrument.library import load_instrument
-from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
+from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,10 +8,9 @@ from statistics import median
 import numpy as np
 import pytest
 
-from dbbstation.instrument.arrivals import Arrivals
-from dbbstation.instrument.driver import Instrument
-from dbbstation.instrument.latch import latch_of
+from dbbstation.instrument.driver import Arrivals, Instrument
 from dbbstation.instrument.library import load_instrument
+from dbbstation.instrument.polling import latch_of
 from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
 

@@ -23,13 +23,12 @@ from dbbstation.instrument.codec import Decoder, encode
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.instrument.link import connected_ports, open_link
-from dbbstation.instrument.recognise import looks_like
-from dbbstation.instrument.symptoms import parity_in
+from dbbstation.instrument.symptoms import looks_like, parity_in
 from dbbstation.system.port_holders import holders
 from dbbstation.virtual.control import ControlServer
-from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
 from dbbstation.virtual.wire_ends import SocketEnd
+from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

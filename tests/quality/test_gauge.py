@@ -10,7 +10,7 @@ import pytest
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.repeated import repeated
+from dbbstation.quality.single import repeated
 from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import edges_of
 from dbbstation.trace.feeding import feeding_ways

@@ -15,8 +15,7 @@ from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.shapes import READING, Follows
 from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.inference.levels import Followed, FollowsAnswer
-from dbbstation.report.diagnosis_figure import diagnosis_figure
-from dbbstation.report.unexplained_panel import draw_unexplained
+from dbbstation.report.diagnosis_figure import diagnosis_figure, draw_unexplained
 from dbbstation.results.panel import OnePanel
 from tests.diagnosis.joint_fits import joint_fit
 

@@ -19,7 +19,7 @@ from dbbstation.station import events
 from dbbstation.station.commands import Accept, Judge, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.judging import JudgedRun
 from dbbstation.station.states import State
-from dbbstation.tui.figures_panel import FiguresPanel
+from dbbstation.tui.measure_screen import FiguresPanel
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.sentences import now
 from dbbstation.tui.set_up_panel import SetUpPanel

@@ -18,8 +18,8 @@ from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.control import CellCommands, ControlServer
 from dbbstation.virtual.machine import Sizes, VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
-from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
+from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

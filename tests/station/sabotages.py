@@ -46,10 +46,10 @@ from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.machine import VirtualMachine, VirtualRun
 from dbbstation.virtual.path import circle_path
 from dbbstation.virtual.truth import random_kinematics
-from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import WaitingClock
 from studies.kept_draws import drawn
 from tests.station.bench import MACHINE_FILE
+from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

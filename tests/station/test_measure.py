@@ -19,7 +19,7 @@ from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.service.order import Gate, Order, ordered
-from dbbstation.station.preflight import check_plan
+from dbbstation.station.assembly import check_plan
 from dbbstation.trace.cut import cut
 from dbbstation.virtual.machine import Sizes
 from tests.cli.conftest import call

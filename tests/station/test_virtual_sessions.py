@@ -18,8 +18,8 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.choice import Choice, prepare
+from dbbstation.service.front import line_to_go_on
 from dbbstation.service.memory import Line
-from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
 from dbbstation.station.assembly import Job, Workplace, assemble
 from dbbstation.station.commands import Accept, Quit, Start

@@ -10,7 +10,7 @@ import pytest
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.service.job import SessionTask
 from dbbstation.tui import texts
-from dbbstation.tui.result_lines import result_lines
+from dbbstation.tui.results_screen import result_lines
 from tests.cli.conftest import call
 
 if TYPE_CHECKING:

@@ -37,8 +37,8 @@ from dbbstation.tui.question import YesQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.start_screen import StartScreen
 from dbbstation.tui.temperature_question import TemperatureQuestion
-from dbbstation.virtual.wire import VirtualInstrument
 from tests.tui.test_screen import accept, one_circle, press
+from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbbstation.instrument.protocol import LineSettings
-from dbbstation.virtual.wire_uart import heard_at
+from dbbstation.virtual.wire import heard_at
 
 LINE = LineSettings(baud=9600)
 SEVEN_EVEN_TWO = LineSettings(baud=9600, data_bits=7, parity="even", stop_bits=2)

@@ -84,7 +84,7 @@ def test_no_run_of_that_name(capsys, folder):
     assert "did you mean a-cw-1?" in err
     code, _, err = run(capsys, "reject", folder, "a-cw-1", "--reason", "  ")
     assert code == 2
-    assert "say why" in err
+    assert "give the reason" in err
     assert (folder / "session.yaml").read_bytes() == before
 
 

@@ -31,6 +31,7 @@ def test_a_calibration_says_what_it_left_and_what_the_plan_could_not_see(calibra
     lines = result_lines(SessionTask.CALIBRATE, calibrated | {"directions_lost": [], "gaps": [], "outliers": []})
     assert not any("not visible" in line for line in lines)
     assert f"{calibrated['residual_within_mounting_rms_um']:.2f} µm rms" in lines[3]
+    assert lines[0].startswith("Use this model: ")
     blind = calibrated | {"directions_lost": ["the height of the base"], "gaps": ["no tilt beyond 20 degrees"]}
     lines = result_lines(SessionTask.CALIBRATE, blind)
     assert "not visible to these tests, held at nominal: the height of the base" in lines

@@ -83,7 +83,10 @@ def use_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
             f"Use this model: no. {found.misfit.rms_um:.2f} µm rms have no explanation; run `dbbstation diagnose` first"
         )
     if not check.enough:
-        return f"Use this model: cannot tell. {check.left} degrees of freedom test it; measure further circles"
+        return (
+            f"Use this model: cannot tell. {check.left} degrees of freedom test it, fewer than the {check.of_one_test} of one circle; "
+            "measure further circles"
+        )
     if any(one.finding == "more" for one in found.scatter):
         return "Use this model: cannot tell. The balls scatter by more than stated; find out why first"
     known = zip("XYZ", found.centre_u_um, strict=True)

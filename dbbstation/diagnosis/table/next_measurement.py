@@ -52,7 +52,7 @@ def _suggested(found: Mismatch) -> Iterator[Next]:
     yield from _other_way(found)
     if len(found.table.blocks) == 1:
         yield Next(
-            "Repeat it on another day as a second file: what comes back is the object's, what does not is the day's.",
+            "Repeat the measurement on another day as a second file: effects that return belong to the object, the others to the day.",
             (),
         )
 
@@ -103,10 +103,10 @@ def _apart(found: Mismatch) -> Iterator[Next]:
                 held, moving = (one, other) if one.kind is Kind.TIME else (other, one)
                 how = f"Measure with {held.name} held while {moving.name} moves"
                 if held.kind is Kind.TIME:  # which cannot be held
-                    how = f"Measure with another course of {moving.name} over {held.name}"
+                    how = f"Measure with another curve of {moving.name} over {held.name}"
                 text = (
-                    f"{how}: they move together here (correlation {alike[a, b]:.3f}), and which of them the mismatch "
-                    f"follows is not known."
+                    f"{how}: they move together here (correlation {alike[a, b]:.3f}), so that these "
+                    f"rows do not show which one the mismatch follows."
                 )
                 yield Next(text, (other.name, one.name))
 

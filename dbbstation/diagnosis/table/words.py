@@ -15,25 +15,25 @@ if TYPE_CHECKING:
 
 MEANINGS: dict[Family, str] = {
     Family.LINEAR: "It grows in proportion: a scale, a stiffness, an expansion or, along another axis, a squareness that the simulation has wrong or lacks.",
-    Family.ONCE: "It closes once per turn: something is off centre, or an axis is tilted.",
-    Family.TWICE: "It closes twice per turn: something is oval, or an axis wobbles.",
-    Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction. Positive is more while this variable rises.",
+    Family.ONCE: "It has one period per turn: a part is off centre, or an axis is tilted.",
+    Family.TWICE: "It has two periods per turn: a part is oval, or an axis wobbles.",
+    Family.HYSTERESIS: "Its sign changes with the direction of travel: play or friction. Positive is more while this variable rises.",
     Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
-    Family.LAG: "The measured value runs after the simulated one (negative: ahead of it).",
+    Family.LAG: "The measured value lags behind the simulated one (negative: leads).",
     Family.MEMORY: "It follows this variable late: a body warms up, a material creeps, a sensor or a filter lags.",
     Family.DEAD_TIME: "It follows this variable after a dead time: transport, a network, or a clock that is off.",
-    Family.INTEGRAL: "It gathers in proportion to this variable: a mass, a level, or heat in a body that loses little.",
+    Family.INTEGRAL: "It accumulates in proportion to this variable: a mass, a level, or heat in a well insulated body.",
     Family.KNEE: "It has another slope beyond one value: a stop, a gap, or, at slope -1 over the simulated value, a sensor at its limit.",
-    Family.SATURATION: "It grows with this variable and then no more: a limit, a stop, or a magnet that is full.",
+    Family.SATURATION: "It grows with this variable up to a limit: a stop, or a saturated magnet.",
     Family.DEAD_ZONE: "It is flat within a width: a valve that overlaps, a gap, or a threshold.",
-    Family.FRICTION: "It turns its sign with the direction of travel, within a small speed: friction in a lubricant.",
-    Family.SCALED: "It turns its sign with the direction of travel, and its force grows with the other variable: friction under a load.",
+    Family.FRICTION: "Its sign changes with the direction of travel, within a small speed: friction in a lubricant.",
+    Family.SCALED: "Its sign changes with the direction of travel, and its force grows with the other variable: friction under a load.",
     Family.DRIFT: "It grows with time: warming, wear, or a clock that runs at another rate.",
-    Family.PRODUCT: "It depends on both together: no curve over one of them alone shows it.",
+    Family.PRODUCT: "It depends on both variables together, not on one alone.",
     Family.CURVE: "It follows this variable smoothly.",
     Family.BY_DIRECTION: "It follows this variable with opposite signs in the two directions of travel.",
     Family.WAVE: "It repeats: a pitch, a tooth, a pole or a ripple.",
-    Family.BUMP: "It is a bell over one place.",
+    Family.BUMP: "It is a bump at one place.",
     Family.STEP: "It steps at one place.",
     Family.PULSES: "It begins and ends in time: something came or went, a force or a state that the simulation does not have.",
     Family.BLOCKS: "Runs differ by a constant: something was set up or reset between them.",
@@ -56,7 +56,7 @@ def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
     if finding.confounded > CONFOUNDED:
         parts.append(f"The fitted parameters conceal {100 * finding.confounded:.0f} % of it.")
     if finding.equivalent:
-        parts.append(f"Nothing here tells it from {', '.join(finding.equivalent[1:])}.")
+        parts.append(f"These rows cannot distinguish it from {', '.join(finding.equivalent[1:])}.")
     parts.append(finding.text)
     return " ".join(part for part in parts if part)
 

@@ -131,7 +131,9 @@ def numbers_of(reported: Reported, page: str) -> ReportResult:
     held = tuple(compared(one, now_both, before_both, coverage_factor) for one in tolerances)
     return ReportResult(
         report=page,
-        verdict=verdict_of(held, reported.found, coverage_factor, identified, ranked, modelled and modelled.evaluation),
+        verdict=verdict_of(
+            held, reported.found, coverage_factor, identified, ranked, None if modelled is None else modelled.evaluation
+        ),
         certificate=CertificateState(certificate.title, certificate.lacking, certificate.place or None),
         model_warnings=() if identified is None else model_warnings(identified),
         coverage_factor=coverage_factor,

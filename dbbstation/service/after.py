@@ -149,6 +149,7 @@ class After:
     Args:
         model: of an earlier calibration, for comparison until a new one exists; None: none.
         settings: named file of the shop's settings; None: searched for.
+        tolerances: settings with those of an operator's job, which replace the shop's; None: none.
 
     Attributes:
         former: session compared by an acceptance, or None.
@@ -161,8 +162,9 @@ class After:
         settings: Path | None = None,
         start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
         place: str = "",
+        tolerances: Path | None = None,
     ) -> None:
-        self._place = place
+        self._place, self._tolerances = place, tolerances
         self.session = session.absolute()
         self.results = {step: Result() for step in SessionTask}
         self._model = model
@@ -291,7 +293,9 @@ class After:
                 plan, machine = self._files()
                 return job.model_copy(update={"plan": plan, "machine": machine, "model": self.model})
             case SessionTask.REPORT:
-                return job.model_copy(update={"model": self.model, "place": self._place})
+                return job.model_copy(
+                    update={"model": self.model, "place": self._place, "tolerances": self._tolerances}
+                )
             case SessionTask.ACCEPTANCE:
                 if self.former is None:
                     raise ValueError("no session was chosen for the comparison")

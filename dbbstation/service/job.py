@@ -43,6 +43,8 @@ class SessionJob(BaseModel):
     """Machine of the programs."""
     settings: Path | None = None
     """File of the shop's settings where one was named."""
+    tolerances: Path | None = None
+    """Settings with the tolerances of an operator's job, in place of the shop's."""
     place: str = ""
     """Where was measured, for a certificate."""
     force: bool = True

@@ -144,7 +144,7 @@ class JobAnswer:
         tolerances = operated.tolerances_file(session)
         self._changed = any(note.text.startswith(_LIMITS) for note in read_session(session).notes)
         self._trouble = job.trouble
-        self._after = After(session, operated.model, tolerances, start, job.place)
+        self._after = After(session, operated.model, None, start, job.place, tolerances)
         self._after.do(SessionTask.REPORT)
 
     def look(self) -> Answered | None:

@@ -85,7 +85,8 @@ def done(job: SessionJob) -> Mapping[str, object]:
     """
     from dbbstation.facts.serialise import plain  # noqa: PLC0415 - the job is read before half a second of imports
 
-    settings = read_settings(settings_files(job.beside) if job.settings is None else [job.settings])
+    shops = settings_files(job.beside) if job.settings is None else [job.settings]
+    settings = read_settings([*([] if job.tolerances is None else [job.tolerances]), *shops])
     match job.task:
         case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
             return plain(_fitted(job))

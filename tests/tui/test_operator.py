@@ -78,8 +78,8 @@ class Reported:
     kind = "within"
 
     def __init__(self, job: SessionJob, folder: Path) -> None:
-        assert job.settings is not None
-        self.settings = read_settings([job.settings])
+        assert job.tolerances is not None
+        self.settings = read_settings([job.tolerances])
         (folder / "report.html").write_text("a report", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:
@@ -394,6 +394,25 @@ def test_an_operator_in_trouble_reads_the_shops_own_text_and_no_command() -> Non
     said = now_for_operator(board, "Do not cut, call 4711.")
     assert said == "FAULT at COM3: no answer. Then C connects again, Q leaves. Do not cut, call 4711."
     assert "`dbbstation instrument ports`" in sentence_now(board)
+
+
+def test_a_jobs_report_has_the_shops_letterhead_and_the_jobs_tolerances(job_file: Path) -> None:
+    folder = job_file.parent
+    session = shutil.copytree(FIXTURES / "sessions" / "virtual", folder / "monday-2026-11-20")
+    text = "format: dbb-settings/1\nreport: {laboratory: Example Metrology}\ntolerances: [{quantity: circular-deviation, largest: 1, unit: µm}]\n"
+    (folder / "dbbstation-settings.yaml").write_text(text, encoding="utf-8")
+    job_file.write_text(job_file.read_text(encoding="utf-8") + "place: hall 3\n", encoding="utf-8")
+    answer = JobAnswer(read_operated(job_file), session, ())
+    until = time.monotonic() + 120.0
+    while (found := answer.look()) is None and time.monotonic() < until:
+        time.sleep(0.1)
+    answer.close()
+    assert found is not None
+    assert found.word is Conformity.WITHIN  # 400 µm by the job, 1 µm by the shop
+    assert found.report is not None
+    page = found.report.read_text(encoding="utf-8")
+    assert "Measured by Example Metrology. hall 3" in page
+    assert any(line.startswith("Circular deviation: ") and "limit 400 µm, margin" in line for line in found.reasons)
 
 
 def test_an_operator_goes_back_to_a_test() -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.shapes import Samples
 
 WITHIN_S = (0.5, 1.0, 2.0, 4.0)
@@ -49,7 +50,7 @@ class AfterReversals:
         )
 
 
-def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.float64]]) -> AfterReversals | None:
+def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[Floats]) -> AfterReversals | None:
     """Return the strut whose reversals the residual follows most, or None for too few."""
     if not all({"time", "strut-speed-sign"} <= run.values.keys() for run in runs):
         return None
@@ -68,6 +69,6 @@ def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[NDArray[np.fl
     return min(found, key=lambda one: (one.probability, -one.beyond_um), default=None)
 
 
-def _reversals(sign: NDArray[np.float64]) -> NDArray[np.int64]:
+def _reversals(sign: Floats) -> NDArray[np.int64]:
     moving = np.flatnonzero(sign)
     return moving[1:][np.diff(sign[moving]) != 0.0]

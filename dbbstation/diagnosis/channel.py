@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Columns
     from dbbstation.inference.harmonics import Spectrum
     from dbbstation.machine.geometry import Machine
@@ -88,7 +89,7 @@ class CircleChannel:
         return self.calibration.layout.known
 
     @property
-    def held(self) -> NDArray[np.float64]:
+    def held(self) -> Floats:
         """Return base directions held at nominal."""
         return self.calibration.solution.held
 
@@ -135,7 +136,7 @@ class CircleChannel:
         """Return whether a cause acts once in a session."""
         return any(source.happens_once for own, source in self.sources.items() if own[0] == name)
 
-    def to_whole(self, variant: Variant) -> NDArray[np.float64]:
+    def to_whole(self, variant: Variant) -> Floats:
         """Return the matrix from a form's amplitudes to the cause's, shape (p, q)."""
         if not len(variant.whole):
             return np.eye(len(variant.columns))
@@ -156,7 +157,7 @@ class CircleChannel:
         columns = self.columns if but_for is None else self.columns.but_for(but_for, only)
         return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
-    def target(self, fit: Calibration) -> NDArray[np.float64]:
+    def target(self, fit: Calibration) -> Floats:
         """Return the target of base and causes about a fit, (n,)."""
         base = len(self.base.prior)
         known = fit.x[:base] - fit.layout.nominal[:base]
@@ -169,7 +170,7 @@ class CircleChannel:
                 target = target + self.columns.samples[:, variants[0].columns] @ amplitudes
         return np.asarray(target, dtype=np.float64)
 
-    def noise(self, target: NDArray[np.float64], others: Sequence[Cause], noise_mm: float) -> Spectrum:
+    def noise(self, target: Floats, others: Sequence[Cause], noise_mm: float) -> Spectrum:
         """Return noise from the residual of base and all causes."""
         sd = np.zeros(self.columns.count)
         for cause in (*self.named, *self.set_up, *others):
@@ -182,7 +183,7 @@ class CircleChannel:
         phases = [np.radians(o.raw.theta_deg) for o in self.observations]
         return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])
 
-    def blocks(self, columns: NDArray[np.int64], target: NDArray[np.float64]) -> list[Block]:
+    def blocks(self, columns: NDArray[np.int64], target: Floats) -> list[Block]:
         """Return compressed runs of base, then causes' columns, a block each."""
         every = np.arange(self.columns.base.shape[1] + len(columns))
         found = []
@@ -193,16 +194,16 @@ class CircleChannel:
             found.append(compress(every[touched], samples[:, touched], target[rows]))
         return found
 
-    def unconcealed(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unconcealed(self, effect: Floats) -> Floats:
         """Return what identifiable machine parameters leave of an effect, unweighted, shape (n,)."""
         return np.asarray(effect - self._of_parameters @ (self._of_parameters.T @ effect))
 
     @cached_property
-    def _of_parameters(self) -> NDArray[np.float64]:
+    def _of_parameters(self) -> Floats:
         machine = np.flatnonzero(~self.base.random)
         return axes_of(self.columns.base[:, machine] @ free_directions(self.base, machine, self.held), SEEN)
 
-    def refine(self, name: str, law: str, values: Mapping[str, NDArray[np.float64]], fit: Calibration) -> None:
+    def refine(self, name: str, law: str, values: Mapping[str, Floats], fit: Calibration) -> None:
         """Lay out a cause at parameter values, with tangents and slack."""
         source = self.sources[name, law]
         readings = self._readings_about(fit)
@@ -246,7 +247,7 @@ class CircleChannel:
         )
 
     @cached_property
-    def _variables(self) -> list[dict[str, NDArray[np.float64]]]:
+    def _variables(self) -> list[dict[str, Floats]]:
         return [variables(motion, self.machine) for motion in self.motions]
 
     def give_back(self) -> None:
@@ -263,14 +264,14 @@ class CircleChannel:
             self._last = fit, [fit.model.bar(motion) for motion in self.motions]
         return self._last[1]
 
-    def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> NDArray[np.float64] | None:
+    def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> Floats | None:
         terms = [t for t in fit.layout.terms if (t.source.name, t.source.law) == key]
         base = {term.source.name for term in self.calibration.layout.terms}
         if not terms or key[0] in base:
             return None
         return fit.x[fit.layout.columns_of(key[0])[0]]
 
-    def _base(self) -> NDArray[np.float64]:
+    def _base(self) -> Floats:
         layout = self.calibration.layout
         samples = np.zeros((self.runs[-1].stop, len(layout.known.prior)))
         for rows, motion, reading in zip(self.runs, self.motions, self.readings, strict=True):
@@ -338,7 +339,7 @@ class CircleChannel:
     def _variants(
         self,
         source: ErrorSource,
-        derivatives: Sequence[NDArray[np.float64]],
+        derivatives: Sequence[Floats],
         shared: Sequence[str],
         nonlinear: tuple[float, ...],
     ) -> list[Variant]:

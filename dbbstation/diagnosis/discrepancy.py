@@ -21,8 +21,7 @@ from dbbstation.sources.contract import Fitted, Owner
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.sources.contract import ErrorSource, Motion
@@ -49,19 +48,19 @@ class Effects:
 
     motion: Motion
     reading: BarReading
-    values: NDArray[np.float64]
-    derivative: NDArray[np.float64]
-    known: Mapping[str, NDArray[np.float64]]
+    values: Floats
+    derivative: Floats
+    known: Mapping[str, Floats]
 
 
-def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
+def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return a source's slack columns over all runs, shape (n, q)."""
     if source.form_uncertainty == 0.0:
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
     amplitude = np.array([not p.grid for p in source.parameters(machine)])
-    effects: list[NDArray[np.float64]] = []
-    along: list[list[NDArray[np.float64]]] = []
-    signs: list[NDArray[np.float64]] = []
+    effects: list[Floats] = []
+    along: list[list[Floats]] = []
+    signs: list[Floats] = []
     for run in runs:
         motion = run.motion
         # What an instrument does wrong it does to the whole reading, though a model may write it as errors of struts.
@@ -84,13 +83,13 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     return np.hstack([columns, _other_stages(source, machine, runs), _left_open(source, machine, runs)])
 
 
-def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
+def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return changes by other constants, shape (n, q), with share one relative to the others."""
     changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
     return np.vstack(changes) / source.form_uncertainty
 
 
-def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
+def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return growth with other time constants, shape (n, q)."""
     parameters = source.parameters(machine)
     amplitude = np.array([not p.grid for p in parameters])
@@ -109,8 +108,8 @@ def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]
 
 
 def _strut_contributions(
-    source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64], reading: BarReading
-) -> NDArray[np.float64] | None:
+    source: ErrorSource, motion: Motion, machine: Machine, values: Floats, reading: BarReading
+) -> Floats | None:
     """Return a source's reading through each strut, shape (n, 6) [mm]; None if it also acts elsewhere."""
     model = MachineModel(machine, (Fitted(source, values, source.shared_by(motion)),))
     effect = model.effect(motion, reading.actual)
@@ -128,8 +127,8 @@ def _strut_contributions(
 
 
 def _followed_by_strut(
-    source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion, machine: Machine
-) -> list[NDArray[np.float64]]:
+    source: ErrorSource, known: Mapping[str, Floats], motion: Motion, machine: Machine
+) -> list[Floats]:
     """Return variables of a strut source's slack, shape (n, 6) each."""
     if source.varies_with in {"time", "temperature"}:
         return [np.broadcast_to(known["time"][:, None], (len(motion), STRUTS))]
@@ -146,7 +145,7 @@ OF_STRUTS_SMOOTH = ("strut-force", "strut-speed")
 that is another at speed."""
 
 
-def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def _swing_rad(motion: Motion, machine: Machine) -> Floats:
     """Return platform joints' angles from mid-travel, shape (n, 6) [rad]."""
     rest = middle(machine)
     unit, at_rest = motion.struts(machine).unit, inverse(machine.hexapod, rest).unit
@@ -155,7 +154,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)), dtype=np.float64)
 
 
-def _followed(source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion) -> NDArray[np.float64]:
+def _followed(source: ErrorSource, known: Mapping[str, Floats], motion: Motion) -> Floats:
     """Return variables of another source's slack, shape (n, q)."""
     name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:

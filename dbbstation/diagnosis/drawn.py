@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Direction
 
 
@@ -21,10 +19,10 @@ class Trace:
     """
 
     direction: Direction
-    theta_deg: NDArray[np.float64]
-    measured_um: NDArray[np.float64]
-    before_um: NDArray[np.float64]
-    after_um: NDArray[np.float64]
+    theta_deg: Floats
+    measured_um: Floats
+    before_um: Floats
+    after_um: Floats
 
 
 @dataclass(frozen=True)
@@ -54,11 +52,11 @@ class Branch:
     """
 
     sense: str
-    variable: NDArray[np.float64]
-    model_um: NDArray[np.float64]
-    before_um: NDArray[np.float64]
-    after_um: NDArray[np.float64]
-    sigma_um: NDArray[np.float64]
+    variable: Floats
+    model_um: Floats
+    before_um: Floats
+    after_um: Floats
+    sigma_um: Floats
 
 
 @dataclass(frozen=True)

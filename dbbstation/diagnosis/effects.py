@@ -24,8 +24,7 @@ from dbbstation.trace.circle import RawCircle
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.identified import Row
     from dbbstation.model.machine_model import BarReading, MachineModel
     from dbbstation.model.observation import Observation
@@ -97,9 +96,9 @@ def effects_of(
     model: MachineModel,
     observations: Sequence[Observation],
     rows: Sequence[Row] = (),
-    covariance: NDArray[np.float64] | None = None,
-    unseen: NDArray[np.float64] | None = None,
-    formula_variance: NDArray[np.float64] | None = None,
+    covariance: Floats | None = None,
+    unseen: Floats | None = None,
+    formula_variance: Floats | None = None,
 ) -> tuple[CauseEffect, ...]:
     """Return causes' contributions, the greatest circular deviation first.
 
@@ -185,14 +184,14 @@ def _places(group: Sequence[Fitted], model: MachineModel, rows: Sequence[Row]) -
     return [place[name] for name in names] if all(name in place for name in names) else None
 
 
-def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _root(covariance: Floats) -> Floats:
     values, vectors = np.linalg.eigh(covariance)
     kept = values > 0.0
-    root: NDArray[np.float64] = vectors[:, kept] * np.sqrt(values[kept])
+    root: Floats = vectors[:, kept] * np.sqrt(values[kept])
     return root
 
 
-def _of_formulas(group: Sequence[Fitted], variance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _of_formulas(group: Sequence[Fitted], variance: Floats) -> Floats:
     """Return parameter changes by formula errors, a column per source, shape (p, sources)."""
     sources = list(dict.fromkeys(f.source.name for f in group))
     owner = np.concatenate([np.full(len(f.values), sources.index(f.source.name)) for f in group])
@@ -200,7 +199,7 @@ def _of_formulas(group: Sequence[Fitted], variance: NDArray[np.float64]) -> NDAr
     return share[:, None] * (owner[:, None] == np.arange(len(sources)))
 
 
-def _parted(group: Sequence[Fitted], changes: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _parted(group: Sequence[Fitted], changes: Floats) -> tuple[Floats, ...]:
     """Return parameter changes, shape (p, r), by source."""
     ends = np.cumsum([len(f.values) for f in group])
     return tuple(np.split(changes, ends[:-1]))
@@ -210,8 +209,8 @@ def _answers(
     observation: Observation,
     reading: BarReading,
     group: Sequence[Fitted],
-    roots: tuple[NDArray[np.float64], ...] | None,
-) -> NDArray[np.float64] | None:
+    roots: tuple[Floats, ...] | None,
+) -> Floats | None:
     """Return reading changes per independent direction of one standard deviation, shape (n, r) [mm]."""
     if roots is None:
         return None
@@ -223,7 +222,7 @@ def _answers(
     return total
 
 
-def _circle(observation: Observation, effect_mm: NDArray[np.float64]) -> CuredCircle:
+def _circle(observation: Observation, effect_mm: Floats) -> CuredCircle:
     raw = observation.raw
     measured, cured = raw.length_mm, raw.length_mm - effect_mm
     was, would = figures(raw, measured), figures(raw, cured)
@@ -243,14 +242,14 @@ def _circle(observation: Observation, effect_mm: NDArray[np.float64]) -> CuredCi
     )
 
 
-def _own_g_um(raw: RawCircle, effect_mm: NDArray[np.float64]) -> float:
+def _own_g_um(raw: RawCircle, effect_mm: Floats) -> float:
     return smooth_circularity_um(raw, raw.circle.bar_mm + effect_mm)
 
 
 def _u_of_mean(
     circles: Sequence[CuredCircle],
-    spread: Sequence[NDArray[np.float64] | None],
-    changed_um: Callable[[CuredCircle, list[NDArray[np.float64]]], NDArray[np.float64]],
+    spread: Sequence[Floats | None],
+    changed_um: Callable[[CuredCircle, list[Floats]], Floats],
 ) -> float | None:
     """Return the standard uncertainty of a figure's mean over all runs, from what some lengths change of it; None if unknown."""
     found = []
@@ -263,11 +262,11 @@ def _u_of_mean(
     return float(np.linalg.norm(each.mean(axis=0))) if each.size else 0.0
 
 
-def _changed_g_um(circle: CuredCircle, lengths_mm: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _changed_g_um(circle: CuredCircle, lengths_mm: list[Floats]) -> Floats:
     return np.array(smooth_circularities_um(circle.raw, lengths_mm)) - circle.g_um
 
 
-def _changed_centres_um(circle: CuredCircle, lengths_mm: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _changed_centres_um(circle: CuredCircle, lengths_mm: list[Floats]) -> Floats:
     raw, own = circle.raw, circle.raw.circle.bar_mm + circle.effect_mm
     own_mm = np.asarray(figures(raw, own).centre_mm)
     moved = [circle.centre_um + 1e3 * (np.asarray(figures(raw, one).centre_mm) - own_mm) for one in lengths_mm]
@@ -278,7 +277,7 @@ def _over_the_workspace(
     model: MachineModel,
     without: MachineModel,
     group: Sequence[Fitted],
-    changes: tuple[tuple[NDArray[np.float64], ...] | None, tuple[NDArray[np.float64], ...] | None],
+    changes: tuple[tuple[Floats, ...] | None, tuple[Floats, ...] | None],
 ) -> tuple[float | None, float | None]:
     """Return a cause's rms tool shift about a common one, with standard uncertainty [µm]; None: unknown."""
     if any(f.source.belongs_to is not Owner.MACHINE or not f.source.needs <= {Need.POSE} for f in group):
@@ -294,7 +293,7 @@ def _over_the_workspace(
     rms_um = _rms_about_mean_um(moved)
     responses = position_responses(here.hexapod, here.frames)
 
-    def spread(roots: tuple[NDArray[np.float64], ...]) -> float:
+    def spread(roots: tuple[Floats, ...]) -> float:
         answers = np.zeros((3, len(motion.poses), roots[0].shape[1]))
         for fitted, root in zip(group, roots, strict=True):
             derivative = here.derivative(fitted)
@@ -313,6 +312,6 @@ def _over_the_workspace(
     return rms_um, None if np.isnan(u) else float(u)
 
 
-def _rms_about_mean_um(moved_mm: NDArray[np.float64]) -> float:
+def _rms_about_mean_um(moved_mm: Floats) -> float:
     """Return the rms length of vectors, shape (3, n) [mm], about their mean [µm]."""
     return 1e3 * float(np.sqrt(np.mean(np.sum((moved_mm - moved_mm.mean(axis=1, keepdims=True)) ** 2, axis=0))))

@@ -11,10 +11,9 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import CLOSE, search
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.unmodelled import Unmodelled
     from dbbstation.inference.harmonics import Misfit, Spectrum
@@ -39,7 +38,7 @@ class SettledCircles:
     posterior: Posterior
     best: Hypothesis
     comparison: ModelComparison
-    target: NDArray[np.float64]
+    target: Floats
     causes: tuple[Cause, ...]
     unmodelled: Unmodelled
     noise: Spectrum

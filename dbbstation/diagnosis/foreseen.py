@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.inference.model_comparison import Variant
     from dbbstation.machine.geometry import Machine
@@ -75,11 +76,11 @@ class _Run:
         of_sources: amplitude rows by form and wait, shape (n, p).
     """
 
-    ball: NDArray[np.float64]
+    ball: Floats
     weight: float
     touched: NDArray[np.int64]
-    base: NDArray[np.float64]
-    of_sources: dict[_Form, NDArray[np.float64]] = field(default_factory=dict)
+    base: Floats
+    of_sources: dict[_Form, Floats] = field(default_factory=dict)
 
 
 class ForeseenTests:
@@ -127,7 +128,7 @@ class ForeseenTests:
         proposal: Proposal,
         direction: Direction,
         asked: Sequence[tuple[ErrorSource, Variant]],
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """Return a run's compressed rows on base and sources, shape (r, k), its new mounting removed."""
         run = self._run(proposal, direction, asked)
         place = len(self.channel.base.prior)
@@ -176,7 +177,7 @@ class ForeseenTests:
         weight = float(np.sqrt(self._samples / len(rows)))
         return _Run(ball, weight, touched, _without(ball, rows[:, touched]) * weight)
 
-    def _of_source(self, run: _Run, reading: BarReading, source: ErrorSource, variant: Variant) -> NDArray[np.float64]:
+    def _of_source(self, run: _Run, reading: BarReading, source: ErrorSource, variant: Variant) -> Floats:
         parameters = source.parameters(self.channel.machine)
         amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
         values = np.zeros(len(parameters))
@@ -190,7 +191,7 @@ def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
     return source.name, source.law, variant.nonlinear, wait_s
 
 
-def _without(ball: NDArray[np.float64], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _without(ball: Floats, rows: Floats) -> Floats:
     return np.asarray(rows - ball @ (ball.T @ rows), dtype=np.float64)
 
 

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
 
 
-def uncertainties(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
+def uncertainties(calibration: Calibration, held: Floats) -> Floats:
     """Return every column's standard uncertainty, shape (k,), with `held_variance`."""
     seen = np.maximum(calibration.solution.variance, 0.0)
     return np.asarray(np.sqrt(seen + held_variance(calibration, held)), dtype=np.float64)
 
 
-def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
+def held_variance(calibration: Calibration, held: Floats) -> Floats:
     """Return every column's variance along held directions, shape (k,).
 
     A source there may be as large as found or plausible, whichever is greater: a ball 70 µm off in visible directions
@@ -41,13 +40,13 @@ def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArra
     return variance
 
 
-def unseen(calibration: Calibration) -> NDArray[np.float64]:
+def unseen(calibration: Calibration) -> Floats:
     """Return undetermined orthonormal rows for the model file, shape (h, f)."""
     fitted = np.flatnonzero(~calibration.layout.known.random)
     return calibration.null_space[:, fitted] / calibration.layout.known.scale[fitted]
 
 
-def held_beside(before: Calibration, after: Calibration) -> NDArray[np.float64]:
+def held_beside(before: Calibration, after: Calibration) -> Floats:
     """Return directions held by the joint fit only, shape (h, f); the base's own are convention."""
     wide = np.zeros((len(before.solution.held), after.solution.held.shape[1]))
     wide[:, : before.solution.held.shape[1]] = before.solution.held

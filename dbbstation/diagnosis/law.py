@@ -11,15 +11,14 @@ from dbbstation.inference.channel import Law
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.sources.contract import Parameter
 
 
 def law_of(
     name: str,
     parameters: Sequence[Parameter],
-    columns: Callable[[tuple[float, ...]], NDArray[np.float64]],
+    columns: Callable[[tuple[float, ...]], Floats],
     **further: Any,  # noqa: ANN401 - fields of `Law`
 ) -> Law:
     """Return a law.

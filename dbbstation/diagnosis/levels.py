@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.outliers.outlier import Outlier
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import Explained, SettledCircles
     from dbbstation.inference.chosen_anew import KnownGains
@@ -44,7 +45,7 @@ class CircleBank(Bank):
         self._columns, self._circles, self._scatter = circles.columns, circles, settled.scatter
         self.nameless = frozenset(cause.name for cause in settled.causes if not cause.named)
 
-    def samples(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+    def samples(self, columns: NDArray[np.int64]) -> Floats:
         """Return columns over all rows, shape (n, p) [mm]."""
         return self._columns.of(columns)
 
@@ -97,7 +98,7 @@ def _law(explained: Explained, cause: Cause) -> Law:
         variable = RUN if once or source is None else variable_of(source)
     signed = variable.endswith("sign") or (follows is not None and follows.moves == SIGNED)
 
-    def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+    def columns(point: tuple[float, ...]) -> Floats:
         return circles.columns.of(next(one.columns for one in cause.variants if one.nonlinear == point))
 
     return Law(

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.explained import SettledCircles
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.levels import Levels
@@ -33,14 +34,12 @@ def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, le
     largest = max(levels.follows, key=lambda one: one.rms, default=None)
     variable = "" if largest is None or largest.in_time else largest.variables[0][0]
     variable = "time" if variable == SESSION_TIME else variable
-    none: list[NDArray[np.float64] | None] = [None] * len(before.observations)
+    none: list[Floats | None] = [None] * len(before.observations)
     struts = strut_contributions(before, fitted) if fitted else none
     return locate(before.observations, before.residual_mm, first.noise, _with_unmodelled(settled, struts), variable)
 
 
-def _with_unmodelled(
-    settled: SettledCircles, struts: list[NDArray[np.float64] | None]
-) -> list[NDArray[np.float64] | None]:
+def _with_unmodelled(settled: SettledCircles, struts: list[Floats | None]) -> list[Floats | None]:
     """Add struts' unmodelled contributions to readings, shape (n, 6) [mm] per run."""
     unmodelled, members = settled.unmodelled, settled.best.members
     values = settled.comparison.estimates(members).values if members else np.zeros(0)
@@ -58,9 +57,9 @@ def _with_unmodelled(
 
 def locate(
     observations: Sequence[Observation],
-    residual_mm: Sequence[NDArray[np.float64]],
+    residual_mm: Sequence[Floats],
     noise_mm: float,
-    struts: Sequence[NDArray[np.float64] | None],
+    struts: Sequence[Floats | None],
     variable: str,
 ) -> tuple[Location, ...]:
     """Return stretches beyond noise, largest share first."""
@@ -89,10 +88,10 @@ def locate(
     return tuple(found[: BOUNDS.locations])
 
 
-def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[NDArray[np.float64] | None]:
+def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[Floats | None]:
     """Return struts' contributions to readings per run, shape (n, 6) [mm]."""
     model = calibration.model
-    contributions: list[NDArray[np.float64] | None] = []
+    contributions: list[Floats | None] = []
     for observation in calibration.observations:
         motion = observation.motion()
         reading = model.bar(motion)
@@ -105,11 +104,11 @@ def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> l
     return contributions
 
 
-def _per_sample(effect: Effect, count: int) -> NDArray[np.float64]:
+def _per_sample(effect: Effect, count: int) -> Floats:
     return np.broadcast_to(np.asarray(effect.strut_mm), (count, 6))
 
 
-def _strut(contribution: NDArray[np.float64] | None, rows: NDArray[np.int64]) -> int | None:
+def _strut(contribution: Floats | None, rows: NDArray[np.int64]) -> int | None:
     if contribution is None:
         return None
     return 1 + int(np.argmax(np.sum(contribution[rows] ** 2, axis=0)))

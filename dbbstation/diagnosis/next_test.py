@@ -20,8 +20,7 @@ from dbbstation.sources.contract import Need
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.diagnosis.findings import SourceFinding
@@ -95,17 +94,17 @@ def propose(
     covariance = solve(blocks, known, noise_mm, channel.held).covariance
     own = slice(first, first + len(variant.columns))
 
-    def seen(proposal: Proposal, runs: slice) -> NDArray[np.float64]:
+    def seen(proposal: Proposal, runs: slice) -> Floats:
         directions = tuple(Direction)[runs]
         return np.vstack([could_be.rows(proposal, direction, asked) for direction in directions])
 
-    def left(rows: NDArray[np.float64]) -> float:
+    def left(rows: Floats) -> float:
         return _size(_told(covariance, rows, noise_mm, own), variant)
 
     proposals = could_be.that_show(frozenset[Need]().union(*(s.needs for s, _ in asked)))
     # One direction tells well enough which tests are worth a closer look beside those already chosen.
     one_way = {k: seen(proposal, slice(1)) for k, proposal in enumerate(proposals)}
-    both_ways: dict[int, NDArray[np.float64]] = {}
+    both_ways: dict[int, Floats] = {}
     chosen: list[Proposal] = []
     sigmas = [_sigmas(covariance[own, own], variant)]
     for _ in range(min(most, len(one_way))):
@@ -127,25 +126,23 @@ def propose(
     return ()
 
 
-def _told(
-    covariance: NDArray[np.float64], rows: NDArray[np.float64], noise_mm: float, own: slice
-) -> NDArray[np.float64]:
+def _told(covariance: Floats, rows: Floats, noise_mm: float, own: slice) -> Floats:
     seen = np.flatnonzero(rows.any(axis=0))
     gain = rows[:, seen] @ covariance[seen, own]
     answer = rows[:, seen] @ covariance[np.ix_(seen, seen)] @ rows[:, seen].T + noise_mm**2 * np.eye(len(rows))
     return np.asarray(covariance[own, own] - gain.T @ np.linalg.solve(answer, gain), dtype=np.float64)
 
 
-def _size(covariance: NDArray[np.float64], variant: Variant) -> float:
+def _size(covariance: Floats, variant: Variant) -> float:
     return float(np.sqrt(np.mean(np.maximum(np.diag(covariance), 0.0) / variant.plausible**2)))
 
 
-def _sigmas(covariance: NDArray[np.float64], variant: Variant) -> NDArray[np.float64]:
+def _sigmas(covariance: Floats, variant: Variant) -> Floats:
     variances = np.linalg.eigvalsh(covariance / np.outer(variant.plausible, variant.plausible))
     return np.sqrt(np.maximum(variances, np.finfo(np.float64).tiny))
 
 
-def _worth_it(now: NDArray[np.float64], then: NDArray[np.float64]) -> bool:
+def _worth_it(now: Floats, then: Floats) -> bool:
     testable = [bool(np.mean(sigmas <= 1.0 / OUT) >= TESTABLE_SHARE) for sigmas in (now, then)]
     return testable == [False, True] or bool(np.any(then <= HALVED * now))
 

@@ -9,9 +9,7 @@ from dbbstation.calibration.fit.calibrate import Calibration, calibrate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
@@ -20,7 +18,7 @@ def refitted(
     like: Calibration,
     observations: Sequence[Observation],
     more: Sequence[ErrorSource] = (),
-    start: Mapping[str, NDArray[np.float64]] | None = None,
+    start: Mapping[str, Floats] | None = None,
 ) -> Calibration:
     """Fit runs with another fit's sources and values, and more from `start`."""
     layout = like.layout

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Columns
 
 PIECE_MM = 0.5
@@ -84,10 +85,10 @@ class TemplateScan:
     def __init__(
         self,
         runs: Sequence[Samples],
-        residual: Sequence[NDArray[np.float64]],
-        jacobian: Iterable[NDArray[np.float64]],
+        residual: Sequence[Floats],
+        jacobian: Iterable[Floats],
         base: Columns,
-        held: NDArray[np.float64],
+        held: Floats,
         noise_mm: float,
     ) -> None:
         self._runs, self._noise = runs, noise_mm
@@ -107,9 +108,7 @@ class TemplateScan:
         )
         self._rest = np.concatenate(residual) / noise_mm
 
-    def sums(
-        self, variable: str, strut: int | None, moves: str, pieces: Callable[[NDArray[np.float64]], NDArray[np.int64]]
-    ) -> Sums:
+    def sums(self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], NDArray[np.int64]]) -> Sums:
         """Sum over pieces of a variable."""
         values = np.concatenate([run.values[variable] for run in self._runs])
         gain = np.vstack([run.gain[moves] for run in self._runs])
@@ -122,7 +121,7 @@ class TemplateScan:
         rows = np.argsort(piece, kind="stable")
         ends = np.concatenate([[0], np.cumsum(number)])
 
-        def added(samples: NDArray[np.floating], times: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        def added(samples: NDArray[np.floating], times: Floats | None = None) -> Floats:
             """Return samples summed over pieces with factors."""
             weights = np.ones(many) if times is None else times[rows]
             return np.asarray(csr_array((weights, rows, ends), shape=(len(number), many)) @ samples, dtype=np.float64)
@@ -224,20 +223,20 @@ _BUMPS_APART, _TURNS_APART, _LINES_APART, _RINGS_APART = 3.0, 4.0, 6.0, 4.0
 """How many neighbours in a list of forms are about the same: only every so many-th counts as another try."""
 
 
-def _piece(values: NDArray[np.float64], low: float, width: float) -> NDArray[np.int64]:
+def _piece(values: Floats, low: float, width: float) -> NDArray[np.int64]:
     return np.floor((values - low) / width).astype(np.int64)
 
 
-def _since(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def _since(values: Floats) -> NDArray[np.int64]:
     return np.round(np.clip(values, -RINGING_S, RINGING_S) / RINGING_PIECE_S).astype(np.int64)
 
 
-def _place(values: NDArray[np.float64]) -> NDArray[np.int64]:
+def _place(values: Floats) -> NDArray[np.int64]:
     x, y = np.floor(values / PLACE_MM).astype(np.int64).T
     return np.asarray(x * 100_000 + y, dtype=np.int64)
 
 
-def _lines(places: NDArray[np.float64]) -> list[Form]:
+def _lines(places: Floats) -> list[Form]:
     found: list[Form] = []
     for across in ACROSS_DEG:
         along = PlaneStep(float(across), 0.0, 1.0).along(places)
@@ -262,8 +261,8 @@ def _waves(
     strut: int | None,
     moves: str,
     sums: Sums,
-    grid: NDArray[np.float64],
-    explained: NDArray[np.float64],
+    grid: Floats,
+    explained: Floats,
 ) -> list[Shape]:
     found = sums.finer([float(grid[k]) for k in peaks(explained, BOUNDS.made_finer)], float(np.ptp(sums.at)))
     tried = len(grid) / 2.0

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.model.machine_model import Actual
     from dbbstation.model.observation import Observation
@@ -53,10 +54,10 @@ SENSES = {1.0: "lengthening", -1.0: "shortening"}
 class _Samples:
     """Samples of all runs by strut or reading, shape (n, c) each."""
 
-    variable: NDArray[np.float64]
-    sense: NDArray[np.float64]
-    model_mm: NDArray[np.float64]
-    gain: NDArray[np.float64]
+    variable: Floats
+    sense: Floats
+    model_mm: Floats
+    gain: Floats
 
 
 @with_one_thread
@@ -123,7 +124,7 @@ def _drawn_over(wanted: Follows, observations: Sequence[Observation], *, moves_s
     return "strut-force" if variable == "strut-force" else "strut-length"
 
 
-def _strut_mm(there: Actual, name: str) -> NDArray[np.float64] | None:
+def _strut_mm(there: Actual, name: str) -> Floats | None:
     """Return one source's strut errors over a motion, shape (6,) or (n, 6) [mm]."""
     effects = [there.by(f).strut_mm for f in there.model.acting(there.motion) if f.source.name == name]
     return next((effect for effect in effects if effect is not None), None)
@@ -157,13 +158,13 @@ def _samples(
     )
 
 
-def _warmer_k(calibration: Calibration, name: str, motion: Motion) -> NDArray[np.float64]:
+def _warmer_k(calibration: Calibration, name: str, motion: Motion) -> Floats:
     """Return a source's thermometers' rise, shape (n, 1) or (n, 6) [K]."""
     own = (t.source for t in calibration.layout.terms if t.source.name == name)
     return next(source.warmer_k(motion) for source in own if isinstance(source, FollowsTemperature))
 
 
-def _branches(sense: NDArray[np.float64], *, signed: bool) -> list[tuple[str, NDArray[np.bool_]]]:
+def _branches(sense: Floats, *, signed: bool) -> list[tuple[str, NDArray[np.bool_]]]:
     if not signed:
         return [("", np.ones(len(sense), dtype=bool))]
     return [(label, sense == sign) for sign, label in SENSES.items()]
@@ -174,8 +175,8 @@ def _branch(
     column: int,
     rows: NDArray[np.bool_],
     sense: str,
-    before_mm: NDArray[np.float64],
-    left_mm: NDArray[np.float64],
+    before_mm: Floats,
+    left_mm: Floats,
     noise_mm: float,
     *,
     fine: bool,
@@ -186,7 +187,7 @@ def _branch(
     piece = np.clip(np.searchsorted(edges, over[rows], side="right") - 1, 0, pieces - 1)
     _, piece, count = np.unique(piece, return_inverse=True, return_counts=True)
 
-    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean(values: Floats) -> Floats:
         return np.bincount(piece, values[rows]) / count
 
     power = mean(gain * gain)

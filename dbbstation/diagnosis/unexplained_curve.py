@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import SettledCircles
     from dbbstation.diagnosis.shapes import Samples, Shape
@@ -108,9 +109,7 @@ def _adds(one: Shape, other: Shape) -> bool:
     return (one.variable, one.strut, one.moves) == (other.variable, other.strut, other.moves)
 
 
-def _summed(
-    runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_Piece]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _summed(runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_Piece]) -> tuple[Floats, Floats]:
     if len(pieces) == 1:
         return pieces[0].at, pieces[0].to_points
     at = max((piece.at for piece in pieces), key=len)
@@ -146,14 +145,14 @@ class _Piece:
         to_points: shape (n, p).
     """
 
-    amplitudes: NDArray[np.float64]
-    to_points: NDArray[np.float64]
-    at: NDArray[np.float64]
+    amplitudes: Floats
+    to_points: Floats
+    at: Floats
     direction: tuple[float, ...]
     words: str
 
 
-def _along(runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]) -> _Piece:
+def _along(runs: Sequence[Samples], shape: Shape, found: Floats) -> _Piece:
     keep, convention = _convention(runs, shape)
     directions = len(found) // shape.form.count
     amplitudes = np.kron(np.eye(directions), keep) @ found
@@ -168,7 +167,7 @@ def _along(runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]) ->
     return _Piece(amplitudes, np.asarray(np.kron(way, curve @ keep), dtype=np.float64), at, direction, words)
 
 
-def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float64], str]:
+def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[Floats, str]:
     count = shape.form.count
     if isinstance(shape.form, Walk):
         return np.eye(count), "counted from its first value"
@@ -179,9 +178,7 @@ def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float
     return np.eye(count) - line, LINE_OUT if straight else MEAN_OUT[shape.moves]
 
 
-def _over(
-    runs: Sequence[Samples], shape: Shape, line: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+def _over(runs: Sequence[Samples], shape: Shape, line: Floats) -> tuple[Floats, Floats, str]:
     form = shape.form
     if isinstance(form, Plane | PlaneStep):
         flat = form.across if isinstance(form, PlaneStep) else line[: form.coordinates]
@@ -197,24 +194,24 @@ def _over(
 _AXIS = {"position of the platform": "+X", "tilt of the platform": "that of tilt A"}
 
 
-def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+def _line(at: Floats, weights: Floats, order: int) -> Floats:
     """Return the matrix to the best polynomial's values, shape (p, p)."""
     basis = np.vander(at, order + 1)
     weighted = basis.T * weights
     return np.asarray(basis @ np.linalg.solve(weighted @ basis, weighted), dtype=np.float64)
 
 
-def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
+def _values(shape: Shape, run: Samples) -> Floats:
     return shape.followed(run.values[shape.variable])
 
 
-def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
+def _weights(runs: Sequence[Samples], shape: Shape) -> Floats:
     return np.asarray(
         sum(shape.form.columns(_values(shape, run)).reshape(-1, shape.form.count).sum(axis=0) for run in runs)
     )
 
 
-def _extent(runs: Sequence[Samples], shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:
+def _extent(runs: Sequence[Samples], shape: Shape, flat: Floats | None) -> tuple[float, float]:
     values = [_values(shape, run) for run in runs]
     along = values if flat is None else [value @ flat for value in values]
     return float(min(one.min() for one in along)), float(max(one.max() for one in along))

@@ -20,9 +20,8 @@ from dbbstation.sources.registry import sources_named
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.findings import Curve, Unexplained
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -46,7 +45,7 @@ class JointFitWithCurve:
 
     source: ErrorSource
     fit: Calibration
-    to_all: NDArray[np.float64]
+    to_all: Floats
     curve: Curve
 
     def identified(self, report: Mapping[str, Any], sessions: Mapping[str, str]) -> IdentifiedModel:
@@ -123,13 +122,13 @@ def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
     return replace(rest, curve=replace(curve, form=f"period {period:.6g} mm", period=float(period), points=points))
 
 
-def _to_all(each: int, strut: int | None) -> NDArray[np.float64]:
+def _to_all(each: int, strut: int | None) -> Floats:
     """Return the matrix from one or shared parameters to all struts', shape (6 each, each)."""
     chosen = np.ones(STRUTS) if strut is None else np.eye(STRUTS)[strut - 1]
     return np.kron(chosen[:, None], np.eye(each))
 
 
-def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) -> ErrorSource:
+def _part(whole: ErrorSource, to_all: Floats, strut: int | None) -> ErrorSource:
     first = int(np.flatnonzero(to_all.any(axis=1))[0])
 
     class TiedSource(ErrorSource):
@@ -148,18 +147,18 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
             own = whole.parameters(machine)[first : first + to_all.shape[1]]
             return own if strut else tuple(replace(p, name=p.name.replace("strut_1", "every_strut")) for p in own)
 
-        def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
             """Return the effect of all parts with these values."""
             return whole.effect(motion, machine, to_all @ values)
 
-        def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
             """Return the derivative of this effect."""
             return whole.derivative(motion, machine, to_all @ values).times(to_all)
 
     return TiedSource()
 
 
-def _wave(curve: Curve, machine: Machine) -> NDArray[np.float64]:
+def _wave(curve: Curve, machine: Machine) -> Floats:
     """Return a wave's sine and cosine [µm] and period [mm], from points."""
     assert curve.period_mm is not None  # noqa: S101 - asked by the caller
     at = np.array([point.at for point in curve.points]) - sum(machine.travel.strut_mm) / 2.0

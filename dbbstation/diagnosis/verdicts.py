@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.levels import Levels
@@ -110,9 +111,7 @@ class _CircleJudge(CauseJudge):
         del name
         return frozenset()
 
-    def _concealed(
-        self, shown: Member, effect: NDArray[np.float64], values: NDArray[np.float64]
-    ) -> tuple[float, float, float]:
+    def _concealed(self, shown: Member, effect: Floats, values: Floats) -> tuple[float, float, float]:
         """Return an effect's rms, as found or plausible, its unconcealed rms [mm], and the concealed share."""
         columns = shown.variant.columns
         amplitudes = values[: len(columns)] if shown.cause.name in self._members else shown.variant.plausible
@@ -148,9 +147,7 @@ class _CircleJudge(CauseJudge):
                 found.add(variant.nonlinear[listed.index(True)])
         return sorted(found)
 
-    def _values_of(
-        self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> dict[str, Value]:
+    def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
         """Return values in the joint fit; for an absent cause, amplitudes whose uncertainty bounds an undetected effect."""
         if member.cause.name in self._members:
             return self._fitted(member.cause.name)
@@ -163,7 +160,7 @@ class _CircleJudge(CauseJudge):
             for k, p in enumerate(amplitudes)
         }
 
-    def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
+    def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:
         source, found = (
             self._circles.source_of(shown.cause.name, shown.variant),
             self._values_of(shown, values, covariance),
@@ -190,7 +187,7 @@ class _CircleJudge(CauseJudge):
                 values[key] = Value(float(found[column]), float(np.sqrt(variance[column])), parameter.unit)
         return values
 
-    def _beside_nameless(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    def _beside_nameless(self, name: str) -> tuple[NDArray[np.int64], Floats, Floats]:
         amplitudes = self._joint.after.layout.columns_of(name)[0]
         if self._best.members == self._joint.members:
             return amplitudes[:0], np.zeros(0), np.zeros(0)

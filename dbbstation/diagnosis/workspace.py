@@ -15,9 +15,8 @@ from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 REACH = 0.6
@@ -82,7 +81,7 @@ def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError |
     )
 
 
-def workspace(machine: Machine) -> NDArray[np.float64]:
+def workspace(machine: Machine) -> Floats:
     """Return poses over the inner travel that the machine can reach, shape (n, 6) [mm, deg]."""
     travel = machine.travel
     middle = sum(travel.z_mm) / 2.0
@@ -95,7 +94,7 @@ def workspace(machine: Machine) -> NDArray[np.float64]:
     return poses[[row for row in np.flatnonzero(inside) if _reachable(machine, poses[row : row + 1])]]
 
 
-def _reachable(machine: Machine, pose: NDArray[np.float64]) -> bool:
+def _reachable(machine: Machine, pose: Floats) -> bool:
     try:
         check_travel(machine, pose, where="workspace")
     except MachineError:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 
@@ -154,7 +155,7 @@ def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause],
     return [scan.best[k] for k in np.argsort(-scan.log_factor)[: BOUNDS.rivals] if scan.log_factor[k] > enough]
 
 
-def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) -> NDArray[np.float64]:
+def standing_out(products: Floats, plausible: Floats) -> Floats:
     """Return how far combinations of plausible amplitudes stand out, least first, shape (p,).
 
     Args:
@@ -164,9 +165,7 @@ def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) 
     return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))
 
 
-def norm_over_sigma(
-    products: NDArray[np.float64], values: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> float:
+def norm_over_sigma(products: Floats, values: Floats, covariance: Floats) -> float:
     """Return an effect's norm in standard deviations, to first order."""
     norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
     if norm == 0.0:
@@ -175,7 +174,7 @@ def norm_over_sigma(
     return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
 
 
-def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
+def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], Floats, dict[str, int]]:
     top = max(posterior.weights.values())
     sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
     place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
@@ -186,7 +185,7 @@ def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.flo
     return inside, weights / weights.sum(), place
 
 
-def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
+def _inverse_root(products: Floats) -> Floats:
     value, axes = np.linalg.eigh(products)
     usable = value > RANK * max(float(value[-1]), 1e-300)
     return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Block, Columns
 
 SMALL = 1e6
@@ -41,10 +42,10 @@ class Group:
 
     columns: NDArray[np.int64]
     border: NDArray[np.int64]
-    inner: NDArray[np.float64]
-    across: NDArray[np.float64]
-    target: NDArray[np.float64]
-    left: NDArray[np.float64]
+    inner: Floats
+    across: Floats
+    target: Floats
+    left: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +62,12 @@ class Arrow:
     alone: NDArray[np.int64]
     random: NDArray[np.int64]
     fitted: NDArray[np.int64]
-    root: NDArray[np.float64]
-    target: NDArray[np.float64]
+    root: Floats
+    target: Floats
     floor: float
 
     @property
-    def root_of_fitted(self) -> NDArray[np.float64]:
+    def root_of_fitted(self) -> Floats:
         """Return the information on fitted columns, random effects averaged, shape (f, f)."""
         return self.root[len(self.random) :, len(self.random) :]
 
@@ -90,7 +91,7 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
 
 def triangles_without(
     blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
+) -> Iterator[tuple[Floats, Floats, float]]:
     """Yield the information on fitted columns without each part's blocks.
 
     Yields:
@@ -99,7 +100,7 @@ def triangles_without(
     members, border = _split(blocks, known)
     group_of = {place: number for number, (places, _) in enumerate(members) for place in places}
 
-    def left_by(number: int, without: Collection[int]) -> NDArray[np.float64]:
+    def left_by(number: int, without: Collection[int]) -> Floats:
         places, columns = members[number]
         kept = [blocks[k] for k in places if k not in without]
         return border.rows(_group(kept, columns, known, noise))
@@ -133,7 +134,7 @@ class _Border:
     place: NDArray[np.int64]
     alone: NDArray[np.int64]
 
-    def priors(self, known: Columns) -> NDArray[np.float64]:
+    def priors(self, known: Columns) -> Floats:
         """Return prior rows, padded with zeros for a full triangle."""
         total = len(self.order)
         bounded = self.order[np.isfinite(known.prior[self.order])]
@@ -141,7 +142,7 @@ class _Border:
         rows[np.arange(len(bounded)), self.place[bounded]] = 1.0 / known.prior[bounded]
         return rows
 
-    def rows(self, group: Group) -> NDArray[np.float64]:
+    def rows(self, group: Group) -> Floats:
         """Return a group's rows over these columns, target last."""
         wide = np.zeros((len(group.left), len(self.order) + 1))
         wide[:, self.place[group.border]] = group.left[:, :-1]

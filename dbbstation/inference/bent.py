@@ -17,8 +17,7 @@ from dbbstation.inference.variables import TRAVELS, Kind
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.variables import Variable
 
 WIDTHS = {
@@ -46,7 +45,7 @@ MADE = 0.9
 
 def bent_laws(
     variables: Sequence[Variable],
-    time: NDArray[np.float64] | None,
+    time: Floats | None,
     time_unit: str,
     blocks: Sequence[slice],
     size: float,
@@ -84,7 +83,7 @@ def bent_laws(
     return found + [_scaled(a, b, blocks, size, unit, len(pairs)) for a, b in pairs]
 
 
-def grows_with(variables: Sequence[Variable], simulated: NDArray[np.float64], size: float) -> dict[str, float]:
+def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) -> dict[str, float]:
     """Return whether the simulated value rises (1) or falls (-1) with each variable; 0 if not, or not known."""
     variables = [v for v in variables if v.kind is not Kind.TIME and v.distinct >= DISTINCT]
     found = dict.fromkeys((v.name for v in variables), 0.0)
@@ -121,7 +120,7 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
     values, largest = variable.values - middle, max(variable.high - middle, middle - variable.low)
     slope = f"{unit}/{variable.unit}" if variable.unit else unit
 
-    def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+    def columns(point: tuple[float, ...]) -> Floats:
         width = min(point[0], WIDEST * largest)
         within = np.clip(values, -width, width)
         if family is Family.DEAD_ZONE:
@@ -155,7 +154,7 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
 def _knee(side: str, variable: Variable, size: float, unit: str, members: int) -> Law:
     """Return a straight line with another slope on one side of a place."""
 
-    def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+    def columns(point: tuple[float, ...]) -> Floats:
         beyond = variable.values - point[0]
         return (np.maximum(beyond, 0.0) if side == "upper" else np.minimum(beyond, 0.0))[:, None]
 
@@ -167,7 +166,7 @@ def _knee(side: str, variable: Variable, size: float, unit: str, members: int) -
     )  # fmt: skip
 
 
-def _friction(rate: NDArray[np.float64], point: tuple[float, ...]) -> NDArray[np.float64]:
+def _friction(rate: Floats, point: tuple[float, ...]) -> Floats:
     return np.tanh(rate / point[0])[:, None]
 
 
@@ -175,7 +174,7 @@ def _with_width(
     name: str,
     family: Family,
     variable: Variable,
-    columns: Callable[[tuple[float, ...]], NDArray[np.float64]],
+    columns: Callable[[tuple[float, ...]], Floats],
     grid: tuple[float, ...],
     amplitudes: Sequence[tuple[str, str, str]],
     width: tuple[str, str],
@@ -204,7 +203,7 @@ SCALES_WITH = frozenset({Kind.FORCE, Kind.SPEED, Kind.ANY})
 """Kinds that a force may be in proportion to: a load, a current or a speed has a zero of its own, a place or a temperature has none."""
 
 
-def integral_of(values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
+def integral_of(values: Floats, time: Floats, blocks: Sequence[slice]) -> Floats:
     """Return an integral by trapezoids, zero at each block's first row, shape (n,)."""
     found = np.zeros(len(time))
     for rows in blocks:
@@ -215,7 +214,7 @@ def integral_of(values: NDArray[np.float64], time: NDArray[np.float64], blocks: 
 
 def _integral(
     variable: Variable,
-    time: NDArray[np.float64],
+    time: Floats,
     time_unit: str,
     blocks: Sequence[slice],
     size: float,

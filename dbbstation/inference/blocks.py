@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -28,21 +30,21 @@ class Block:
     """
 
     columns: NDArray[np.int64]
-    triangle: NDArray[np.float64]
-    target: NDArray[np.float64]
+    triangle: Floats
+    target: Floats
     count: int
     square: float
     noise: float | None = None
 
 
-def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: NDArray[np.float64]) -> Block:
+def compress(columns: NDArray[np.int64], jacobian: Floats, target: Floats) -> Block:
     """Compress a run to its triangle."""
     stacked = np.column_stack([jacobian, target])
     triangle = triangle_of(stacked)[: jacobian.shape[1] + 1]
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
 
 
-def spread(blocks: Sequence[Block], columns: int) -> NDArray[np.float64]:
+def spread(blocks: Sequence[Block], columns: int) -> Floats:
     """Return all blocks' rows over all columns, target last, shape (r, columns + 1)."""
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0
@@ -54,7 +56,7 @@ def spread(blocks: Sequence[Block], columns: int) -> NDArray[np.float64]:
     return wide
 
 
-def spread_over(blocks: Sequence[Block], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+def spread_over(blocks: Sequence[Block], columns: NDArray[np.int64]) -> Floats:
     """Return all blocks' rows over some columns, shape (k,), target last, shape (r, k + 1)."""
     order = np.argsort(columns)
     narrow = np.zeros((sum(len(block.target) for block in blocks), len(columns) + 1))
@@ -92,12 +94,12 @@ class Columns:
         random: effects averaged, not reported, shape (k,).
     """
 
-    prior: NDArray[np.float64]
-    scale: NDArray[np.float64]
+    prior: Floats
+    scale: Floats
     random: NDArray[np.bool_]
 
 
-def with_random(known: Columns, sd: NDArray[np.float64]) -> Columns:
+def with_random(known: Columns, sd: Floats) -> Columns:
     """Return columns with random effects of these standard deviations appended."""
     return Columns(
         np.concatenate([known.prior, sd]),

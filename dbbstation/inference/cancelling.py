@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.settled import Settled
 
 MOST_CANCELS = 0.5
@@ -27,7 +26,7 @@ class Cancelling:
     unit: str
 
 
-def cancelling(effects: Mapping[str, NDArray[np.float64]], unit: str, scale: float = 1.0) -> Cancelling | None:
+def cancelling(effects: Mapping[str, Floats], unit: str, scale: float = 1.0) -> Cancelling | None:
     """Return effects above their sum if most squares cancel, else None."""
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}
     whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0

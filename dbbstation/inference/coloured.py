@@ -20,7 +20,7 @@ from dbbstation.inference.bounds import BOUNDS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 LONGEST = 60
 """Rows that a prediction looks back over, at the most."""
@@ -129,7 +129,7 @@ class Coloured:
         return replace(self, sigma=innovation / float(np.sqrt(self._predictors[1][-1])))
 
     @cached_property
-    def _predictors(self) -> tuple[list[NDArray[np.float64]], list[float]]:
+    def _predictors(self) -> tuple[list[Floats], list[float]]:
         coefficients, left = [np.zeros(0)], [1.0]
         for partial in self.partial:
             before = coefficients[-1]
@@ -138,11 +138,11 @@ class Coloured:
         return coefficients, left
 
     @cached_property
-    def filter(self) -> NDArray[np.float64]:
+    def filter(self) -> Floats:
         """Return the whitening filter, shape (p + 1,)."""
         return np.concatenate([[1.0], -self._predictors[0][-1]])
 
-    def log_power(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    def log_power(self, frequency: Floats) -> Floats:
         """Return the log spectrum [cycles per row], log variance for white noise."""
         taps = self.filter
         phase = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(taps))))
@@ -190,7 +190,7 @@ class Coloured:
         flat = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
         return csr_array(flat, shape=(size, size))
 
-    def unwhitened(self, white: NDArray[np.float64], stretches: Sequence[slice]) -> NDArray[np.float64]:
+    def unwhitened(self, white: Floats, stretches: Sequence[slice]) -> Floats:
         """Return the rows, shape (n,), that whitening maps to these."""
         if self.is_white:
             return white
@@ -207,13 +207,13 @@ class Coloured:
         return found
 
 
-def _state(taps: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:
+def _state(taps: Floats, before: Floats) -> Floats:
     order = len(taps) - 1
     recent = before[::-1]
     return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
 
 
-def partial_autocorrelations(correlation: NDArray[np.float64]) -> tuple[float, ...]:
+def partial_autocorrelations(correlation: Floats) -> tuple[float, ...]:
     """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last ones."""
     coefficients, left, found = np.zeros(0), 1.0, []
     for order in range(1, len(correlation)):
@@ -240,12 +240,12 @@ class Bands:
         log_power: bias-corrected mean log, shape (b,).
     """
 
-    frequency: NDArray[np.float64]
-    log_power: NDArray[np.float64]
-    count: NDArray[np.float64]
+    frequency: Floats
+    log_power: Floats
+    count: Floats
 
 
-def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | None:
+def bands_of(rows: Floats, stretches: Sequence[slice]) -> Bands | None:
     """Return the rows' spectrum; None if stretches are too short.
 
     Logs resist unexplained spectral lines.
@@ -273,7 +273,7 @@ def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | N
     return Bands(np.add.reduceat(every, starts) / count, np.add.reduceat(logs, starts) / count + LOG_MEAN, count)
 
 
-def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Coloured:
+def autoregressive(rows: Floats, stretches: Sequence[slice]) -> Coloured:
     """Return autoregressive noise by forward and backward prediction.
 
     [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5], order by Akaike's
@@ -318,7 +318,7 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
     weight = bands.count / LOG_VARIANCE
     worth = float(np.log(bands.count.sum()))
 
-    def distance(shape: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def distance(shape: Floats) -> tuple[Floats, Floats]:
         away = bands.log_power - np.log(shape)
         level = (away @ weight) / weight.sum()
         return np.square(away - level[..., None]) @ weight, level
@@ -354,7 +354,7 @@ def akaike_cost(parameters: int, rows: int) -> float:
     return parameters * rows / max(rows - parameters - 2.0, 1.0)
 
 
-def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np.float64], rows: int) -> Coloured:
+def with_put_back(noise: Coloured, bands: Floats, taken: Floats, rows: int) -> Coloured:
     """Return the noise with absorbed power restored, in an order that the rows support.
 
     Args:

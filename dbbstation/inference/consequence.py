@@ -14,8 +14,7 @@ from dbbstation.inference.triangle import left_by
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.variables import Variable
 
@@ -51,9 +50,7 @@ def may_result(variable: Variable, channel: Channel) -> bool:
     )
 
 
-def _with_derivatives(
-    values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]
-) -> NDArray[np.float64]:
+def _with_derivatives(values: Floats, time: Floats, blocks: Sequence[slice]) -> Floats:
     """Return a constant, values, and their first two derivatives by central differences, shape (n, 4)."""
     found = np.column_stack([np.ones(len(values)), values, np.zeros((len(values), 2))])
     for rows in blocks:

@@ -13,7 +13,7 @@ from dbbstation.inference.forms import Form
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 CUBIC = 3
 
@@ -35,7 +35,7 @@ class Spline(Form):
     def count(self) -> int:
         return self.functions - self.falls
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         """Return B-splines at values, shape (..., p)."""
         inner = np.linspace(0.0, 1.0, self.functions - CUBIC + 1)
         knots = np.concatenate([np.zeros(CUBIC), inner, np.ones(CUBIC)])
@@ -52,7 +52,7 @@ class Power(Form):
     high: float
     power: int = 1
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return (((values - middle) / half) ** self.power)[..., None]
 
@@ -67,8 +67,8 @@ class Clock:
         reach: rows until the response is constant.
     """
 
-    rows: NDArray[np.float64]
-    response: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    rows: Floats
+    response: Callable[[Floats], Floats]
     reach: float
 
     @classmethod
@@ -87,13 +87,13 @@ class Stretches(Form):
 
     first: tuple[float, ...]
     last: tuple[float, ...]
-    response: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    response: Callable[[Floats], Floats]
 
     @property
     def count(self) -> int:
         return len(self.first)
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         """Return the visible part of each stretch, shape (n, p)."""
         begun, ended = (self.response(values[..., None] - np.array(edges)) for edges in (self.first, self.last))
         return np.asarray(begun - ended, dtype=np.float64)

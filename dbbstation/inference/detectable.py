@@ -15,8 +15,7 @@ from dbbstation.inference.patterns import CURVES, Family
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause, Variant
     from dbbstation.inference.settled import Settled
@@ -90,7 +89,7 @@ def _detectable(
     settled: Settled,
     cause: Cause,
     variant: Variant,
-    samples: NDArray[np.float64],
+    samples: Floats,
     shown: float,
     follows: str,
     confirm: str | None = None,
@@ -103,9 +102,7 @@ def _detectable(
     return Detectable(follows, None if size is None else MARGIN * size, float(np.clip(1.0 - shown, 0.0, 1.0)), confirm)
 
 
-def least_seen(
-    products: NDArray[np.float64], samples: NDArray[np.float64], plausible: NDArray[np.float64], log_odds: float
-) -> float | None:
+def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: float) -> float | None:
     """Return the least rms at which `POWER` of random effects are surely found, or None.
 
     Amplitudes N(0, 1) at one size give z = L a + L^(1/2) e along the information L; averaged over `SCALES` as any cause.

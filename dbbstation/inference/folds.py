@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.settled import Settled
 
@@ -114,7 +115,7 @@ def held_out_error(
     progress: Callable[[str, int, int], None] = lambda _text, _done, _of: None,
     *,
     alike: float = 1.0,
-    reference: Callable[[NDArray[np.bool_]], NDArray[np.float64]] | None = None,
+    reference: Callable[[NDArray[np.bool_]], Floats] | None = None,
 ) -> HeldOutError:
     """Hold back parts in turn [`part_numbers`].
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.settled import Settled
@@ -216,9 +217,7 @@ def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause
     return found
 
 
-def estimated(
-    settled: Settled, names: Collection[str]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def estimated(settled: Settled, names: Collection[str]) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Return columns of some members, their values, shape (p,), and covariance."""
     members = settled.best.members
     every = settled.comparison.estimates(members)
@@ -227,7 +226,7 @@ def estimated(
     return columns, every.values[inside], every.covariance[np.ix_(inside, inside)]
 
 
-def share_made(products: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+def share_made(products: Floats, values: Floats) -> float:
     """Return the share of an effect's squares that the other columns make."""
     p = len(values)
     whole = float(values @ products[:p, :p] @ values)
@@ -288,7 +287,7 @@ class ChosenWithoutParts:
         return [float(np.sqrt(np.mean(np.square(rows)))) for rows in left]
 
 
-def left_with(one: Settled, wanted: Collection[str]) -> NDArray[np.float64]:
+def left_with(one: Settled, wanted: Collection[str]) -> Floats:
     """Return the residual after effects of these variables alone, refitted; none given: after everything."""
     follow = follow_of(one)
     rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
@@ -315,7 +314,7 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
     return ClassGain(DensityGains(tuple(brought), counts), float(np.sqrt(before / mean)), float(np.sqrt(after / mean)))
 
 
-def left_without(one: Settled, names: Collection[str], unseen: Collection[str] = ()) -> NDArray[np.float64]:
+def left_without(one: Settled, names: Collection[str], unseen: Collection[str] = ()) -> Floats:
     """Return the residual without some members, others refitted, shape (n,).
 
     Args:
@@ -327,7 +326,7 @@ def left_without(one: Settled, names: Collection[str], unseen: Collection[str] =
     return np.asarray(one.channel.residual - shown - one.channel.base.samples @ one.base_values(effect))
 
 
-def log_density(one: Settled, rows: NDArray[np.bool_], left: NDArray[np.float64]) -> float:
+def log_density(one: Settled, rows: NDArray[np.bool_], left: Floats) -> float:
     """Return a part's log residual density in the others' noise, up to a constant.
 
     Row spacing is that of the noise measurement.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 SPLINES = 7
 """Points of a piecewise linear curve."""
@@ -37,10 +37,10 @@ class Form(ABC):
         return 1
 
     @abstractmethod
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         """Return each amplitude's curve at values, shape (..., p)."""
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         """Return printed places between extremes, shape (q,); by default three, which a straight line needs."""
         return np.linspace(low, high, 3)
 
@@ -54,18 +54,18 @@ class Form(ABC):
 class LinearSplines(Form):
     """A curve straight between seven points; limits may be arrays by strut."""
 
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    low: Floats
+    high: Floats
 
     @property
     def count(self) -> int:
         return SPLINES
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
         return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(SPLINES)))
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low, high
         return np.linspace(np.mean(self.low), np.mean(self.high), SPLINES)
 
@@ -79,18 +79,18 @@ class Walk(Form):
         unit: length of a unit step, in the variable's unit.
     """
 
-    at: NDArray[np.float64]
+    at: Floats
     unit: float
 
     @property
     def count(self) -> int:
         return len(self.at) - 1
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         steps = np.diff(self.at)
         return np.clip((values[..., None] - self.at[:-1]) / steps, 0.0, 1.0) * np.sqrt(steps / self.unit)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low, high
         return self.at
 
@@ -110,11 +110,11 @@ class Wave(Form):
         more = f" and {self.harmonics - 1} harmonics" if self.harmonics > 1 else ""
         return f"period {1.0 / self.frequency:.6g} {unit}{more}"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         phase = 2.0 * np.pi * self.frequency * np.asarray(values)
         return np.stack([f(k * phase) for k in range(1, self.harmonics + 1) for f in (np.cos, np.sin)], axis=-1)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         periods = (high - low) * self.frequency
         periods = periods if periods <= _MOST_PERIODS else 1.0
         span = periods / self.frequency
@@ -141,12 +141,12 @@ class WaveOfTurn(Form):
         del unit
         return f"{self.frequency:.4g} per turn"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         both = Wave(self.frequency).columns(np.abs(values))
         ccw = (values > 0.0)[..., None]
         return np.concatenate([both * ccw, both * ~ccw], axis=-1)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low, high
         turn = np.linspace(0.0, 1.0, int(np.ceil(POINTS_PER_WAVE * max(self.frequency, 1.0))) + 1)
         return np.concatenate([-turn[:0:-1], turn[1:]])
@@ -166,11 +166,11 @@ class Lobes(Form):
         del unit
         return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         theta = np.radians(values)
         return np.stack([f(k * theta) for k in self.numbers for f in (np.cos, np.sin)], axis=-1)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low, high
         step = 10.0 if max(self.numbers) <= 10 else 5.0  # noqa: PLR2004 - lobes as in `LOBES`
         return np.arange(0.0, 360.0, step)
@@ -186,10 +186,10 @@ class Bump(Form):
     def text(self, unit: str) -> str:
         return f"about {self.centre:.5g} {unit}, {self.width:.3g} {unit} wide either way"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         return np.exp(-0.5 * ((values - self.centre) / self.width) ** 2)[..., None]
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         return _across(self.centre, self.width, low, high)
 
 
@@ -203,14 +203,14 @@ class StepForm(Form):
     def text(self, unit: str) -> str:
         return f"at {self.at:.5g} {unit}"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         return 0.5 * np.tanh((values - self.at) / self.width)[..., None]
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         return _across(self.at, self.width, low, high)
 
 
-def _across(at: float, width: float, low: float, high: float) -> NDArray[np.float64]:
+def _across(at: float, width: float, low: float, high: float) -> Floats:
     near = at + width * np.linspace(-WIDTHS, WIDTHS, int(2 * WIDTHS * POINTS_PER_WIDTH) + 1)
     return np.unique(np.concatenate([[low], near[(near > low) & (near < high)], [high]]))
 
@@ -219,10 +219,10 @@ def _across(at: float, width: float, low: float, high: float) -> NDArray[np.floa
 class SignForm(Form):
     """Plus one way, minus the other."""
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         return np.sign(values)[..., None]
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low, high
         return np.array([-1.0, 1.0])
 
@@ -233,7 +233,7 @@ class Proportional(Form):
 
     unit: float
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         return (values / self.unit)[..., None]
 
 
@@ -253,7 +253,7 @@ class Plane(Form):
         del unit
         return "with a constant" if self.constant else ""
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         """Return coordinates in their unit; values of shape (n, c)."""
         scaled = values / self.unit
         return np.column_stack([scaled, np.ones(len(scaled))]) if self.constant else scaled
@@ -271,19 +271,19 @@ class PlaneStep(Form):
         return f"across a line {self.at:.4g} {unit} from the origin, at {self.across_deg:.0f} deg to +X"
 
     @property
-    def across(self) -> NDArray[np.float64]:
+    def across(self) -> Floats:
         """Return the direction across the line, shape (2,)."""
         return np.array([np.cos(np.radians(self.across_deg)), np.sin(np.radians(self.across_deg))])
 
-    def along(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def along(self, values: Floats) -> Floats:
         """Return the distance across the line from the origin, shape (n,)."""
         return np.asarray(values @ self.across, dtype=np.float64)
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         """Return minus to plus a half; values of shape (n, 2)."""
         return StepForm(self.at, self.width).columns(self.along(values))
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         return _across(self.at, self.width, low, high)
 
 
@@ -307,7 +307,7 @@ class Spring(Form):
         del unit
         return f"towards {self.towards_deg:.0f} deg to +X"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         """Return one, and the distance in 100 mm; values of shape (n,)."""
         return np.column_stack([np.ones(len(values)), (values - self.about) / 100.0])
 
@@ -330,13 +330,13 @@ class Ringing(Form):
     def text(self, unit: str) -> str:
         return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         since = np.abs(values)
         phase = 2.0 * np.pi * since / self.period
         fading = -np.sign(values) * np.exp(-since / self.decay)
         return np.stack([fading * np.cos(phase), fading * np.sin(phase)], axis=-1)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low
         last = min(high, RINGS_FOR * self.decay)
         return np.linspace(1e-6, last, max(int(POINTS_PER_WAVE * last / self.period), 2) + 1)
@@ -360,11 +360,11 @@ class BehindReversal(Form):
     def text(self, unit: str) -> str:
         return f"over {self.length:.3g} {unit}"
 
-    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(self, values: Floats) -> Floats:
         places = self.points(0.0, self.length)
         hats = [np.interp(np.abs(values), places, row) for row in np.eye(len(places))[1:-1]]
         return -np.sign(values)[..., None] * np.stack(hats, axis=-1)
 
-    def points(self, low: float, high: float) -> NDArray[np.float64]:
+    def points(self, low: float, high: float) -> Floats:
         del low, high
         return self.length * np.append(0.0, 0.5 ** np.arange(self.halves, -1, -1))

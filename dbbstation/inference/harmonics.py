@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 LOW = 30
 """Highest harmonic that counts as smooth."""
 
@@ -59,11 +61,11 @@ class Spectrum:
         freedom: of their mean as a mean square.
     """
 
-    power: NDArray[np.float64]
+    power: Floats
     freedom: float
 
 
-def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
+def coefficients(residual: Floats, phase_rad: Floats, highest: int) -> Floats:
     """Return orthonormal Fourier coefficients of a whole period, harmonics 0 to `highest`, shape (2 highest + 1,) or (..., m).
 
     White noise s gives coefficients of size s.
@@ -78,14 +80,14 @@ def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], 
     return np.asarray(both.reshape(2 * highest + 1, *residual.shape[1:]) / np.sqrt(len(residual)))
 
 
-def basis(phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
+def basis(phase_rad: Floats, highest: int) -> Floats:
     """Return constant, cosines and sines of mean square one, shape (n, 2 highest + 1)."""
     fine, coarse = _waves(phase_rad, highest)
     waves = (coarse[:, None, :] * fine[None, :, :]).reshape(-1, len(phase_rad))[1 : highest + 1].T
     return np.hstack([np.ones((len(phase_rad), 1)), np.sqrt(2.0) * waves.real, np.sqrt(2.0) * waves.imag])
 
 
-def _waves(phase_rad: NDArray[np.float64], highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _waves(phase_rad: Floats, highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Return factor waves whose products are harmonics a + AT_ONCE b, ten times faster than cosines."""
     first = np.exp(1j * phase_rad)
     return _powers(first, min(AT_ONCE, highest + 1)), _powers(np.exp(1j * AT_ONCE * phase_rad), highest // AT_ONCE + 1)
@@ -99,9 +101,7 @@ def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
     return found
 
 
-def _sums(
-    values: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
-) -> list[NDArray[np.complex128]]:
+def _sums(values: Sequence[Floats], phase_rad: Floats, highest: int) -> list[NDArray[np.complex128]]:
     total = np.zeros((len(values), highest // AT_ONCE + 1, min(AT_ONCE, highest + 1)), dtype=np.complex128)
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
@@ -119,7 +119,7 @@ STRETCH = 2048
 """Samples whose waves are made at once: half a megabyte."""
 
 
-def amplitudes(values: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.complex128]:
+def amplitudes(values: Floats, phase_rad: Floats, highest: int) -> NDArray[np.complex128]:
     """Return least-squares harmonics, shape (highest + 1,): values are the real part of sum a_k exp(i k phase).
 
     Normal equations need only sums and differences of harmonics. Incomplete periods are ill-conditioned and use the
@@ -128,9 +128,7 @@ def amplitudes(values: NDArray[np.float64], phase_rad: NDArray[np.float64], high
     return amplitudes_of([values], phase_rad, highest)[0]
 
 
-def amplitudes_of(
-    several: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
-) -> list[NDArray[np.complex128]]:
+def amplitudes_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> list[NDArray[np.complex128]]:
     """Return harmonics of several values at equal phases, as `amplitudes`."""
     moment, *further = _sums([np.ones(len(phase_rad)), *several], phase_rad, 2 * highest)
     order = np.arange(-highest, highest + 1)
@@ -146,14 +144,12 @@ def amplitudes_of(
     return list(found.T)
 
 
-def smooth(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int = LOW) -> NDArray[np.float64]:
+def smooth(residual: Floats, phase_rad: Floats, highest: int = LOW) -> Floats:
     """Return the residual up to a harmonic by least squares, shape (n,)."""
     return smooth_of([residual], phase_rad, highest)[0]
 
 
-def smooth_of(
-    several: Sequence[NDArray[np.float64]], phase_rad: NDArray[np.float64], highest: int
-) -> list[NDArray[np.float64]]:
+def smooth_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> list[Floats]:
     """Return several such residuals at equal phases."""
     if not several:
         return []
@@ -183,8 +179,8 @@ def bands(samples: int) -> tuple[int, int]:
 
 
 def misfit(
-    residuals: Sequence[NDArray[np.float64]],
-    phases_rad: Sequence[NDArray[np.float64]],
+    residuals: Sequence[Floats],
+    phases_rad: Sequence[Floats],
     groups: Sequence[object],
     freedom_used: float,
     noise: Spectrum | None = None,
@@ -218,11 +214,11 @@ def misfit(
 
 
 def centred_coefficients(
-    residuals: Sequence[NDArray[np.float64]],
-    phases_rad: Sequence[NDArray[np.float64]],
+    residuals: Sequence[Floats],
+    phases_rad: Sequence[Floats],
     groups: Sequence[object],
     highest: int,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return all runs' coefficients without each group's common first harmonic, shape (runs, 2 highest + 1)."""
     found, first = _all_coefficients(residuals, phases_rad, highest), [1, highest + 1]
     for group in set(groups):
@@ -232,9 +228,9 @@ def centred_coefficients(
 
 
 def noise_left_by(
-    residuals: Sequence[NDArray[np.float64]],
-    phases_rad: Sequence[NDArray[np.float64]],
-    of_white: Sequence[NDArray[np.float64]],
+    residuals: Sequence[Floats],
+    phases_rad: Sequence[Floats],
+    of_white: Sequence[Floats],
 ) -> Spectrum:
     """Return noise from a residual of many columns, in higher harmonics.
 
@@ -274,18 +270,16 @@ LEAST_LEFT = 0.02
 leave is a shadow of the effect, not of the noise."""
 
 
-def _all_coefficients(
-    residuals: Sequence[NDArray[np.float64]], phases_rad: Sequence[NDArray[np.float64]], high: int
-) -> NDArray[np.float64]:
+def _all_coefficients(residuals: Sequence[Floats], phases_rad: Sequence[Floats], high: int) -> Floats:
     return np.array([coefficients(r, phase, high) for r, phase in zip(residuals, phases_rad, strict=True)])
 
 
-def _squares(all_coefficients: NDArray[np.float64], high: int) -> tuple[float, NDArray[np.float64]]:
+def _squares(all_coefficients: Floats, high: int) -> tuple[float, Floats]:
     squares = (all_coefficients**2).sum(axis=0)
     return float(squares[0]), squares[1 : high + 1] + squares[high + 1 :]
 
 
-def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Spectrum:
+def noise_spectrum(squares: Floats, low: int, freedom: float) -> Spectrum:
     """Return the noise spectrum up to `low` from higher harmonics.
 
     Args:
@@ -314,16 +308,16 @@ class Continuations:
         variances: of the log mean power, shape (processes,).
     """
 
-    powers: NDArray[np.float64]
-    likely: NDArray[np.float64]
-    variances: NDArray[np.float64]
+    powers: Floats
+    likely: Floats
+    variances: Floats
 
 
 def continuations(
-    squares: NDArray[np.float64],
+    squares: Floats,
     low: int,
     freedom: float,
-    processes: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    processes: Callable[[Floats], Floats],
 ) -> Continuations | None:
     """Continue noise below `low` with a floor and each process; None if white.
 
@@ -352,16 +346,16 @@ def continuations(
     return Continuations(np.array(powers), np.array(likely), np.array(variances))
 
 
-def first_order(harmonic: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_order(harmonic: Floats, corners: Floats) -> Floats:
     """Return unit first-order processes by corner, shape (processes, h)."""
     return np.asarray(1.0 / (1.0 + (harmonic / corners[:, None]) ** 2))
 
 
-def _on_a_floor(power: NDArray[np.float64]) -> NDArray[np.float64]:
+def _on_a_floor(power: Floats) -> Floats:
     return np.stack([np.ones_like(power), power], axis=1)
 
 
-def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _fitted(mean: Floats, shapes: Floats) -> Floats:
     """Return non-negative maximum-likelihood floor and height, shape (processes, 2)."""
     power = np.full((len(shapes), len(mean)), mean.mean())
     for _ in range(_ROUNDS):
@@ -370,7 +364,7 @@ def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[n
     return found
 
 
-def _not_negative(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _not_negative(rows: Floats, values: Floats) -> Floats:
     """Return non-negative least squares by two columns, shape (processes, 2).
 
     A negative solution lies on an edge: one column.
@@ -400,7 +394,7 @@ _ROUNDS = 6
 _SMALLEST_SHARE = 1e-6
 
 
-def _likelihood(mean: NDArray[np.float64], power: NDArray[np.float64], freedom: float) -> float:
+def _likelihood(mean: Floats, power: Floats, freedom: float) -> float:
     """Return the log likelihood of mean squares under a spectrum [Whittle 1953], up to a constant."""
     if not np.all(power > 0.0):
         return -np.inf

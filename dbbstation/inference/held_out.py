@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 
 @dataclass(frozen=True)
 class HeldOut:
@@ -35,7 +37,7 @@ def held_out(
     known: Columns,
     active: NDArray[np.int64],
     noise: float,
-    held: NDArray[np.float64],
+    held: Floats,
     single: float | None = None,
 ) -> HeldOut:
     """Omit groups of blocks in turn and predict them.
@@ -80,7 +82,7 @@ def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[
     return float(remaining @ remaining - explained), len(remaining)
 
 
-def _left(blocks: Sequence[Block], known: Columns, x: NDArray[np.float64], noise: float) -> float:
+def _left(blocks: Sequence[Block], known: Columns, x: Floats, noise: float) -> float:
     random = np.flatnonzero(known.random)
     whole, target = np.hsplit(spread(blocks, len(known.prior)), [-1])
     fixed = x.copy()

@@ -18,16 +18,17 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
 
 
 def weighted_jackknife(
-    values: NDArray[np.float64],
-    variances: NDArray[np.float64],
-    without: NDArray[np.float64],
-    variances_without: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    values: Floats,
+    variances: Floats,
+    without: Floats,
+    variances_without: Floats,
+) -> Floats:
     """Return standard uncertainties by omitted parts, shape (p,), weighted by remaining information.
 
     The expected square is the stated variance if right [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261,
@@ -42,9 +43,7 @@ def weighted_jackknife(
     return np.asarray(np.sqrt(np.sum(np.where(np.isfinite(squares), squares, 0.0), axis=0)))
 
 
-def widening(
-    variances: NDArray[np.float64], moved: NDArray[np.float64], variances_without: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def widening(variances: Floats, moved: Floats, variances_without: Floats) -> Floats:
     """Return factors to the larger of model and jackknife uncertainty, shape (p,).
 
     Values of one weak direction get similar factors, so scaled covariances keep combinations. Held values stay.

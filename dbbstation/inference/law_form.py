@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.followed import VariableClass
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
@@ -137,7 +138,7 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
     return not impossible(law, found.values[:width], np.diag(found.covariance)[:width])
 
 
-def _is_worse(best: NDArray[np.float64], other: NDArray[np.float64], parts: Sequence[NDArray[np.bool_]] | None) -> bool:
+def _is_worse(best: Floats, other: Floats, parts: Sequence[NDArray[np.bool_]] | None) -> bool:
     """Return whether parts other than the best one's strongest, or all rows if none were held back, surely prefer it."""
     apart = best - other
     return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
@@ -148,7 +149,7 @@ def _scores(
     candidates: dict[str, tuple[Member, ...]],
     others: Sequence[Member],
     parts: Sequence[NDArray[np.bool_]],
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Floats]:
     """Return each part's conditional log evidence over an empty place, shape (parts,) each."""
     bank = settled.bank
     every = np.unique(np.concatenate([m.columns for ms in (others, *candidates.values()) for m in ms]))

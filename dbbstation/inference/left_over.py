@@ -15,8 +15,7 @@ from scipy.stats import chi2, f, norm
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.variables import Variable
 
@@ -86,7 +85,7 @@ def left_over(settled: Settled) -> LeftOver:
     return LeftOver(probability >= SIGNIFICANT, probability, tuple(looks))
 
 
-def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[ResidualTest]:
+def _in_order(left: Floats, stretches: Sequence[slice], sigma: float) -> list[ResidualTest]:
     longest = left[max(stretches, key=lambda rows: rows.stop - rows.start)]
     found = []
     if len(longest) >= FEWEST:
@@ -109,7 +108,7 @@ def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: floa
     return found
 
 
-def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) -> ResidualTest:
+def _by_block(left: Floats, blocks: Sequence[slice], sigma: float) -> ResidualTest:
     counts = np.array([rows.stop - rows.start for rows in blocks], dtype=np.float64)
     means = np.array([left[rows].mean() for rows in blocks])
     terms = counts * means**2
@@ -118,7 +117,7 @@ def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) 
     return ResidualTest("blocks", float(chi2.sf(terms.sum(), len(blocks))), size, f"most in block {worst + 1}")
 
 
-def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> ResidualTest:
+def _over(left: Floats, variable: Variable, sigma: float) -> ResidualTest:
     values = variable.values
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.forms import Form
     from dbbstation.inference.pieces import Left
     from dbbstation.inference.variables import Variable
@@ -81,7 +82,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
     return found
 
 
-def _sums(left: Left, values: NDArray[np.float64], pieces: int, size: float) -> Sums:
+def _sums(left: Left, values: Floats, pieces: int, size: float) -> Sums:
     """Return sums over equal pieces of a variable, shape (n,)."""
     low, high = float(values.min()), float(values.max())
     place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
@@ -89,7 +90,7 @@ def _sums(left: Left, values: NDArray[np.float64], pieces: int, size: float) -> 
     order = np.argsort(number, kind="stable")
     starts = np.concatenate([[0], np.cumsum(count)[:-1]])
 
-    def added(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def added(rows: Floats) -> Floats:
         return np.asarray(np.add.reduceat(rows[order], starts, axis=0), dtype=np.float64)
 
     squares, base = np.asarray(count * size**2, dtype=np.float64), size * added(left.beside)
@@ -141,7 +142,7 @@ def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: f
     return _pattern(variable, pattern.family, form, pattern.tried)
 
 
-def _explained_by(left: Left, columns: NDArray[np.float64], size: float) -> float:
+def _explained_by(left: Left, columns: Floats, size: float) -> float:
     beside = columns - left.axes @ (left.axes.T @ columns)
     along = columns.T @ left.rest
     return float(along @ np.linalg.solve(columns.T @ beside + np.eye(columns.shape[1]) / size**2, along))

@@ -15,8 +15,7 @@ from dbbstation.inference.variables import Kind
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.variables import Variable
 
 SHORTEST_ROWS = 2.0
@@ -38,7 +37,7 @@ AT_ONCE = 0.5
 
 def memory_laws(
     variables: Sequence[Variable],
-    time: NDArray[np.float64],
+    time: Floats,
     time_unit: str,
     blocks: Sequence[slice],
     size: float,
@@ -96,9 +95,7 @@ def _grid(shortest: float, longest: float) -> tuple[float, ...]:
     return tuple(np.geomspace(shortest, longest, BOUNDS.memory_lengths).tolist()) if longest > 2.0 * shortest else ()
 
 
-def _lag(
-    variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
-) -> NDArray[np.float64]:
+def _lag(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple[float, ...]) -> Floats:
     """Return late, late less present, and initial transients by block, shape (n, 2 + starts)."""
     starts = starts_of(blocks)
     found = np.zeros((len(time), 2 + starts))
@@ -115,9 +112,7 @@ def starts_of(blocks: Sequence[slice]) -> int:
     return len(blocks) if len(blocks) <= BOUNDS.memory_starts else 1
 
 
-def _delay(
-    variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
-) -> NDArray[np.float64]:
+def _delay(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple[float, ...]) -> Floats:
     """Return the delayed value, and less the present one, shape (n, 2), constant before the first row."""
     found = np.zeros((len(time), 2))
     for rows in blocks:
@@ -131,7 +126,7 @@ def _middle(variable: Variable) -> float:
     return 0.5 * (variable.low + variable.high)
 
 
-def lagging(values: NDArray[np.float64], time: NDArray[np.float64], constant: float) -> NDArray[np.float64]:
+def lagging(values: Floats, time: Floats, constant: float) -> Floats:
     """Return a first-order lag of values less these, shape (n,), initially settled.
 
     Exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital Control of Dynamic

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 """Standard deviations of amplitudes that are averaged over, in units of the plausible size."""
 
@@ -41,10 +43,10 @@ MOST_SLACK = 1.5
 """Times the amplitudes that the slack of a variant was made for up to which it grows with them."""
 
 
-_Eliminated: TypeAlias = "tuple[NDArray[np.float64], NDArray[np.float64], float]"
+_Eliminated: TypeAlias = "tuple[Floats, Floats, float]"
 """Cholesky factor, what it makes of the target, log evidence."""
 
-_Group: TypeAlias = "tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]"
+_Group: TypeAlias = "tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]"
 """Forms of one number of amplitudes: their numbers, columns, plausible sizes, and products of the columns."""
 
 
@@ -64,14 +66,14 @@ class Variant:
     """
 
     columns: NDArray[np.int64]
-    plausible: NDArray[np.float64]
+    plausible: Floats
     nonlinear: tuple[float, ...] = ()
     label: str = ""
     law: str = ""
     whole: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     log_weight: float = 0.0
     slack: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    slack_sd: NDArray[np.float64] = field(default_factory=lambda: NO_SLACK)
+    slack_sd: Floats = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
     tangents: int = 0
     positive: tuple[bool, ...] = ()
@@ -113,7 +115,7 @@ class Member:
         return np.concatenate([self.variant.columns, self.variant.slack])
 
     @cached_property
-    def sd(self) -> NDArray[np.float64]:
+    def sd(self) -> Floats:
         """Return prior standard deviations."""
         slack = self.variant.slack_sd * self.slack_scale
         # A parameter is as unknown as it is where a formula is closer than stated.
@@ -133,9 +135,9 @@ class Scan:
     """
 
     causes: tuple[Cause, ...]
-    log_factor: NDArray[np.float64]
-    factors: NDArray[np.float64]
-    weighted: NDArray[np.float64]
+    log_factor: Floats
+    factors: Floats
+    weighted: Floats
     first: NDArray[np.int64]
     last: NDArray[np.int64]
     slim: tuple[list[int], ...]
@@ -151,7 +153,7 @@ class Scan:
         return tuple(self.best_of(k) for k in range(len(self.causes)))
 
     @cached_property
-    def log_best(self) -> NDArray[np.float64]:
+    def log_best(self) -> Floats:
         """Return best log Bayes factors without weights, shape (c,)."""
         best = (self._best(k) for k in range(len(self.causes)))
         return np.array([self.factors[self.first[k] + form, scale] for k, (form, scale) in enumerate(best)])
@@ -189,8 +191,8 @@ class Scan:
 class Estimates:
     """Posterior means and covariance of members' columns, in order."""
 
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    values: Floats
+    covariance: Floats
 
 
 class _OfCause:
@@ -200,9 +202,7 @@ class _OfCause:
         groups: by p: forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
     """
 
-    def __init__(
-        self, cause: Cause, gram: NDArray[np.float64], at: Callable[[NDArray[np.int64]], NDArray[np.int64]]
-    ) -> None:
+    def __init__(self, cause: Cause, gram: Floats, at: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> None:
         by_size: dict[int, list[int]] = {}
         for number, variant in enumerate(cause.variants):
             by_size.setdefault(len(variant.columns), []).append(number)
@@ -258,8 +258,8 @@ class ModelComparison:
 
     def __init__(
         self,
-        gram: NDArray[np.float64],
-        towards: NDArray[np.float64],
+        gram: Floats,
+        towards: Floats,
         columns: NDArray[np.int64] | None = None,
         evidence: float = 0.0,
     ) -> None:
@@ -283,9 +283,7 @@ class ModelComparison:
         across = self._across((member,), lower, np.arange(len(self._gram)))
         return ModelComparison(self._gram - across.T @ across, self._towards - across.T @ z, self._columns, evidence)
 
-    def _across(
-        self, members: Sequence[Member], lower: NDArray[np.float64], places: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _across(self, members: Sequence[Member], lower: Floats, places: NDArray[np.int64]) -> Floats:
         """Return the members' factor applied to columns, shape (p, q)."""
         if not members:
             return np.zeros((0, len(places)))
@@ -306,7 +304,7 @@ class ModelComparison:
         _, z, _ = self._eliminated(members)
         return float(z @ z)
 
-    def values(self, members: Sequence[Member]) -> NDArray[np.float64]:
+    def values(self, members: Sequence[Member]) -> Floats:
         """Return posterior means of amplitudes and slack, shape (p,)."""
         lower, z, _ = self._eliminated(members)
         _, sd = _stacked(members)
@@ -321,7 +319,7 @@ class ModelComparison:
         inverse = cho_solve((factor, True), np.eye(len(sd)))
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
-    def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+    def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> Floats:
         """Return products of columns beside base and members, shape (p, p)."""
         columns = self._at(columns)
         own = self._gram[np.ix_(columns, columns)]
@@ -409,7 +407,7 @@ class ModelComparison:
             found.append((replace(member, scale=float(SCALES[best])), averaged, float(factors[best])))
         return found
 
-    def _information(self, columns: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _information(self, columns: NDArray[np.int64], sd: Floats) -> Floats:
         own = self._at(columns)
         information = self._gram[np.ix_(own, own)]
         information *= sd[:, None]
@@ -449,7 +447,7 @@ class ModelComparison:
         return found
 
 
-def _scanned(forms: _Forms, towards: NDArray[np.float64], left: Sequence[NDArray[np.float64]]) -> Scan:
+def _scanned(forms: _Forms, towards: Floats, left: Sequence[Floats]) -> Scan:
     factors = np.empty((len(forms.weights), len(SCALES)))
     for (numbers, own, plausible, _), products in zip(forms.groups, left, strict=True):
         seen, axes = np.linalg.eigh(plausible[:, :, None] * products * plausible[:, None, :])
@@ -476,11 +474,11 @@ class Around:
         self,
         members: tuple[Member, ...],
         forms: _Forms,
-        lower: NDArray[np.float64],
-        z: NDArray[np.float64],
+        lower: Floats,
+        z: Floats,
         evidence: float,
-        across: NDArray[np.float64],
-        towards: NDArray[np.float64],
+        across: Floats,
+        towards: Floats,
     ) -> None:
         self.members, self._forms, self._evidence = members, forms, evidence
         self._towards = towards - across.T @ z
@@ -517,7 +515,7 @@ class Around:
         return scan.of([k for k, cause in enumerate(scan.causes) if cause.name not in there])
 
 
-def _solved(lower: NDArray[np.float64], right: NDArray[np.float64], *, transposed: bool = False) -> NDArray[np.float64]:
+def _solved(lower: Floats, right: Floats, *, transposed: bool = False) -> Floats:
     if not len(lower):
         return right
     found, info = dtrtrs(np.asarray(lower, order="C").T, right, lower=0, trans=0 if transposed else 1)
@@ -526,7 +524,7 @@ def _solved(lower: NDArray[np.float64], right: NDArray[np.float64], *, transpose
     return np.asarray(found, dtype=np.float64)
 
 
-def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:
+def _factors(information: Floats) -> Floats:
     """Return several Cholesky factors, shape (k, p, p), as `cholesky`."""
     try:
         return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
@@ -534,7 +532,7 @@ def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([cholesky(one) for one in information])
 
 
-def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:
+def cholesky(information: Floats) -> Floats:
     """Return the Cholesky factor of information in prior units, shape (p, p).
 
     All eigenvalues are at least one; rounding below is lifted to one.
@@ -547,7 +545,7 @@ def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray((upper * np.sign(np.diag(upper))[:, None]).T, dtype=np.float64)
 
 
-def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
+def with_slack_of(member: Member, values: Floats) -> Member:
     """Return the member with the slack of these amplitudes."""
     if len(member.variant.slack) == 0:
         return member
@@ -555,12 +553,12 @@ def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
     return replace(member, slack_scale=member.slack_share * min(size / member.variant.slack_at, MOST_SLACK))
 
 
-def amplitude_size(member: Member, values: NDArray[np.float64]) -> float:
+def amplitude_size(member: Member, values: Floats) -> float:
     """Return a member's rms amplitude in plausible ones."""
     return float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
 
 
-def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+def _log_factors(seen: Floats, along: Floats) -> Floats:
     """Return log Bayes factors at all scales, shape (m, s)."""
     squares = SCALES[:, None] ** 2
     information = 1.0 + squares * seen[:, None, :]
@@ -569,5 +567,5 @@ def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArr
     )
 
 
-def _stacked(members: Sequence[Member]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _stacked(members: Sequence[Member]) -> tuple[NDArray[np.int64], Floats]:
     return np.concatenate([m.columns for m in members]), np.concatenate([m.sd for m in members])

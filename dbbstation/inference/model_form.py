@@ -13,7 +13,7 @@ from scipy.special import comb
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 DEGREE = 3
 """Of the polynomials that modulate an effect: four functions over the range of a variable."""
@@ -22,7 +22,7 @@ LATER = 2.0
 """Samples by which a transit may be later: a degree of the turn."""
 
 
-def bernstein(values: NDArray[np.float64], low: float, high: float, degree: int = DEGREE) -> NDArray[np.float64]:
+def bernstein(values: Floats, low: float, high: float, degree: int = DEGREE) -> Floats:
     """Return Bernstein polynomials over a range, shape (..., degree + 1), summing to one [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]."""
     share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
     k = np.arange(degree + 1)
@@ -30,10 +30,10 @@ def bernstein(values: NDArray[np.float64], low: float, high: float, degree: int 
 
 
 def modulated(
-    effects: Sequence[NDArray[np.float64]],
-    along: Sequence[NDArray[np.float64]],
-    signs: Sequence[NDArray[np.float64]] | None,
-) -> NDArray[np.float64]:
+    effects: Sequence[Floats],
+    along: Sequence[Floats],
+    signs: Sequence[Floats] | None,
+) -> Floats:
     """Return effects of m movers times smooth functions, over all runs, shape (n, q).
 
     Args:
@@ -53,9 +53,7 @@ def modulated(
     return np.hstack(found) if found else np.zeros((len(effect), 0))
 
 
-def _other_transits(
-    effects: Sequence[NDArray[np.float64]], signs: Sequence[NDArray[np.float64]], mover: int
-) -> NDArray[np.float64]:
+def _other_transits(effects: Sequence[Floats], signs: Sequence[Floats], mover: int) -> Floats:
     """Return changes by faster and later transits after reversals, shape (n, 2)."""
     found = []
     for effect, sign in zip(effects, signs, strict=True):

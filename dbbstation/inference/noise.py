@@ -13,7 +13,7 @@ from dbbstation.inference.harmonics import bands, noise_spectrum
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Noise:
         return self.sigma * float(np.sqrt(self.correlation_samples))
 
 
-def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> Noise:
+def noise_of(residuals: Sequence[Floats], freedom_used: float) -> Noise:
     """Return noise from fit residuals, by run.
 
     Integrated autocorrelation over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo, Statistical Science
@@ -52,7 +52,7 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
     return Noise(sigma, max(1.0, 1.0 + 2.0 * float(pairs[:until].sum())))
 
 
-def noise_of_turns(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> Noise:
+def noise_of_turns(residuals: Sequence[Floats], freedom_used: float) -> Noise:
     """Return noise from residuals of whole turns.
 
     Misfit and absorption are smooth, so noise is measured in higher harmonics and extrapolated
@@ -87,7 +87,7 @@ _LAGS = 201
 """Lags looked at, in samples; longer correlations are structure that a model should name, not noise."""
 
 
-def _autocovariance(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+def _autocovariance(residual: Floats) -> Floats:
     size = next_fast_len(len(residual) + _LAGS, real=True)  # room for the lags: nothing wraps round into them
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
     return np.fft.irfft(spectrum, size)[:_LAGS]

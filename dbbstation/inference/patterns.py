@@ -16,8 +16,7 @@ from dbbstation.inference.variables import TRAVELS, Kind
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.variables import Variable
 
 FAMILY_ODDS = float(np.log(0.1 / 0.9))
@@ -95,7 +94,7 @@ class Pattern:
 
     family: Family
     variables: tuple[Variable, ...]
-    samples: NDArray[np.float64]
+    samples: Floats
     form: Form | None = None
     units: tuple[str, ...] = ()
     per: tuple[float, ...] = ()
@@ -128,7 +127,7 @@ _JOIN = {
 def patterns(
     variables: Sequence[Variable],
     blocks: Sequence[slice],
-    time: NDArray[np.float64] | None,
+    time: Floats | None,
     simulated: Variable | None,
     time_unit: str = "s",
 ) -> list[Pattern]:
@@ -208,7 +207,7 @@ def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
     return found
 
 
-def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: NDArray[np.float64]) -> Pattern:
+def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: Floats) -> Pattern:
     widths = [share * variable.extent for share in TRANSITS]
     # A row at which it turns may belong to either way: as it came there, or as it goes on.
     arriving = variable.arriving(blocks)
@@ -230,7 +229,7 @@ TRANSITS = (0.003, 0.01, 0.03, 0.1)
 """Ways after a reversal over which hysteresis turns to its other side, in shares of the range."""
 
 
-def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> NDArray[np.float64]:
+def play(values: Floats, blocks: Sequence[slice], width: float) -> Floats:
     """Return the place within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; each block begins in the middle."""
     found = np.empty(len(values))
     for rows in blocks:
@@ -248,7 +247,7 @@ def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> 
 
 
 def _speed(
-    variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], unit: str, family: Family = Family.SPEED
+    variable: Variable, time: Floats, blocks: Sequence[slice], unit: str, family: Family = Family.SPEED
 ) -> Pattern:
     rate = variable.rates(time, blocks)
     size = float(np.abs(rate).max(initial=0.0)) or 1.0

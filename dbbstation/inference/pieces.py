@@ -11,9 +11,9 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.coloured import Coloured
 
 
@@ -32,19 +32,19 @@ class Left:
         known: `beside` if known, shape (n, k).
     """
 
-    rest: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    rest: Floats
+    axes: Floats
     noise: float
     coloured: Coloured
     whitening: csr_array | None
-    known: NDArray[np.float64] | None = None
+    known: Floats | None = None
 
     @classmethod
     def of(
         cls,
-        target: NDArray[np.float64],
-        columns: NDArray[np.float64],
-        sd: NDArray[np.float64],
+        target: Floats,
+        columns: Floats,
+        sd: Floats,
         coloured: Coloured,
         whitening: csr_array | None,
     ) -> Left:
@@ -52,20 +52,20 @@ class Left:
         return Fitting.of(columns, sd, coloured, whitening).left(target)
 
     @cached_property
-    def towards(self) -> NDArray[np.float64]:
+    def towards(self) -> Floats:
         """Return `rest` transposed-whitened, for unwhitened columns, shape (n,)."""
         return self.transposed(self.rest)
 
     @cached_property
-    def beside(self) -> NDArray[np.float64]:
+    def beside(self) -> Floats:
         """Return `axes` transposed-whitened, for unwhitened columns, shape (n, k)."""
         return self.transposed(self.axes) if self.known is None else self.known
 
-    def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def whitened(self, rows: Floats) -> Floats:
         """Return rows with white noise."""
         return rows if self.whitening is None else np.asarray(self.whitening @ rows)
 
-    def whitened_part(self, rows: NDArray[np.float64], here: slice, there: slice) -> NDArray[np.float64]:
+    def whitened_part(self, rows: Floats, here: slice, there: slice) -> Floats:
         """Return a whitened place of rows that are zero elsewhere."""
         if self.whitening is None:
             return rows
@@ -83,7 +83,7 @@ class Left:
         taps = np.where(inside, self.whitening.data[own], 0.0)
         return np.add.reduceat(taps[:, None] * rows[np.where(inside, column, 0)], ends[:-1] - ends[0], axis=0)
 
-    def transposed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def transposed(self, rows: Floats) -> Floats:
         """Return transposed whitening of rows."""
         return rows if self.whitening is None else np.asarray(self.whitening.T @ rows)
 
@@ -96,20 +96,18 @@ class Fitting:
         axes: of rows and one row per prior, shape (n + b, k).
     """
 
-    axes: NDArray[np.float64]
+    axes: Floats
     rows: int
     coloured: Coloured
     whitening: csr_array | None
 
     @classmethod
-    def of(
-        cls, columns: NDArray[np.float64], sd: NDArray[np.float64], coloured: Coloured, whitening: csr_array | None
-    ) -> Fitting:
+    def of(cls, columns: Floats, sd: Floats, coloured: Coloured, whitening: csr_array | None) -> Fitting:
         """Return columns alone; arguments as of `Left.of`."""
         none = np.zeros((len(columns), 0))
         return cls(none, len(columns), coloured, whitening).beside(columns, sd)
 
-    def beside(self, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> Fitting:
+    def beside(self, columns: Floats, sd: Floats) -> Fitting:
         """Return these with further columns, shape (n, k), priors infinite if unknown."""
         noise = self.coloured.innovation
         bounded = np.flatnonzero(np.isfinite(sd))
@@ -120,14 +118,14 @@ class Fitting:
         new = np.vstack([self.without_axes(columns * (size / noise)), priors])
         return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
 
-    def without_axes(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def without_axes(self, columns: Floats) -> Floats:
         """Return columns in noise, shape (n, k), minus their projection on these, shape (n + b, k)."""
         new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
         for _ in range(2 if self.axes.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
             new = new - self.axes @ (self.axes.T @ new)
         return new
 
-    def left(self, target: NDArray[np.float64]) -> Left:
+    def left(self, target: Floats) -> Left:
         """Return the residual of a whitened target, shape (n,)."""
         noise, axes = self.coloured.innovation, self.axes[: self.rows]
         weighted = target / noise
@@ -140,9 +138,9 @@ class LeftBesideOthers:
     def __init__(
         self,
         fitting: Fitting,
-        sd: NDArray[np.float64],
-        target: NDArray[np.float64],
-        whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+        sd: Floats,
+        target: Floats,
+        whitened: Callable[[Floats], Floats],
     ) -> None:
         self._fitting, self._target, self._whitened = fitting, target, whitened
         self._size = sd / fitting.coloured.innovation
@@ -152,7 +150,7 @@ class LeftBesideOthers:
         self._transposed = np.zeros((fitting.rows, len(sd)))
         self._products = np.eye(len(sd))
 
-    def __call__(self, but_for: int, own: NDArray[np.float64]) -> Left:
+    def __call__(self, but_for: int, own: Floats) -> Left:
         """Return the residual beside unwhitened columns, shape (n, k), but one."""
         changed = np.arange(own.shape[1])
         if len(self._own):

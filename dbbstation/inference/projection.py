@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Columns
 
 MARGIN = 512
@@ -50,15 +51,15 @@ class CauseColumns:
 
     def __init__(
         self,
-        base: NDArray[np.float64],
-        whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        base: Floats,
+        whitened: Callable[[Floats], Floats] | None = None,
         room: int = MARGIN,
     ) -> None:
         self.base = base
         self.axes, self.on_axes = _orthonormal(base)
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
-        self._waiting: list[NDArray[np.float64]] = []
+        self._waiting: list[Floats] = []
         self._ready, self._shared = 0, False
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
@@ -68,7 +69,7 @@ class CauseColumns:
         self.numbers: NDArray[np.int64] | None = None
 
     @property
-    def samples(self) -> NDArray[np.float64]:
+    def samples(self) -> Floats:
         """Return all columns, shape (n, p)."""
         if self._waiting:
             self._make_room(self.count)
@@ -88,7 +89,7 @@ class CauseColumns:
         self._shared = other._shared = True
         return other
 
-    def of(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+    def of(self, columns: NDArray[np.int64]) -> Floats:
         """Return some columns, shape (n, q)."""
         if not self._waiting or len(columns) > FEW * self.count:
             return self.samples[:, columns]
@@ -104,7 +105,7 @@ class CauseColumns:
         return found
 
     @property
-    def gram(self) -> NDArray[np.float64]:
+    def gram(self) -> Floats:
         """Return all products, shape (p, p)."""
         known = len(self._products)
         if known < self.count:
@@ -117,7 +118,7 @@ class CauseColumns:
         self._renew()
         return self._products
 
-    def own_gram(self) -> NDArray[np.float64]:
+    def own_gram(self) -> Floats:
         """Return all products in an array that the caller may change."""
         return self.gram.copy()
 
@@ -135,7 +136,7 @@ class CauseColumns:
                 self._along[:, own] = self.axes.T @ columns
 
     @property
-    def along(self) -> NDArray[np.float64]:
+    def along(self) -> Floats:
         """Return columns along base axes, shape (k, p)."""
         known = self._along.shape[1]
         if known < self.count:
@@ -143,7 +144,7 @@ class CauseColumns:
         self._renew()
         return self._along
 
-    def add(self, columns: NDArray[np.float64]) -> NDArray[np.int64]:
+    def add(self, columns: Floats) -> NDArray[np.int64]:
         """Add columns, shape (m, q), in freed places first, and return their numbers."""
         taken = np.array(self._free[: columns.shape[1]], dtype=np.int64)
         if len(taken):
@@ -176,7 +177,7 @@ class CauseColumns:
         wider[:, : self._ready] = self._buffer[:, : self._ready]
         self._buffer, self._shared = wider, False
 
-    def towards(self, target: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def towards(self, target: Floats) -> tuple[Floats, Floats]:
         """Return products with a target, shape (n,), of columns, shape (p,), and axes, shape (k,)."""
         return self.samples.T @ target, self.axes.T @ target
 
@@ -204,27 +205,27 @@ class _Without(CauseColumns):
         self._along_left = self._turned.T @ (along - (self._out @ axes).T)
 
     @property
-    def samples(self) -> NDArray[np.float64]:
+    def samples(self) -> Floats:
         return self._whole.samples
 
     @property
-    def gram(self) -> NDArray[np.float64]:
+    def gram(self) -> Floats:
         return self.own_gram()
 
-    def own_gram(self) -> NDArray[np.float64]:
+    def own_gram(self) -> Floats:
         gram, own = self._whole.gram, self.numbers
         return _less(gram.copy() if own is None else gram[np.ix_(own, own)], self._out.T)
 
     @property
-    def along(self) -> NDArray[np.float64]:
+    def along(self) -> Floats:
         return self._along_left
 
-    def towards(self, target: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def towards(self, target: Floats) -> tuple[Floats, Floats]:
         of_columns, of_axes = self._whole.towards(target)
         return of_columns if self.numbers is None else of_columns[self.numbers], self._turned.T @ of_axes
 
 
-def _less(products: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _less(products: Floats, columns: Floats) -> Floats:
     """Subtract the products of columns, shape (m, q), from the given products, shape (q, q), in place."""
     if not columns.size:
         return products
@@ -242,7 +243,7 @@ STRIP = 256
 """Columns that are mirrored at once: half a megabyte on the diagonal."""
 
 
-def _orthonormal(base: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _orthonormal(base: Floats) -> tuple[Floats, Floats]:
     axes, on_axes = np.linalg.qr(base)
     return axes, on_axes
 
@@ -255,7 +256,7 @@ class BesideBase:
             cause.
     """
 
-    def __init__(self, causes: CauseColumns, known: Columns, held: NDArray[np.float64], noise: float) -> None:
+    def __init__(self, causes: CauseColumns, known: Columns, held: Floats, noise: float) -> None:
         random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
         free = free_directions(known, fitted, held)
         usual = known.scale[fitted][:, None] * held.T
@@ -272,7 +273,7 @@ class BesideBase:
         # Of what lies along the axes of the base, how much its fit takes, given its priors.
         self._taken = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)].T
 
-    def comparison(self, target: NDArray[np.float64], only: NDArray[np.int64] | None = None) -> ModelComparison:
+    def comparison(self, target: Floats, only: NDArray[np.int64] | None = None) -> ModelComparison:
         """Compare causes on a target, shape (n,)."""
         causes = self._causes
         if only is None:
@@ -287,7 +288,7 @@ class BesideBase:
         gram /= self._noise**2
         return ModelComparison(gram, towards / self._noise**2, causes.numbers if only is None else only)
 
-    def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
+    def left(self, targets: Floats, sd: Floats) -> Floats:
         """Return the residual of base and causes, shape (n, m)."""
         causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.harmonics import Spectrum
 
 
@@ -61,8 +62,8 @@ PULSES = 120
 
 
 def remainder(
-    residuals: Sequence[NDArray[np.float64]],
-    phases_rad: Sequence[NDArray[np.float64]],
+    residuals: Sequence[Floats],
+    phases_rad: Sequence[Floats],
     groups: Sequence[object],
     noise: Spectrum,
 ) -> Remainder:
@@ -102,9 +103,7 @@ def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int,
     return at, chances[at]
 
 
-def _stretches(
-    residual: NDArray[np.float64], phase_rad: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
+def _stretches(residual: Floats, phase_rad: Floats) -> tuple[Floats, NDArray[np.int64], int]:
     place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * PULSES).astype(np.int64) % PULSES
     counts = np.bincount(place, minlength=PULSES)
     means = np.bincount(place, residual, minlength=PULSES) / np.maximum(counts, 1)

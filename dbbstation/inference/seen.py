@@ -17,8 +17,7 @@ from dbbstation.inference.variables import Kind, Variable
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
@@ -42,7 +41,7 @@ def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Patter
     return bank.worthy(left, found)
 
 
-def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[Floats, Floats]:
     known, held = bank.channel.known, bank.channel.held
     fixed, random = np.flatnonzero(~known.random), np.flatnonzero(known.random)
     base = bank.base
@@ -54,7 +53,7 @@ def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[NDArray[np.float64],
     return np.hstack(columns), np.concatenate(sd)
 
 
-def _left(bank: Bank, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> Left:
+def _left(bank: Bank, columns: Floats, sd: Floats) -> Left:
     return Left.of(bank.target, columns, sd, bank.noise, bank.whitening)
 
 

@@ -11,8 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.coloured import Coloured
@@ -58,9 +57,7 @@ class Settled:
         """Return the most probable hypothesis."""
         return self.posterior.best
 
-    def effect(
-        self, names: Collection[str] | None = None, members: Sequence[Member] | None = None
-    ) -> NDArray[np.float64]:
+    def effect(self, names: Collection[str] | None = None, members: Sequence[Member] | None = None) -> Floats:
         """Return the effect of some members over all rows, in the residual's unit, shape (n,).
 
         Args:
@@ -74,11 +71,11 @@ class Settled:
                 total += self.bank.samples(member.columns) @ own
         return total
 
-    def base_values(self, effect: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def base_values(self, effect: Floats | None = None) -> Floats:
         """Return base values beside an effect; None: of all members, shape (k,)."""
         return self.bank.base_values(self.effect() if effect is None else effect)
 
-    def predicted(self) -> NDArray[np.float64]:
+    def predicted(self) -> Floats:
         """Return base and members over all rows, shape (n,)."""
         effect = self.effect()
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)

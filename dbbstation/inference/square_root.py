@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Block, Columns
 
 
@@ -36,13 +37,13 @@ class Spreads:
         own: columns, shape (j,), and root, shape (j, j), per group.
     """
 
-    shared: NDArray[np.float64]
-    own: tuple[tuple[NDArray[np.int64], NDArray[np.float64]], ...]
+    shared: Floats
+    own: tuple[tuple[NDArray[np.int64], Floats], ...]
     alone: NDArray[np.int64]
-    prior: NDArray[np.float64]
+    prior: Floats
 
     @cached_property
-    def variance(self) -> NDArray[np.float64]:
+    def variance(self) -> Floats:
         """Return each column's variance, shape (k,)."""
         variance = np.einsum("kq,kq->k", self.shared, self.shared)
         variance[self.alone] = self.prior**2
@@ -51,15 +52,15 @@ class Spreads:
         return variance
 
     @cached_property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Floats:
         """Return the covariance, shape (k, k)."""
-        covariance: NDArray[np.float64] = self.shared @ self.shared.T
+        covariance: Floats = self.shared @ self.shared.T
         covariance[self.alone, self.alone] = self.prior**2
         for columns, root in self.own:
             covariance[np.ix_(columns, columns)] += root @ root.T
         return covariance
 
-    def times(self, factor: NDArray[np.float64]) -> Spreads:
+    def times(self, factor: Floats) -> Spreads:
         """Return standard deviations scaled by factors, shape (k,)."""
         return Spreads(
             factor[:, None] * self.shared,
@@ -68,7 +69,7 @@ class Spreads:
             factor[self.alone] * self.prior,
         )
 
-    def square_of(self, columns: NDArray[np.int64], rows: NDArray[np.float64]) -> float:
+    def square_of(self, columns: NDArray[np.int64], rows: Floats) -> float:
         """Return the trace of rows, shape (r, j), times covariance times rows."""
         square = float(np.sum((rows @ self.shared[columns]) ** 2))
         for group, root in self.own:
@@ -87,8 +88,8 @@ class Directions:
         vectors: orthonormal rows, shape (f, f).
     """
 
-    singular: NDArray[np.float64]
-    vectors: NDArray[np.float64]
+    singular: Floats
+    vectors: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,21 +104,21 @@ class Solution:
         freedom_used: on measurements of the channel's noise.
     """
 
-    x: NDArray[np.float64]
+    x: Floats
     spreads: Spreads
     directions: Directions
-    held: NDArray[np.float64]
+    held: Floats
     chi2: float
     stated_chi2: float
     freedom_used: float
 
     @property
-    def variance(self) -> NDArray[np.float64]:
+    def variance(self) -> Floats:
         """Return variances, shape (k,), without the full covariance."""
         return self.spreads.variance
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Floats:
         """Return the covariance, shape (k, k), zero along held directions."""
         return self.spreads.covariance
 
@@ -126,7 +127,7 @@ def solve(
     blocks: Sequence[Block],
     known: Columns,
     noise: float,
-    held: NDArray[np.float64] | None = None,
+    held: Floats | None = None,
 ) -> Solution:
     """Return best estimates of fitted and predictions of random columns.
 
@@ -187,7 +188,7 @@ def chi2_without(
     blocks: Sequence[Block],
     known: Columns,
     noise: float,
-    held: NDArray[np.float64],
+    held: Floats,
     parts: Sequence[Sequence[int]],
 ) -> list[float]:
     """Return chi-square without each part's blocks, priors included."""
@@ -200,16 +201,14 @@ def chi2_without(
     return found
 
 
-def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> NDArray[np.float64]:
+def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Floats:
     """Return orthonormal directions, in scales, more uncertain than 1."""
     arrow = arrow_of(blocks, known, noise)
     directions = directions_of(arrow.root_of_fitted * known.scale[arrow.fitted])
     return directions.vectors[directions.singular < 1.0 - ROUNDING]
 
 
-def unseen_combinations(
-    blocks: Sequence[Block], known: Columns, noise: float, held: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, held: Floats) -> Floats:
     """Return combinations that blocks cannot determine, at scale size, shape (h, k).
 
     A direction lost at the first linearisation differs at the solution: here other columns follow by least squares.
@@ -226,7 +225,7 @@ def unseen_combinations(
     return combinations
 
 
-def directions_of(seen: NDArray[np.float64]) -> Directions:
+def directions_of(seen: Floats) -> Directions:
     """Return directions of a scaled information root, shape (r, f), most certain first."""
     _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
     padded = np.zeros(seen.shape[1])
@@ -234,7 +233,7 @@ def directions_of(seen: NDArray[np.float64]) -> Directions:
     return Directions(padded, vectors)
 
 
-def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def complement(rows: Floats) -> Floats:
     """Return the orthonormal complement."""
     if len(rows) == 0:
         return np.eye(rows.shape[1])
@@ -242,7 +241,7 @@ def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return vt[len(rows) :]
 
 
-def free_directions(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
+def free_directions(base: Columns, fitted: NDArray[np.int64], held: Floats) -> Floats:
     """Return fitted columns along free directions, in scales, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.pieces import Left
     from dbbstation.inference.variables import Variable
@@ -41,7 +42,7 @@ def stretches(
     size: float,
     *,
     clock: Clock | None = None,
-    by: tuple[Variable, NDArray[np.float64]] | None = None,
+    by: tuple[Variable, Floats] | None = None,
 ) -> list[Pattern]:
     """Return outstanding stretches as patterns of one, two and more.
 
@@ -51,7 +52,7 @@ def stretches(
         by: time, and direction, shape (n,), for odd effects.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
-    kinds: list[tuple[Family, tuple[Variable, ...], NDArray[np.float64]]] = [(Family.PULSES, (), np.ones(len(kept)))]
+    kinds: list[tuple[Family, tuple[Variable, ...], Floats]] = [(Family.PULSES, (), np.ones(len(kept)))]
     if by is not None:
         kinds.append((Family.PULSES_BY_DIRECTION, (by[0],), by[1]))
     patterns = []
@@ -75,13 +76,13 @@ def stretches(
 def refined(
     pattern: Pattern,
     count: int,
-    lefts: Callable[[int, NDArray[np.float64]], Left],
+    lefts: Callable[[int, Floats], Left],
     blocks: Sequence[slice],
     kept: NDArray[np.bool_],
     size: float,
     *,
     clock: Clock | None = None,
-    direction: NDArray[np.float64] | None = None,
+    direction: Floats | None = None,
 ) -> Pattern:
     """Return a pattern's first stretches with re-optimised ends.
 
@@ -128,7 +129,7 @@ def _pattern(
     over: tuple[Variable, ...],
     found: Sequence[tuple[float, float]],
     clock: Clock,
-    factor: NDArray[np.float64],
+    factor: Floats,
     tried: float,
 ) -> Pattern:
     form = Stretches(tuple(a for a, _ in found), tuple(b for _, b in found), clock.response)
@@ -169,7 +170,7 @@ class _Look:
         kept: NDArray[np.bool_],
         size: float,
         clock: Clock,
-        factor: NDArray[np.float64],
+        factor: Floats,
         windows: NDArray[np.int64] | None = None,
     ) -> None:
         self._left, self._size, self._clock, self._factor = left, size, clock, factor
@@ -204,7 +205,7 @@ class _Look:
         starts, ends = np.divmod(np.unique(np.vstack(found) @ np.array([per_row, 1])), per_row)
         return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
 
-    def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> Floats:
         own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
         for many in range(0, len(starts), BOUNDS.stretches_at_once):
             rows = slice(many, many + BOUNDS.stretches_at_once)
@@ -236,14 +237,14 @@ class _Look:
                 return low, high
         return 0, len(self._rows)
 
-    def _worth_between(self, edge: int, others: slice) -> NDArray[np.float64]:
+    def _worth_between(self, edge: int, others: slice) -> Floats:
         way, along = 1.0 if others.start > edge else -1.0, self._along_axes.columns
         own = way * (self._whole[others] - self._whole[edge])
         own += self._edges[np.abs(np.arange(others.start, others.stop) - edge)]
         own -= self._lengths[others] - 2.0 * (along[others] @ along[edge]) + self._lengths[edge]
         return self._worth(self._total[others] - self._total[edge], own)
 
-    def _worth(self, along: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _worth(self, along: Floats, own: Floats) -> Floats:
         information = np.maximum(own, 0.0) + 1.0 / self._size**2
         occam = 0.5 * np.log(information * self._size**2)
         return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
@@ -278,7 +279,7 @@ class _Look:
         self._own = self._own - (total[self._windows[:, 1]] - total[self._windows[:, 0]]) ** 2
         return begins, ends
 
-    def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
+    def _best_edges(self, begins: Floats, ends: Floats) -> tuple[float, float]:
         # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once, where it is not zero.
         rings, reach = self._left.coloured.order, self._clock.reach
         moving = begins if begins[0] < begins[-1] else ends
@@ -305,9 +306,7 @@ class _Look:
         begin, end = np.searchsorted(self._at, [first, last + 1.0]).tolist()
         return slice(begin, end)
 
-    def _columns(
-        self, begins: NDArray[np.float64], ends: NDArray[np.float64], rows: slice = slice(None)
-    ) -> NDArray[np.float64]:
+    def _columns(self, begins: Floats, ends: Floats, rows: slice = slice(None)) -> Floats:
         at = self._at[rows, None]
         return (self._clock.response(at - begins) - self._clock.response(at - ends)) * self._factor[rows, None]
 
@@ -315,10 +314,10 @@ class _Look:
 class _Growing:
     """Columns, shape (n, k), growing without copies."""
 
-    def __init__(self, columns: NDArray[np.float64]) -> None:
+    def __init__(self, columns: Floats) -> None:
         self.columns, self._room = columns, columns
 
-    def add(self, column: NDArray[np.float64]) -> None:
+    def add(self, column: Floats) -> None:
         """Add a column, shape (n,)."""
         count = self.columns.shape[1]
         if count == self._room.shape[1]:
@@ -338,17 +337,17 @@ ALIKE = 1e-12
 """Relative difference that is none."""
 
 
-def _squares(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _squares(rows: Floats) -> Floats:
     return np.asarray(np.einsum("wk,wk->w", rows, rows), dtype=np.float64)
 
 
-def _cumulative(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _cumulative(rows: Floats) -> Floats:
     found = np.zeros((len(rows) + 1, *rows.shape[1:]))
     np.cumsum(rows, axis=0, out=found[1:])
     return found
 
 
-def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:
+def _squares_of_edges(noise: Coloured, longest: int) -> Floats:
     """Return two edges' squares after whitening, by stretch length 0 to `longest`."""
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 
 @dataclass(frozen=True, eq=False)
 class Sums:
@@ -32,13 +34,13 @@ class Sums:
         base: gain times base directions, shape (b, d, k).
     """
 
-    at: NDArray[np.float64]
+    at: Floats
     place: NDArray[np.int64]
-    rest: NDArray[np.float64]
-    gains: NDArray[np.float64]
-    base: NDArray[np.float64]
+    rest: Floats
+    gains: Floats
+    base: Floats
 
-    def explained(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
+    def explained(self, curves: Floats) -> Floats:
         """Return squares explained by curves beside the base, shape (m,), from (b, m, p)."""
         pieces, many, count = curves.shape
         flat = curves.reshape(pieces, many * count).T
@@ -48,16 +50,16 @@ class Sums:
         gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
         return solved(rest, taken(base), gains)
 
-    def of_forms(self, forms: Sequence[Form]) -> NDArray[np.float64]:
+    def of_forms(self, forms: Sequence[Form]) -> Floats:
         """Return squares explained by forms, shape (m,)."""
         curves = [form.columns(self.at) for form in forms]
         return self.explained(np.stack(curves, axis=1)) if curves else np.zeros(0)
 
-    def of_waves(self, length: int, first: int, last: int) -> NDArray[np.float64]:
+    def of_waves(self, length: int, first: int, last: int) -> Floats:
         """Return squares explained by waves of `first` to `last` - 1 periods in `length` pieces, by Fourier transform."""
         pieces, directions, width = self.base.shape
 
-        def transformed(values: NDArray[np.float64], step: int) -> NDArray[np.complex128]:
+        def transformed(values: Floats, step: int) -> NDArray[np.complex128]:
             wide = np.zeros((length, values.shape[1]))
             wide[self.place] = values
             return np.asarray(rfft(wide, axis=0)[step * first : step * last : step])
@@ -97,7 +99,7 @@ FINER = (1.0 / 30.0, 1.0 / 450.0)
 other."""
 
 
-def peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+def peaks(explained: Floats, most: int) -> NDArray[np.int64]:
     """Return local maxima, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     found = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
@@ -135,7 +137,7 @@ class NearbyWaves:
         )
         self._twice = _moments(wave**2, x, sums.gains.reshape(pieces, -1), TERMS_OF_SQUARES)
 
-    def explained(self, frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
+    def explained(self, frequencies: Floats) -> Floats:
         """Return squares explained by waves, shape (m,), from (m,)."""
         many, d = len(frequencies), self._directions
         turned = 2.0 * np.pi * (frequencies - self._frequency) * self._half
@@ -152,9 +154,7 @@ TERMS, TERMS_OF_SQUARES = 18, 24
 """Polynomials: J_n(pi REACH) and J_n(2 pi REACH) are below 2e-17 from there on."""
 
 
-def _moments(
-    wave: NDArray[np.complex128], x: NDArray[np.float64], values: NDArray[np.float64], terms: int
-) -> NDArray[np.complex128]:
+def _moments(wave: NDArray[np.complex128], x: Floats, values: Floats, terms: int) -> NDArray[np.complex128]:
     """Return sums of wave times polynomials times values, shape (terms, q), from (b,), (b,) and (b, q)."""
     curves = np.empty((terms, 2, len(x)))
     before, now = x, np.ones(len(x))  # T_1, which is also T_-1, and T_0
@@ -166,7 +166,7 @@ def _moments(
     return np.asarray(found[:, 0] + 1j * found[:, 1])
 
 
-def _weights(turned: NDArray[np.float64], terms: int) -> NDArray[np.complex128]:
+def _weights(turned: Floats, terms: int) -> NDArray[np.complex128]:
     """Return polynomials' weights in exp(i a x), shape (m, terms), from a, shape (m,)."""
     order = np.arange(terms)
     weights = jv(order, turned[:, None]) * 1j**order
@@ -174,12 +174,12 @@ def _weights(turned: NDArray[np.float64], terms: int) -> NDArray[np.complex128]:
     return np.asarray(weights)
 
 
-def sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
+def sides(transform: NDArray[np.complex128]) -> Floats:
     """Return cosine and sine sums, shape (m, 2, ...), from those with exp(-ix), shape (m, ...)."""
     return np.stack([transform.real, -transform.imag], axis=1)
 
 
-def squares(mean: NDArray[np.float64], twice: NDArray[np.complex128]) -> NDArray[np.float64]:
+def squares(mean: Floats, twice: NDArray[np.complex128]) -> Floats:
     """Return cosine and sine products, shape (m, 2, 2, d, d), from those with one, (d, d), and exp(-2ix), (m, d, d)."""
     # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2
     found = np.empty((len(twice), 2, 2, *mean.shape))
@@ -188,13 +188,13 @@ def squares(mean: NDArray[np.float64], twice: NDArray[np.complex128]) -> NDArray
     return found
 
 
-def taken(base: NDArray[np.float64]) -> NDArray[np.float64]:
+def taken(base: Floats) -> Floats:
     """Return the base's part of curve products, (m, p d, p d), from (m, p, d, k)."""
     side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
     return np.asarray(side @ side.transpose(0, 2, 1))
 
 
-def solved(rest: NDArray[np.float64], of_base: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
+def solved(rest: Floats, of_base: Floats, gains: Floats) -> Floats:
     """Return squares that columns explain, from (m, p, d), `taken` and (m, p, p, d, d)."""
     many, size = len(rest), rest.shape[1] * rest.shape[2]
     normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)

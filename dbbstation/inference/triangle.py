@@ -9,13 +9,13 @@ import numpy as np
 from dbbstation.inference.bounds import BOUNDS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 RANK = 1e-9
 """Share of the largest singular value or eigenvalue of columns below which a direction says nothing."""
 
 
-def triangle_of(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
+def triangle_of(stacked: Floats) -> Floats:
     """Return the QR triangle without signs; refuse NaN and infinity.
 
     Cache-sized slabs first, three times as fast [Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34 (2012)
@@ -33,7 +33,7 @@ def triangle_of(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
     return triangle
 
 
-def axes_of(columns: NDArray[np.float64], least: float = RANK) -> NDArray[np.float64]:
+def axes_of(columns: Floats, least: float = RANK) -> Floats:
     """Return orthonormal axes of columns, shape (n, k).
 
     Args:
@@ -43,12 +43,12 @@ def axes_of(columns: NDArray[np.float64], least: float = RANK) -> NDArray[np.flo
     return np.asarray(u[:, s > least * s[:1]], dtype=np.float64)
 
 
-def left_by(columns: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def left_by(columns: Floats, values: Floats) -> Floats:
     """Return what columns, shape (n, k), leave of values, shape (n,), by least squares."""
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])
 
 
-def rms(values: NDArray[np.float64]) -> float:
+def rms(values: Floats) -> float:
     """Return the root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -13,6 +13,8 @@ from dbbstation.inference.bounds import BOUNDS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
 
@@ -20,9 +22,7 @@ TAILS = (2.5, 3.0, 4.0, 6.0, 10.0)
 """Degrees of freedom of Student's t that are tried."""
 
 
-def most_probable_variance(
-    powers: NDArray[np.float64], even: NDArray[np.float64], grows: NDArray[np.float64], odds: float
-) -> tuple[float, NDArray[np.float64]]:
+def most_probable_variance(powers: Floats, even: Floats, grows: Floats, odds: float) -> tuple[float, Floats]:
     """Return the cost and the most probable variance of each row [Schwarz 1978]."""
     squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
     every = np.array(list(product(GROWN, repeat=squares.shape[1])))
@@ -36,7 +36,7 @@ def most_probable_variance(
     return float(priced[k]), even + squares @ np.square(every[k])
 
 
-def spread_by_kind(powers: NDArray[np.float64], kinds: NDArray[np.int64]) -> NDArray[np.float64]:
+def spread_by_kind(powers: Floats, kinds: NDArray[np.int64]) -> Floats:
     """Return rows' relative standard deviations by kind, shape (m,)."""
     count = np.maximum(np.bincount(kinds), 1)
     mean = np.bincount(kinds, powers) / count
@@ -48,7 +48,7 @@ QUIET = 1e-4
 """Least noise of a kind of rows, over the largest: what is quieter is a column of digits."""
 
 
-def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+def most_probable_tails(new: Floats) -> tuple[Floats, float]:
     """Return root weights, shape (m,), and best Student's t degrees of innovations."""
     squares = np.square(new)
     best, found = -np.inf, (np.ones(len(new)), np.inf)
@@ -60,7 +60,7 @@ def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], 
     return found
 
 
-def student_likelihood(new: NDArray[np.float64], tails: float) -> float:
+def student_likelihood(new: Floats, tails: float) -> float:
     """Return Student's t log likelihood at best scale, over the normal density's height.
 
     Args:
@@ -69,11 +69,11 @@ def student_likelihood(new: NDArray[np.float64], tails: float) -> float:
     return _likelihood(new, tails, _scale_of(np.square(new), tails))
 
 
-def _likelihood(new: NDArray[np.float64], tails: float, scale: float) -> float:
+def _likelihood(new: Floats, tails: float, scale: float) -> float:
     return float(np.sum(log_student(new / np.sqrt(scale), tails))) - 0.5 * len(new) * float(np.log(scale))
 
 
-def _scale_of(squares: NDArray[np.float64], tails: float) -> float:
+def _scale_of(squares: Floats, tails: float) -> float:
     """Return the best squared scale by expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
     scale = 1.0
     for _ in range(BOUNDS.tail_rounds):
@@ -82,7 +82,7 @@ def _scale_of(squares: NDArray[np.float64], tails: float) -> float:
     return scale
 
 
-def has_long_tails(new: NDArray[np.float64]) -> bool:
+def has_long_tails(new: Floats) -> bool:
     """Return whether innovations, shape (m,), favour long tails at best scales."""
     if not np.any(new):
         return False
@@ -90,7 +90,7 @@ def has_long_tails(new: NDArray[np.float64]) -> bool:
     return max(student_likelihood(scaled, tails) for tails in TAILS) > -0.5 * len(new)
 
 
-def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:
+def log_student(new: Floats, tails: float) -> Floats:
     """Return Student's t log density over the normal density's height, shape (m,)."""
     height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
     return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))

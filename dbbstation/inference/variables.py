@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 class Kind(StrEnum):
@@ -57,7 +57,7 @@ class Variable:
     name: str
     unit: str
     kind: Kind
-    values: NDArray[np.float64]
+    values: Floats
     period: float | None = None
     driven: bool = False
     range: tuple[float, float] | None = None
@@ -83,7 +83,7 @@ class Variable:
         return self.high - self.low
 
     @property
-    def scaled(self) -> NDArray[np.float64]:
+    def scaled(self) -> Floats:
         """Return values scaled to -1..1, shape (n,)."""
         return np.asarray((self.values - 0.5 * (self.low + self.high)) / (0.5 * self.extent), dtype=np.float64)
 
@@ -92,7 +92,7 @@ class Variable:
         """Return the length of one scaled unit in the variable's unit."""
         return 0.5 * self.extent
 
-    def travel(self, rows: slice) -> NDArray[np.float64]:
+    def travel(self, rows: slice) -> Floats:
         """Return values over consecutive rows, angles unwrapped."""
         own = self.values[rows]
         if self.period is None or self.extent > self.period:
@@ -105,7 +105,7 @@ class Variable:
         every = np.concatenate([np.zeros(0), *steps])
         return len(every) > 0 and float(np.median(every)) < CONTINUOUS * self.extent
 
-    def directions(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
+    def directions(self, blocks: Sequence[slice]) -> Floats:
         """Return each row's direction: 1 up, -1 down, shape (n,).
 
         Along a path by speed; between poses by arrival. Stationary rows keep the last direction; before a block's first
@@ -113,11 +113,11 @@ class Variable:
         """
         return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
 
-    def arriving(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
+    def arriving(self, blocks: Sequence[slice]) -> Floats:
         """Return directions by the previous row alone, for ambiguous turns."""
         return _signs(self, blocks, _arriving)
 
-    def rates(self, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
+    def rates(self, time: Floats, blocks: Sequence[slice]) -> Floats:
         """Return central differences per time within blocks, shape (n,); zero if time does not advance."""
         found = np.zeros(len(self.values))
         for rows in blocks:
@@ -127,17 +127,15 @@ class Variable:
         return found
 
 
-def _arriving(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _arriving(values: Floats) -> Floats:
     return np.diff(values, prepend=values[:1])
 
 
-def _central(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _central(values: Floats) -> Floats:
     return np.gradient(values) if len(values) > 1 else np.zeros(len(values))
 
 
-def _signs(
-    variable: Variable, blocks: Sequence[slice], change_of: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-) -> NDArray[np.float64]:
+def _signs(variable: Variable, blocks: Sequence[slice], change_of: Callable[[Floats], Floats]) -> Floats:
     found = np.zeros(len(variable.values))
     for rows in blocks:
         change = change_of(variable.travel(rows))

@@ -12,8 +12,7 @@ from dbbstation.nc.toolpath import IN_FORCE, RowKind, Toolpath, ToolpathBuilder
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
 
 STEP_DEG = 0.1
@@ -90,7 +89,7 @@ def circle_toolpath(
     return path.built()
 
 
-def arc_phi_deg(circle: Circle, step_deg: float) -> NDArray[np.float64]:
+def arc_phi_deg(circle: Circle, step_deg: float) -> Floats:
     """Return the progress of the programmed points, overshoot arcs included [deg]."""
     edges = [-circle.overshoot_deg, 0.0, FULL_TURN_DEG, FULL_TURN_DEG + circle.overshoot_deg]
     parts = [np.array(edges[:1])]
@@ -105,9 +104,9 @@ def chord_error_mm(circle: Circle, step_deg: float) -> float:
     return circle.radius_mm * float(1.0 - np.cos(np.radians(step_deg) / 2.0))
 
 
-def _ends_deg(circle: Circle) -> NDArray[np.float64]:
+def _ends_deg(circle: Circle) -> Floats:
     return circle.theta_deg(np.array([-circle.overshoot_deg, FULL_TURN_DEG + circle.overshoot_deg]))
 
 
-def _raised(pose: NDArray[np.float64], by_mm: float) -> NDArray[np.float64]:
+def _raised(pose: Floats, by_mm: float) -> Floats:
     return pose + np.array([0.0, 0.0, by_mm, 0.0, 0.0, 0.0])

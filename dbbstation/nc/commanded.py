@@ -12,8 +12,7 @@ from dbbstation.nc.toolpath import RowKind
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
     from dbbstation.nc.toolpath import Toolpath
     from dbbstation.plan.circle import Circle
@@ -28,7 +27,7 @@ SLACK_DEG = 1.0
 """How far beyond the ends of the arc its ends may stand in: a compensated arc is not exactly as long as the circle."""
 
 
-def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[np.float64]:
+def commanded_poses(text: str, file: str, observation: Observation) -> Floats:
     """Return the commanded poses of the lead-in and the samples, shape (n, 6) [mm, deg].
 
     Args:
@@ -43,7 +42,7 @@ def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[n
     return poses_at_progress(toolpath, observation.raw.circle, phi_deg)
 
 
-def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+def poses_at_progress(toolpath: Toolpath, circle: Circle, phi_deg: Floats) -> Floats:
     """Return commanded poses at the progress phi along the turn, shape (n, 6) [mm, deg].
 
     Phi is time at the plan's feed; 180 degrees is the middle between feed-in and feed-out. The arc is the program's
@@ -85,9 +84,9 @@ def _arc_s(toolpath: Toolpath) -> tuple[float, float]:
 
 def _check_near(
     toolpath: Toolpath,
-    poses: NDArray[np.float64],
+    poses: Floats,
     circle: Circle,
-    phi_deg: NDArray[np.float64],
+    phi_deg: Floats,
 ) -> None:
     off = poses - circle.poses(circle.theta_deg(phi_deg))
     off_mm = np.linalg.norm(off[:, :3], axis=1)

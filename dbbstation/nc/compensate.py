@@ -29,6 +29,7 @@ from dbbstation.nc.toolpath import RowKind, rounded
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.curve import SpanBehind
@@ -152,7 +153,7 @@ def _commanded(
     chord_mm: float | None,
     runs: NDArray[np.int64],
     whole: NDArray[np.bool_],
-) -> tuple[Pieces, NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Pieces, Floats, Floats]:
     """Return pieces, poses to command at their ends, shape (k, 6) [mm, deg], and the curve's distance from them, shape (k,) [mm]."""
     if chord_mm is None:
         pieces = rows_as_pieces(curve.toolpath)
@@ -181,14 +182,14 @@ class _Part(NamedTuple):
         off_mm: distance of the curve from pieces at feed, at `DENSELY` places, shape (k,).
     """
 
-    begin: NDArray[np.float64]
-    end: NDArray[np.float64]
-    commanded: NDArray[np.float64]
-    shift_mm: NDArray[np.float64]
-    off_mm: NDArray[np.float64]
+    begin: Floats
+    end: Floats
+    commanded: Floats
+    shift_mm: Floats
+    off_mm: Floats
 
 
-def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.float64], largest_mm: float) -> None:
+def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: Floats, largest_mm: float) -> None:
     if shift_mm.max(initial=0.0) <= largest_mm:
         return
     worst = int(np.argmax(shift_mm))
@@ -200,7 +201,7 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.
     )
 
 
-def _needed_mm(toolpath: Toolpath, planner: Planner) -> NDArray[np.float64]:
+def _needed_mm(toolpath: Toolpath, planner: Planner) -> Floats:
     mm_s = np.where(cuts(toolpath), np.nan_to_num(toolpath.feed) / 60.0, 0.0)
     return np.where(cuts(toolpath), planner.needed_mm(mm_s), 0.0)
 
@@ -209,7 +210,7 @@ def _assembled(
     toolpath: Toolpath,
     pieces: Pieces,
     written: NDArray[np.bool_],
-    commanded: NDArray[np.float64],
+    commanded: Floats,
     runs: NDArray[np.int64],
     machine: Machine,
     corner_mm: float,
@@ -237,7 +238,7 @@ def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
     return np.asarray(last | (toolpath.kind[row] == RowKind.FEED))
 
 
-def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _until(toolpath: Toolpath, places: Floats) -> tuple[Floats, Floats]:
     at = np.arange(len(toolpath) + 1)
     ways = (np.concatenate([[0.0], np.cumsum(each)]) for each in (toolpath.tip_mm, toolpath.duration_s))
     way_mm, time_s = (np.interp(places, at, way) for way in ways)
@@ -246,10 +247,10 @@ def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.
 
 def _feeds(
     path: Toolpath,
-    wanted_feed: NDArray[np.float64],
-    wanted_mm: NDArray[np.float64],
-    wanted_s: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    wanted_feed: Floats,
+    wanted_mm: Floats,
+    wanted_s: Floats,
+) -> Floats:
     """Return the feeds of a compensated path, shape (n,) [mm/min]; of angles if the tip does not move [deg/min].
 
     F is kept, because the compensated move has nearly the original length. A turn about a nearly stationary tip gets

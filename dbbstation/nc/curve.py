@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.compensation import Passed
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.toolpath import Toolpath
@@ -38,7 +39,7 @@ class SpanBehind:
         passed: memory of the model's sources.
     """
 
-    command: NDArray[np.float64]
+    command: Floats
     passed: Passed
 
 
@@ -74,7 +75,7 @@ class CommandCurve:
         self.behind = before
         """What is left behind the last of the places that were looked at last."""
 
-    def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, places: Floats) -> Floats:
         """Return poses to command at places in program order, shape (k, 6) [mm, deg].
 
         Raises:
@@ -105,7 +106,7 @@ class CommandCurve:
         at_rest = behind[resting[np.searchsorted(resting, np.arange(len(row)))]]
         return inverse[at_rest]
 
-    def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
+    def _inverted(self, wanted: Motion) -> Floats:
         passed = None if self._before is None else self._before.passed
         parts = [] if self._before is None else [self._before.command[None]]
         for start in range(0, len(wanted), PLACES_AT_ONCE):
@@ -117,7 +118,7 @@ class CommandCurve:
             self.behind = SpanBehind(commands[-1], passed)
         return commands
 
-    def _stretch(self, passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
+    def _stretch(self, passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
         command, behind = compensated_on(passed, wanted)
         if not self._hold_tilt:
             return command, behind
@@ -131,17 +132,17 @@ class CommandCurve:
         return np.hstack([command[:, :3], programmed]), behind
 
 
-def row_and_share(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def row_and_share(places: Floats) -> tuple[NDArray[np.int64], Floats]:
     """Return rows and shares passed, shapes (k,); the end of a row belongs to it, its begin does not."""
     row = np.maximum(np.ceil(places).astype(np.int64) - 1, 0)
     return row, places - row
 
 
-def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
+def felt_mm(off: Floats) -> Floats:
     """Return the motion at the tip, or at the lever if larger, of pose differences (k, 6), shape (k,) [mm]."""
     lengths = in_mm(off)
     moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
-    felt: NDArray[np.float64] = np.maximum(moved, tilted)
+    felt: Floats = np.maximum(moved, tilted)
     return felt
 
 
@@ -150,6 +151,6 @@ def rounding_mm(decimals: Sequence[int]) -> float:
     return float(felt_mm(0.5 / 10.0 ** np.array([decimals]))[0])
 
 
-def in_mm(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def in_mm(poses: Floats) -> Floats:
     """Return poses, shape (k, 6), with angles as the motion of a point at the lever [mm]."""
     return poses * np.repeat([1.0, np.radians(LEVER_MM)], 3)

@@ -12,9 +12,7 @@ from dbbstation.nc.toolpath import DECIMALS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.planner import LookAhead
     from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath
@@ -73,9 +71,7 @@ class Dialect(ABC):
         return True
 
     @abstractmethod
-    def read(
-        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
-    ) -> Toolpath:
+    def read(self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
         """Return what a program commands.
 
         Args:
@@ -87,7 +83,7 @@ class Dialect(ABC):
         """
 
     def toolpath(
-        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
+        self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         """Return the result of `read` for a program that moves something.
 

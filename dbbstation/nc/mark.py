@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.toolpath import Toolpath
 
 BITS = {2: 16, 3: 11, 4: 7}
@@ -115,14 +116,14 @@ def is_marked(toolpath: Toolpath) -> bool:
     return False
 
 
-def decimals_of(poses: NDArray[np.float64]) -> Iterator[tuple[int, ...]]:
+def decimals_of(poses: Floats) -> Iterator[tuple[int, ...]]:
     """Yield the decimals in which a dialect may have written poses, shape (n, 6), this program's first."""
     yield DECIMALS
     enough = [[n for n in COARSER if n <= most and _off(poses[:, axes], n) < _SAME] for axes, most in _GROUPS]
     yield from (found for mm in enough[0] for deg in enough[1] if (found := (mm,) * 3 + (deg,) * 3) != DECIMALS)
 
 
-def _off(numbers: NDArray[np.float64], decimals: int) -> float:
+def _off(numbers: Floats, decimals: int) -> float:
     return float(np.abs(numbers - np.round(numbers, decimals)).max(initial=0.0))
 
 
@@ -152,7 +153,7 @@ def _first_marked(
     return chosen
 
 
-def _numbers(poses: NDArray[np.float64], decimals: Sequence[int]) -> NDArray[np.int64]:
+def _numbers(poses: Floats, decimals: Sequence[int]) -> NDArray[np.int64]:
     numbers: NDArray[np.int64] = np.rint(poses * 10.0 ** np.array(decimals)).astype(np.int64)
     return numbers
 

@@ -11,10 +11,12 @@ from dbbstation.machine.compiled import compiled
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 
 def longest(
-    way: NDArray[np.float64],
-    curve: NDArray[np.float64],
+    way: Floats,
+    curve: Floats,
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:
@@ -30,7 +32,7 @@ def longest(
 
 
 @compiled
-def _distance_mm(way: NDArray[np.float64], curve: NDArray[np.float64], start: int, end: int) -> float:
+def _distance_mm(way: Floats, curve: Floats, start: int, end: int) -> float:
     worst = 0.0
     length = way[end] - way[start]
     for k in range(start + 1, end):
@@ -48,8 +50,8 @@ def _distance_mm(way: NDArray[np.float64], curve: NDArray[np.float64], start: in
 
 @compiled
 def _farthest(
-    way: NDArray[np.float64],
-    curve: NDArray[np.float64],
+    way: Floats,
+    curve: Floats,
     may_end: NDArray[np.bool_],
     tolerance_mm: float,
 ) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ from dbbstation.nc.toolpath import RowKind
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.toolpath import Toolpath
 
 CYCLES = 1.5
@@ -50,24 +51,24 @@ class Planner:
     acceleration_mm_s2: float
     look_ahead: LookAhead | None
 
-    def needed_mm(self, mm_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def needed_mm(self, mm_s: Floats) -> Floats:
         """Return the length of a turning piece that reaches these speeds, same shape [mm]."""
         if self.look_ahead is None:
             return np.zeros_like(mm_s)
         least = mm_s**2 / (self.look_ahead.share * self.acceleration_mm_s2)
-        needed: NDArray[np.float64] = least + CYCLES * self.look_ahead.cycle_s * mm_s
+        needed: Floats = least + CYCLES * self.look_ahead.cycle_s * mm_s
         return needed
 
-    def reached_mm_s(self, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    def reached_mm_s(self, length_mm: Floats) -> Floats:
         """Return the speeds of turning pieces of these lengths, same shape [mm/s]."""
         if self.look_ahead is None:
             return np.full_like(length_mm, np.inf)
         a = self.look_ahead.share * self.acceleration_mm_s2
         lost = CYCLES * self.look_ahead.cycle_s * a
-        reached: NDArray[np.float64] = (np.sqrt(lost**2 + 4.0 * a * length_mm) - lost) / 2.0
+        reached: Floats = (np.sqrt(lost**2 + 4.0 * a * length_mm) - lost) / 2.0
         return reached
 
-    def row_mm_s(self, toolpath: Toolpath) -> NDArray[np.float64]:
+    def row_mm_s(self, toolpath: Toolpath) -> Floats:
         """Return the speed of each row at feed that moves the tip, F or less, shape (n,) [mm/s]; infinite in others."""
         turning = cuts(toolpath) & (toolpath.turn_deg > 0.0)
         reached = np.where(turning, self.reached_mm_s(move_mm(toolpath)), np.inf)
@@ -85,7 +86,7 @@ def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
     return (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 
 
-def move_mm(toolpath: Toolpath) -> NDArray[np.float64]:
+def move_mm(toolpath: Toolpath) -> Floats:
     """Return the length of each row's written move, shape (n,) [mm]: LinuxCNC runs an arc as one."""
     number = moves_of(toolpath)
     return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)

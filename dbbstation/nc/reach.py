@@ -13,6 +13,7 @@ from dbbstation.nc.toolpath import RowKind, in_pieces
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
 
@@ -70,7 +71,7 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
 class _Poses:
     """Known poses within rows of a toolpath, its start first."""
 
-    def __init__(self, toolpath: Toolpath, row: NDArray[np.int64], share: NDArray[np.float64]) -> None:
+    def __init__(self, toolpath: Toolpath, row: NDArray[np.int64], share: Floats) -> None:
         poses = toolpath.between(row, share)
         known = toolpath.is_move[row]
         self.row, self.poses = row[known], poses[known]
@@ -99,7 +100,7 @@ class _Poses:
             check_travel(machine, self.poses[outside : outside + 1], where=where, remedy=DECLARED)
 
 
-def _is_inside(machine: Machine, poses: NDArray[np.float64]) -> bool:
+def _is_inside(machine: Machine, poses: Floats) -> bool:
     try:
         for begin in range(0, len(poses), AT_ONCE):
             check_travel(machine, poses[begin : begin + AT_ONCE], where="")

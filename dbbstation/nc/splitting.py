@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.curve import CommandCurve
@@ -72,15 +73,15 @@ MOST_CELLS = 1_000_000
 class Pieces:
     """Begins and ends of pieces as places of `CommandCurve`, shapes (k,)."""
 
-    begin: NDArray[np.float64]
-    end: NDArray[np.float64]
+    begin: Floats
+    end: Floats
 
     @property
     def row(self) -> NDArray[np.int64]:
         """Return the row in which each piece ends, shape (k,)."""
         return row_and_share(self.end)[0]
 
-    def places(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    def places(self, shares: Floats) -> Floats:
         """Return places at shares of each piece, shape (k, len(shares)); share 1 is exactly its end."""
         inside = self.begin[:, None] + (self.end - self.begin)[:, None] * shares
         return np.where(shares == 1.0, self.end[:, None], inside)
@@ -121,7 +122,7 @@ def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
     return [slice(begin, end) for begin, end in pairwise([*cuts, len(toolpath)])]
 
 
-def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.int64]:
+def runs_of(toolpath: Toolpath, needed_mm: Floats) -> NDArray[np.int64]:
     """Return the run of each row, shape (n,): a written move, or several shorter than their feed needs.
 
     Moves of a run share F and work system, may round their corners, and nearly keep one direction.
@@ -150,7 +151,7 @@ def split(
     runs: NDArray[np.int64],
     *,
     whole: NDArray[np.bool_],
-) -> tuple[Pieces, NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Pieces, Floats, Floats]:
     """Return the longest pieces in which a toolpath keeps the tolerance.
 
     Pieces, the poses to command at begin and end of each, shape (k, 2, 6) [mm, deg], and how far the curve leaves the chord of
@@ -196,8 +197,8 @@ class _Nodes:
         self,
         curve: CommandCurve,
         begin: float,
-        places: NDArray[np.float64],
-        at: NDArray[np.float64],
+        places: Floats,
+        at: Floats,
         steps: NDArray[np.bool_],
     ) -> None:
         toolpath = curve.toolpath
@@ -215,20 +216,20 @@ class _Nodes:
         self.way = np.concatenate([[first], way])
 
 
-def off_chord_mm(at: NDArray[np.float64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def off_chord_mm(at: Floats, shares: Floats) -> Floats:
     """Return the distance of the curve from each piece's chord, shape (k,) [mm]."""
     begin, end = at[:, 0], at[:, -1]
     off = [felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(shares[:-1])]
-    worst: NDArray[np.float64] = np.max(off, axis=0)
+    worst: Floats = np.max(off, axis=0)
     return worst
 
 
 def looked_at(
     curve: CommandCurve,
     pieces: Pieces,
-    shares: NDArray[np.float64],
+    shares: Floats,
     bends: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6).
 
     Args:
@@ -250,9 +251,7 @@ def looked_at(
     return at
 
 
-def _halved(
-    curve: CommandCurve, cells: Pieces, shares: NDArray[np.float64], at: NDArray[np.float64], halves: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def _halved(curve: CommandCurve, cells: Pieces, shares: Floats, at: Floats, halves: NDArray[np.bool_]) -> Floats:
     """Return what `looked_at` does, from the same of cells of which some are halves now."""
     if curve.has_history:
         return looked_at(curve, cells, shares)
@@ -263,7 +262,7 @@ def _halved(
     return at
 
 
-def along(toolpath: Toolpath, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def along(toolpath: Toolpath, pieces: Pieces, shares: Floats) -> Floats:
     """Return places at shares of the way of successive pieces, shape (k, len(shares))."""
     places = pieces.places(shares)
     across = np.flatnonzero(np.floor(pieces.begin) < pieces.row)
@@ -281,7 +280,7 @@ def _cells(
     model: MachineModel,
     tolerance_mm: float,
     whole: NDArray[np.bool_],
-) -> tuple[Pieces, NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Pieces, Floats, Floats]:
     """Return cells, the curve at their begin and at shares of each, and these shares."""
     toolpath = curve.toolpath
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
@@ -311,14 +310,14 @@ def _cells(
         at = _halved(curve, cells, shares, at[part], again[part] > 1)
 
 
-def _in(toolpath: Toolpath, number: NDArray[np.float64]) -> Pieces:
+def _in(toolpath: Toolpath, number: Floats) -> Pieces:
     number = np.maximum(np.ceil(number), 1.0)
     _check_number(toolpath, number.sum())
     row, end = in_pieces(number.astype(np.int64))
     return Pieces(row + (end - 1.0 / number[row]), row + end)
 
 
-def _way_mm(toolpath: Toolpath, machine: Machine) -> NDArray[np.float64]:
+def _way_mm(toolpath: Toolpath, machine: Machine) -> Floats:
     """Return a bound of the motion of tool tip and platform joints in each row, shape (n,) [mm].
 
     The platform turns by at most the sum of the three angles: √3 times the root of their squares.

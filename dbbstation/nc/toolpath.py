@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 DECIMALS = (6, 6, 6, 7, 7, 7)
 """Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding costs at most 0.0009 µm in space, and as much a metre from the tip."""
 
@@ -107,25 +109,25 @@ class Toolpath:
 
     name: str
     kind: NDArray[np.int8]
-    poses: NDArray[np.float64]
-    feed_mm_min: NDArray[np.float64]
-    feed_deg_min: NDArray[np.float64]
-    dwell_s: NDArray[np.float64]
+    poses: Floats
+    feed_mm_min: Floats
+    feed_deg_min: Floats
+    dwell_s: Floats
     line: NDArray[np.int64]
-    corners_mm: NDArray[np.float64]
+    corners_mm: Floats
     offset: NDArray[np.int32]
-    offsets: NDArray[np.float64]
+    offsets: Floats
     unknown: NDArray[np.uint8]
     in_machine: NDArray[np.bool_]
     text: Mapping[int, str] = field(default_factory=dict)
-    start: NDArray[np.float64] | None = None
+    start: Floats | None = None
     holds: Mapping[str, tuple[float, ...]] | None = None
     ending: Ending = Ending.STOP
     units_said: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[tuple[int, str], ...] = ()
     numbers: tuple[int, ...] = ()
-    arc: NDArray[np.float64] | None = None
+    arc: Floats | None = None
     run: int = 1
 
     def __len__(self) -> int:
@@ -146,7 +148,7 @@ class Toolpath:
         corners = self.corners_mm[self.is_move]
         return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
 
-    def divided(self, row: NDArray[np.int64], poses: NDArray[np.float64]) -> Toolpath:
+    def divided(self, row: NDArray[np.int64], poses: Floats) -> Toolpath:
         """Return the toolpath with some rows in several pieces."""
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
         place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
@@ -188,27 +190,27 @@ class Toolpath:
         return (self.kind == RowKind.RAPID) | (self.kind == RowKind.FEED)
 
     @cached_property
-    def before(self) -> NDArray[np.float64]:
+    def before(self) -> Floats:
         """Return the pose before each row, shape (n, 6) [mm, deg]; the pose after it if unknown."""
         first = self.poses[:1] if self.start is None else np.where(np.isnan(self.start), self.poses[:1], self.start)
         return np.vstack([first, self.poses])[: len(self)]
 
     @property
-    def numbers_written(self) -> NDArray[np.float64]:
+    def numbers_written(self) -> Floats:
         """Return the written numbers of each pose, shape (n, 6): without work offsets and tool length."""
         return self.poses - self.offsets[self.offset]
 
-    def with_numbers(self, numbers: NDArray[np.float64]) -> Toolpath:
+    def with_numbers(self, numbers: Floats) -> Toolpath:
         """Return the toolpath with other written numbers, shape (n, 6)."""
         return replace(self, poses=numbers + self.offsets[self.offset])
 
     @cached_property
-    def tip_mm(self) -> NDArray[np.float64]:
+    def tip_mm(self) -> Floats:
         """Return the distance of the tool tip in each row, shape (n,) [mm]; zero if only rounding."""
         return _norm(self.poses[:, :3] - self.before[:, :3], LEAST_MM)
 
     @cached_property
-    def turn_deg(self) -> NDArray[np.float64]:
+    def turn_deg(self) -> Floats:
         """Return each row's root sum of squares of the three angles, shape (n,) [deg]; zero if only rounding."""
         return _norm(self.poses[:, 3:] - self.before[:, 3:], LEAST_DEG)
 
@@ -218,12 +220,12 @@ class Toolpath:
         return (self.tip_mm == 0.0) & (self.turn_deg > 0.0)
 
     @property
-    def feed(self) -> NDArray[np.float64]:
+    def feed(self) -> Floats:
         """Return F of each row, shape (n,): along the path [mm/min], or of angles [deg/min] if only they move."""
         return np.where(self.only_turns, self.feed_deg_min, self.feed_mm_min)
 
     @cached_property
-    def duration_s(self) -> NDArray[np.float64]:
+    def duration_s(self) -> Floats:
         """Return the time of each row at its feed, without ramps, shape (n,) [s].
 
         F refers to X, Y and Z, and to the angles only if X, Y and Z do not move [RS274/NGC 2.1.2.5; LinuxCNC does the
@@ -235,18 +237,18 @@ class Toolpath:
         return self.dwell_s + np.where(self.kind == RowKind.RAPID, rapid, feeding)
 
     @cached_property
-    def end_s(self) -> NDArray[np.float64]:
+    def end_s(self) -> Floats:
         """Return the time at the end of each row from the start, shape (n,) [s]."""
         return np.cumsum(self.duration_s)
 
-    def at_time(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at_time(self, time_s: Floats) -> Floats:
         """Return commanded poses at times after the start, shape (n, 6); the ends hold beyond them."""
         if not len(self):
             raise ValueError(f"{self.name} has no moves")
         nodes, ends_s = np.vstack([self.before[:1], self.poses]), np.concatenate([[0.0], self.end_s])
         return np.column_stack([np.interp(time_s, ends_s, nodes[:, axis]) for axis in range(6)])
 
-    def between(self, row: NDArray[np.int64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    def between(self, row: NDArray[np.int64], share: Floats) -> Floats:
         """Return poses within rows, shape (k, 6); `share` 0 before the row, 1 after it, both of shape (k,)."""
         before, after = self.before[row], self.poses[row]
         inside = before + share[:, None] * (after - before)
@@ -258,7 +260,7 @@ class Toolpath:
         # The end of a row is its programmed pose to the last bit.
         return np.where(share[:, None] == 1.0, after, inside)
 
-    def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], Floats]:
         """Divide rows into pieces no longer than the steps; return row and share of each end, shapes (k,)."""
         return in_pieces(self.pieces(step_mm, step_deg))
 
@@ -279,7 +281,7 @@ ALL_AXES = 0b111111
 
 class _Rows(NamedTuple):
     kind: RowKind
-    poses: NDArray[np.float64]
+    poses: Floats
     feed: tuple[float, float]
     dwell_s: float
     line: int
@@ -304,7 +306,7 @@ class ToolpathBuilder:
         left: rows up to the last rapid.
     """
 
-    def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
+    def __init__(self, name: str, start: Floats | None = None) -> None:
         self.name = name
         self.corner_mm: float | None = None
         self.holds: dict[str, tuple[float, ...]] | None = None
@@ -326,7 +328,7 @@ class ToolpathBuilder:
         """Set the offset of following moves' numbers from their poses, shape (6,) [mm, deg]."""
         self._offset = self._offsets.setdefault(tuple(float(each) for each in offset), len(self._offsets))
 
-    def lines(self, poses: NDArray[np.float64], feed: tuple[float, float] | None, *, line: int) -> None:
+    def lines(self, poses: Floats, feed: tuple[float, float] | None, *, line: int) -> None:
         """Add a move of each of successive lines, poses of shape (k, 6) [mm, deg], at F by way and by angle; None: rapids."""
         kind = RowKind.RAPID if feed is None else RowKind.FEED
         self._add(kind, poses, feed or _NO_FEED, line=line, step=1)
@@ -335,7 +337,7 @@ class ToolpathBuilder:
         else:
             self.fed = self._count
 
-    def rapid(self, pose: NDArray[np.float64], *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
+    def rapid(self, pose: Floats, *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
         """Add a move as fast as the machine can."""
         self.unknown = unknown
         self._add(RowKind.RAPID, pose[None], line=line, in_machine=in_machine)
@@ -343,7 +345,7 @@ class ToolpathBuilder:
 
     def feed(
         self,
-        poses: NDArray[np.float64],
+        poses: Floats,
         mm_min: float,
         deg_min: float | None = None,
         *,
@@ -363,7 +365,7 @@ class ToolpathBuilder:
         self.fed = self._count
 
     @property
-    def pose(self) -> NDArray[np.float64]:
+    def pose(self) -> Floats:
         """Return where the last row ends, shape (6,) [mm, deg]."""
         return self._pose.copy()
 
@@ -375,7 +377,7 @@ class ToolpathBuilder:
     def bend(
         self,
         added: int,
-        poses: NDArray[np.float64],
+        poses: Floats,
         arc: tuple[float, float, float, float],
         plane: NDArray[np.int64],
     ) -> None:
@@ -458,18 +460,18 @@ class ToolpathBuilder:
         numbers: NDArray[np.int64] = np.arange(behind[-1] if len(count) else 0) - np.repeat(behind - count, count)
         return numbers
 
-    def _corners_mm(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _corners_mm(self, count: NDArray[np.int64]) -> Floats:
         """Return the rounding of each row; an arc as chords stops only at its own ends."""
         corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
         last = np.repeat(np.array([rows.step > 0 for rows in self._rows], dtype=np.bool_), count)
         last[np.cumsum(count) - 1] = True
-        inner: NDArray[np.float64] = np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners)
+        inner: Floats = np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners)
         return inner
 
     def _add(
         self,
         kind: RowKind,
-        poses: NDArray[np.float64],
+        poses: Floats,
         feed: tuple[float, float] = _NO_FEED,
         *,
         dwell_s: float = 0.0,
@@ -493,11 +495,11 @@ def bits_of(axes: NDArray[np.bool_]) -> int:
 
 
 def _on_arc(
-    before: NDArray[np.float64],
-    after: NDArray[np.float64],
-    arc: NDArray[np.float64],
-    share: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    before: Floats,
+    after: Floats,
+    arc: Floats,
+    share: Floats,
+) -> Floats:
     centre, turned = arc[:, :2], share * arc[:, 2]
     first, last = before - centre, after - centre
     radius = np.linalg.norm(first, axis=1)
@@ -507,19 +509,19 @@ def _on_arc(
     return centre + np.column_stack([cos * x - sin * y, sin * x + cos * y])
 
 
-def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
     """Return rows and end shares of pieces, shapes (k,), for the piece count of each row, shape (n,)."""
     row = np.repeat(np.arange(len(pieces)), pieces)
     number = np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1
     return row, number / pieces[row]
 
 
-def rounded(poses: NDArray[np.float64], decimals: Sequence[int] = DECIMALS) -> NDArray[np.float64]:
+def rounded(poses: Floats, decimals: Sequence[int] = DECIMALS) -> Floats:
     """Return poses, shape (n, 6), as programs write them, without -0."""
     return np.column_stack([np.round(poses[:, axis], places) for axis, places in enumerate(decimals)]) + 0.0
 
 
-def _norm(vectors: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+def _norm(vectors: Floats, least: float) -> Floats:
     """Return lengths of vectors, shape (n, 3), without components below `least`."""
-    length: NDArray[np.float64] = np.linalg.norm(np.where(np.abs(vectors) < least, 0.0, vectors), axis=1)
+    length: Floats = np.linalg.norm(np.where(np.abs(vectors) < least, 0.0, vectors), axis=1)
     return length

@@ -16,8 +16,7 @@ from dbbstation.nc.words import WordDialect
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.toolpath import Toolpath
 
@@ -89,7 +88,7 @@ def _curve(path: ToolpathBuilder) -> None:
     path.feed(poses[1:], 600.0)
 
 
-def _from_first(by: list[float]) -> NDArray[np.float64]:
+def _from_first(by: list[float]) -> Floats:
     return FIRST + np.array(by)
 
 

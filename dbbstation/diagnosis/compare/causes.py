@@ -20,6 +20,7 @@ from dbbstation.sources.contract import Effect, LinearSource, Need
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.sources.contract import ErrorSource, Parameter
 
@@ -100,7 +101,7 @@ class Change:
             confirm=self.source.texts.confirm,
         )
 
-    def columns(self, point: tuple[float, ...]) -> NDArray[np.float64]:
+    def columns(self, point: tuple[float, ...]) -> Floats:
         """Return reading B minus A by amplitude and way, shape (n, p)."""
         of_a = self._of(0, point) if len(self._whens) > 1 else None
         of_b = self._of(1, point)
@@ -112,7 +113,7 @@ class Change:
             found += [own, own.sum(axis=1, keepdims=True)] if self._alike else [own]
         return np.hstack(found)
 
-    def _at(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _at(self, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         found = self.columns(point)
         width = len(amplitudes) // len(self._whens)
         for k in np.flatnonzero(amplitudes).tolist():
@@ -125,7 +126,7 @@ class Change:
             found[:, k] = effect / amplitudes[k]
         return found
 
-    def _effect(self, side: int, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _effect(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         pieces, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
             values = self._values(point, np.split(amplitudes, self._sets)[group])
@@ -137,7 +138,7 @@ class Change:
     def _proportional(self) -> bool:
         return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
 
-    def _values(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _values(self, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         is_shape = np.array([bool(p.grid) for p in self._parameters])
         values = np.empty(len(is_shape))
         values[is_shape], values[~is_shape] = point, amplitudes
@@ -177,7 +178,7 @@ class Change:
         shown = tuple(v for v in values if self.source.shows(self.sides.motions[1], [*middle[:k], v, *middle[k + 1 :]]))
         return shown or values[:1]
 
-    def _of(self, side: int, point: tuple[float, ...]) -> NDArray[np.float64]:
+    def _of(self, side: int, point: tuple[float, ...]) -> Floats:
         count = len(self._amplitudes)
         values = self._values(point, np.zeros(count))
         amplitudes = [k for k, p in enumerate(self._parameters) if not p.grid]
@@ -189,9 +190,7 @@ class Change:
             pieces.append(own)
         return self.sides.averaged(side, pieces)
 
-    def _discrepancy(
-        self, effect: NDArray[np.float64], point: tuple[float, ...], amplitudes: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _discrepancy(self, effect: Floats, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         count = len(self._amplitudes) * self._sets
         total = [np.zeros(count), np.zeros(count)]
         for when, own in zip(self._whens, np.split(amplitudes, len(self._whens)), strict=True):
@@ -202,7 +201,7 @@ class Change:
         found += [self._slack(side, point, values) for side, values in enumerate(total) if values.any()]
         return np.hstack(found)
 
-    def _slack(self, side: int, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _slack(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         runs, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
             values = self._values(point, np.split(amplitudes, self._sets)[group])

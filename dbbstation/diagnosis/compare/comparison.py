@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.findings import EffectOfCause
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
     from dbbstation.inference.cancelling import Cancelling
@@ -178,8 +179,8 @@ def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
     members = settled.best.members
     columns = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
     samples = settled.bank.samples(columns)
-    values: NDArray[np.float64] = np.zeros(0)
-    covariance: NDArray[np.float64] = np.zeros((0, 0))
+    values: Floats = np.zeros(0)
+    covariance: Floats = np.zeros((0, 0))
     if members:
         estimates = settled.comparison.estimates(members)
         values, covariance = estimates.values, estimates.covariance
@@ -194,7 +195,7 @@ def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
 
 
 def _run(
-    pair: Pair, settled: Settled, rows: slice, order: NDArray[np.int64], found: NDArray[np.float64], sigmas: float
+    pair: Pair, settled: Settled, rows: slice, order: NDArray[np.int64], found: Floats, sigmas: float
 ) -> RunDifference:
     theta, count = np.radians(pair.theta_deg), len(pair.theta_deg)
     low, _ = bands(count)
@@ -234,9 +235,7 @@ def _run(
     )
 
 
-def _stated(
-    settled: Settled, rows: slice, order: NDArray[np.int64], columns: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _stated(settled: Settled, rows: slice, order: NDArray[np.int64], columns: Floats) -> Floats:
     """Return the variances of stated balls, bars and starts in a run's constant, first cosine and first sine [mm²]."""
     base = settled.channel.base
     by_angle = np.empty((len(columns), len(base.prior)))
@@ -244,7 +243,7 @@ def _stated(
     return np.asarray(np.sum((columns.T @ by_angle) ** 2, axis=1), dtype=np.float64)
 
 
-def _by_angle_um(theta_deg: NDArray[np.float64], smooth_mm: NDArray[np.float64]) -> tuple[float, ...]:
+def _by_angle_um(theta_deg: Floats, smooth_mm: Floats) -> tuple[float, ...]:
     """Return means over ten degrees from +X, 36 of them [µm]."""
     sector = (theta_deg * (SECTORS / 360.0)).astype(np.int64)
     count = np.bincount(sector, minlength=SECTORS)

@@ -16,8 +16,7 @@ from dbbstation.sources.registry import sources_named
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.settled import Settled
@@ -37,7 +36,7 @@ def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
     return found
 
 
-def _placed(sides: Sides, rows: NDArray[np.float64], share: float, taken_up: float) -> EffectOfCause:
+def _placed(sides: Sides, rows: Floats, share: float, taken_up: float) -> EffectOfCause:
     by_run = sides.by_angle(rows)
     worst = int(np.argmax([np.abs(values).max() for values in by_run]))
     pair, values = sides.pairs[worst], by_run[worst]
@@ -55,7 +54,7 @@ def _placed(sides: Sides, rows: NDArray[np.float64], share: float, taken_up: flo
     return EffectOfCause(1e3 * rms(rows), share, taken_up, opposite_share(sides, by_run), where)
 
 
-def opposite_share(sides: Sides, by_run: list[NDArray[np.float64]]) -> float:
+def opposite_share(sides: Sides, by_run: list[Floats]) -> float:
     """Return the share of squares odd in direction."""
     same, opposite = 0.0, 0.0
     for one, other in both_directions(sides.pairs):
@@ -72,7 +71,7 @@ def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
     return [(runs[0], runs[1]) for runs in by_test.values() if len(runs) == 2]  # noqa: PLR2004
 
 
-def _kinematic(sides: Sides) -> NDArray[np.float64]:
+def _kinematic(sides: Sides) -> Floats:
     """Return orthonormal kinematic columns of B's readings, shape (n, k)."""
     sources = sources_named(KINEMATIC_SOURCES)
     columns = [

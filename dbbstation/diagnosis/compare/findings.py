@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
-
+from dbbstation.computing.arrays import Floats
 from dbbstation.diagnosis.compare.pairs import Pair
 from dbbstation.facts.serialise import AsItIs, Kept
 
@@ -49,8 +47,8 @@ class RunDifference:
     peak_theta_deg: float
     by_angle_um: tuple[float, ...]
     pair: Annotated[Pair, AsItIs, Kept]
-    smooth_mm: Annotated[NDArray[np.float64], AsItIs, Kept]
-    found_mm: Annotated[NDArray[np.float64], AsItIs, Kept]
+    smooth_mm: Annotated[Floats, AsItIs, Kept]
+    found_mm: Annotated[Floats, AsItIs, Kept]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.machine.geometry import Machine
 
@@ -97,6 +96,6 @@ def _temperatures(pairs: Sequence[Pair]) -> list[str]:
     ]
 
 
-def _means(logs: Sequence[Mapping[str, NDArray[np.float64]]]) -> dict[str, float]:
+def _means(logs: Sequence[Mapping[str, Floats]]) -> dict[str, float]:
     sensors = set.intersection(*(set(log) for log in logs))
     return {sensor: float(np.mean([log[sensor].mean() for log in logs])) for sensor in sorted(sensors)}

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.trace.circle import RawCircle
@@ -47,8 +48,8 @@ class Pair:
     a: tuple[Observation, ...]
     b: tuple[Observation, ...]
     number: int
-    a_mm: NDArray[np.float64]
-    b_mm: NDArray[np.float64]
+    a_mm: Floats
+    b_mm: Floats
 
     @property
     def test(self) -> str:
@@ -71,12 +72,12 @@ class Pair:
         return f"{self.test} {self.direction} {self.number}"
 
     @property
-    def theta_deg(self) -> NDArray[np.float64]:
+    def theta_deg(self) -> Floats:
         """Return sector middles from +X towards +Y, shape (s,) [deg]."""
         return (np.arange(len(self.a_mm), dtype=np.float64) + 0.5) * (FULL_TURN_DEG / len(self.a_mm))
 
     @property
-    def difference_mm(self) -> NDArray[np.float64]:
+    def difference_mm(self) -> Floats:
         """Return B less A, interpolated over empty sectors, shape (s,) [mm]."""
         difference = self.b_mm - self.a_mm
         there = np.isfinite(difference)
@@ -161,10 +162,10 @@ class Sectors:
     count: int
     there: NDArray[np.int64]
     group: NDArray[np.int64]
-    moved: NDArray[np.float64]
+    moved: Floats
 
     @classmethod
-    def of(cls, theta_deg: NDArray[np.float64], count: int) -> Sectors:
+    def of(cls, theta_deg: Floats, count: int) -> Sectors:
         """Return sectors of samples at angles from +X, shape (n,)."""
         sector = np.minimum((theta_deg * (count / FULL_TURN_DEG)).astype(np.int64), count - 1)
         there, group = np.unique(sector, return_inverse=True)
@@ -174,7 +175,7 @@ class Sectors:
         away = middle - means(basis(np.radians(theta_deg), highest), group)
         return cls(count, there, group, away @ np.linalg.pinv(curve))
 
-    def at_middles(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at_middles(self, values: Floats) -> Floats:
         """Return samples, shape (n,) or (n, p), at sector middles, (count,) or (count, p); NaN if empty."""
         found = np.full((self.count, *values.shape[1:]), np.nan)
         averages = means(values, self.group)
@@ -182,14 +183,14 @@ class Sectors:
         return found
 
 
-def at_common_angles(raw: RawCircle, sectors: int) -> NDArray[np.float64]:
+def at_common_angles(raw: RawCircle, sectors: int) -> Floats:
     """Return raw less commanded length at sector middles, shape (sectors,) [mm]; NaN if empty."""
     poses = raw.circle.poses(raw.theta_deg)
     deviation = raw.length_mm - np.linalg.norm(poses[:, :3] - np.array(raw.circle.ball_mm), axis=1)
     return Sectors.of(raw.theta_deg, sectors).at_middles(deviation)
 
 
-def _mean(runs: Sequence[Observation], sectors: int) -> NDArray[np.float64]:
+def _mean(runs: Sequence[Observation], sectors: int) -> Floats:
     return np.asarray(np.mean([at_common_angles(run.raw, sectors) for run in runs], axis=0), dtype=np.float64)
 
 

@@ -17,8 +17,7 @@ from dbbstation.sources.registry import sources_named
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.diagnosis.shapes import Samples
@@ -47,8 +46,8 @@ ANYWHERE_MM = 1.0
 def base_of(sides: Sides) -> Base:
     """Return set-up effects of both sessions at stated sizes."""
     names: list[str] = []
-    columns: list[NDArray[np.float64]] = []
-    prior: list[NDArray[np.float64]] = []
+    columns: list[Floats] = []
+    prior: list[Floats] = []
     for source in sources_named(SET_UP):
         for name, samples, sd in _stated(sides, source):
             seen = (sd > 0.0) & samples.any(axis=0)
@@ -66,7 +65,7 @@ def base_of(sides: Sides) -> Base:
     return Base(tuple(names), np.hstack(columns), every, np.ones(len(every), dtype=bool))
 
 
-def _per_degree(pair: Pair) -> NDArray[np.float64]:
+def _per_degree(pair: Pair) -> Floats:
     """Return A's smooth slope by angle, for shifted begins, shape (s,) [mm/deg]."""
     theta, there = np.radians(pair.theta_deg), np.isfinite(pair.a_mm)
     low, _ = bands(len(theta))
@@ -76,7 +75,7 @@ def _per_degree(pair: Pair) -> NDArray[np.float64]:
     return np.asarray(np.radians(1.0) * (basis(theta, low) @ by_angle), dtype=np.float64)
 
 
-def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
+def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, Floats, Floats]]:
     """Return a source's sharing tests, columns, shape (n, p), and stated sizes, shape (p,) [mm].
 
     If runs share the error in both sessions, their variances add.
@@ -99,7 +98,7 @@ def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.flo
     return found
 
 
-def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
+def _sd(source: ErrorSource, motion: Motion) -> Floats:
     stated = source.stated_mm(motion)
     known = np.zeros(0) if stated is None else stated
     lost = source.name == "mounting" and motion.setup is not None and not motion.setup.place_known
@@ -121,9 +120,7 @@ def set_up_laws(sides: Sides) -> list[Law]:
     return found
 
 
-def _outsize(
-    source: ErrorSource, parameters: Sequence[str], sets: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]]
-) -> list[Law]:
+def _outsize(source: ErrorSource, parameters: Sequence[str], sets: Sequence[tuple[str, Floats, Floats]]) -> list[Law]:
     """Return one source's effects beyond stated size; may be empty."""
     names: list[str] = []
     choices: list[tuple[tuple[int, ...], float, str]] = []

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
@@ -73,11 +74,11 @@ class Sides:
         ends = np.cumsum([0, *(len(order) for order in self.orders)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
-    def rows(self, values_of: Callable[[Pair], NDArray[np.float64]]) -> NDArray[np.float64]:
+    def rows(self, values_of: Callable[[Pair], Floats]) -> Floats:
         """Return values at common angles as rows, shape (n,)."""
         return np.concatenate([values_of(pair)[order] for pair, order in zip(self.pairs, self.orders, strict=True)])
 
-    def averaged(self, side: int, values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def averaged(self, side: int, values: Sequence[Floats]) -> Floats:
         """Return values along one session's motions as rows, shape (n, ...)."""
         found = []
         for sectors, order, one in zip(self._sectors[side], self.orders, values, strict=True):
@@ -95,11 +96,11 @@ class Sides:
         )
         return a, b
 
-    def each_row(self, values: Sequence[float]) -> NDArray[np.float64]:
+    def each_row(self, values: Sequence[float]) -> Floats:
         """Return one value per pair as rows, shape (n,)."""
         return np.repeat(np.array(values, dtype=np.float64), [len(order) for order in self.orders])
 
-    def by_angle(self, rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    def by_angle(self, rows: Floats) -> list[Floats]:
         """Return rows by pair at common angles, shape (s,) each."""
         found = []
         for order, block in zip(self.orders, self.blocks, strict=True):

@@ -16,8 +16,7 @@ from dbbstation.machine.geometry import STRUTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.diagnosis.shapes import Samples, Shape
 
@@ -52,7 +51,7 @@ def _times(sides: Sides) -> list[Variable]:
     return both
 
 
-def of_readings(variables: Sequence[Variable], sides: Sides, time: NDArray[np.float64]) -> list[Pattern]:
+def of_readings(variables: Sequence[Variable], sides: Sides, time: Floats) -> list[Pattern]:
     """Return effects on the reading; speed appears only as direction."""
     every = patterns(variables, sides.blocks, time, None)
     return [pattern for pattern in every if pattern.family is not Family.SPEED]

@@ -12,9 +12,7 @@ from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 
@@ -59,7 +57,7 @@ class DriveForm:
     """
 
     parameters: tuple[Parameter, ...]
-    columns: Callable[[Signals, tuple[float, ...]], NDArray[np.float64]]
+    columns: Callable[[Signals, tuple[float, ...]], Floats]
     label: str = ""
     tried: float = 1.0
 

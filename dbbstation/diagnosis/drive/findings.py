@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
@@ -224,9 +223,9 @@ class FrictionCurve:
         speed_m_s: shape (c,) [m/s].
     """
 
-    speed_m_s: NDArray[np.float64]
-    force_n: NDArray[np.float64]
-    uncertainty_n: NDArray[np.float64]
+    speed_m_s: Floats
+    force_n: Floats
+    uncertainty_n: Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -262,7 +261,7 @@ class DriveFindings:
     held_out_rms_n: HeldOutForce | None
     signals: RecordedSignals
     noticed: Annotated[tuple[str, ...], Field(serialization_alias="notes")]
-    table: Annotated[Mapping[str, NDArray[np.float64]], AsItIs, Kept]
+    table: Annotated[Mapping[str, Floats], AsItIs, Kept]
     before: Annotated[Mapping[str, DriveValue], AsItIs, Kept]
     chosen: Annotated[tuple[str, ...], AsItIs, Kept]
     curve: Annotated[FrictionCurve, AsItIs, Kept]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.inference.channel import Law
     from dbbstation.inference.hypotheses import Hypothesis
@@ -42,9 +43,9 @@ class DriveFit:
 
     drive: DriveChannel
     members: tuple[Member, ...]
-    samples: NDArray[np.float64]
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    samples: Floats
+    values: Floats
+    covariance: Floats
 
     @property
     def base(self) -> dict[str, Value]:
@@ -94,7 +95,7 @@ class DriveFit:
                 found |= {name: value.value for name, value in self.parameters(member.cause.name).items()}
         return found
 
-    def force_n(self, names: Container[str] | None = None) -> NDArray[np.float64]:
+    def force_n(self, names: Container[str] | None = None) -> Floats:
         """Return the force of base and members at compared samples, shape (m,) [N]; None: all."""
         used = np.zeros(len(self.values), dtype=bool)
         used[: len(self.drive.channel.base.names)] = True
@@ -104,7 +105,7 @@ class DriveFit:
                 used[own.start : own.start + len(member.columns)] = True
         return np.asarray(self.samples[:, used] @ self.values[used], dtype=np.float64)
 
-    def weighted(self, weights: NDArray[np.float64], unit: str) -> Value:
+    def weighted(self, weights: Floats, unit: str) -> Value:
         """Return a weighted sum of values, weights of shape (k,)."""
         sigma = float(np.sqrt(max(float(weights @ self.covariance @ weights), 0.0)))
         return Value(float(weights @ self.values), sigma, unit)
@@ -128,14 +129,12 @@ def fit(
     return DriveFit(drive, tuple(members), samples, values, covariance)
 
 
-def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.float64]:
+def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> Floats:
     """Return prior standard deviations, shape (k,)."""
     return np.concatenate([np.full(len(drive.channel.base.names), np.inf), *(member.sd for member in members)])
 
 
-def _solved(
-    rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _solved(rows: Floats, sd: Floats, noise: float) -> tuple[Floats, Floats]:
     rows = triangle_of(rows)  # which says the same in as many rows as columns
     norm = np.linalg.norm(rows[:, :-1], axis=0)
     norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere: its prior alone says what it is
@@ -183,9 +182,7 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
     return float(apart.max(initial=0.0))
 
 
-def _widened(
-    settled: Settled, fitted: DriveFit, rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
-) -> DriveFit:
+def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise: float) -> DriveFit:
     """Return the fit with uncertainties widened by omitted stretches and half the band.
 
     Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
@@ -208,9 +205,7 @@ def _widened(
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 
 
-def _information(
-    settled: Settled, samples: NDArray[np.float64], sd: NDArray[np.float64], counted: float
-) -> NDArray[np.float64]:
+def _information(settled: Settled, samples: Floats, sd: Floats, counted: float) -> Floats:
     """Return the covariance of columns' coloured noise with priors, shape (k, k).
 
     Rows are divided by the square of the `counted` noise.

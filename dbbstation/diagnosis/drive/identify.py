@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
@@ -146,9 +147,7 @@ def identify(
     )
 
 
-def _table(
-    recordings: Recordings, base_n: NDArray[np.float64], model_n: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
+def _table(recordings: Recordings, base_n: Floats, model_n: Floats) -> dict[str, Floats]:
     return {
         "t_s": recordings.time_s,
         "position_mm": 1e3 * recordings.at(lambda s: s.position_m),
@@ -200,11 +199,11 @@ def _left_of_base(explained: ExplainedDrive) -> LeftOver:
     return left_over(replace(settled, posterior=alone))
 
 
-def _beyond(residual: NDArray[np.float64], sigma: float) -> float:
+def _beyond(residual: Floats, sigma: float) -> float:
     return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
 
 
-def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: NDArray[np.float64]) -> UnexplainedForces:
+def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: Floats) -> UnexplainedForces:
     recordings, settled = explained.drive.recordings, explained.settled
     least = METHOD_SHARE * recordings.scale.force_n
     effects = tuple(effect for effect in verdicts.effects() if effect.rms_n > least)

@@ -13,6 +13,7 @@ from dbbstation.inference.left_over import COUNTS_SIGMA
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.coloured import Coloured
 
@@ -25,7 +26,7 @@ SLOW = 0.1
 
 
 def locate(
-    recordings: Recordings, residual_n: NDArray[np.float64], noise: Coloured, variable: str | None
+    recordings: Recordings, residual_n: Floats, noise: Coloured, variable: str | None
 ) -> tuple[ForceLocation, ...]:
     """Return stretches of a residual, shape (m,) [N], beyond noise, largest share first, with variable."""
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
@@ -53,7 +54,7 @@ def locate(
     return tuple(found[: BOUNDS.locations])
 
 
-def _stretches(marked: NDArray[np.bool_], direction: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+def _stretches(marked: NDArray[np.bool_], direction: Floats) -> list[NDArray[np.int64]]:
     rows = np.flatnonzero(marked)
     if not len(rows):
         return []

@@ -20,6 +20,8 @@ from scipy.signal import butter, sosfiltfilt
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 ORDER = 4
 """Of the Butterworth filters; twice that after both passes."""
 
@@ -30,7 +32,7 @@ EDGE_PERIODS = 3.0
 """Periods of the cut-off over which the filters ring."""
 
 
-def low_passed(columns: NDArray[np.float64], rate_hz: float, cutoff_hz: float) -> NDArray[np.float64]:
+def low_passed(columns: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
     """Return low-passed columns, shape (n,) or (n, p), without phase shift, constant beyond ends."""
     bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
     sos = np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
@@ -38,7 +40,7 @@ def low_passed(columns: NDArray[np.float64], rate_hz: float, cutoff_hz: float) -
     return np.asarray(sosfiltfilt(sos, columns, axis=0, padtype="constant", padlen=beyond), dtype=np.float64)
 
 
-def impulse_response(rate_hz: float, cutoff_hz: float) -> NDArray[np.float64]:
+def impulse_response(rate_hz: float, cutoff_hz: float) -> Floats:
     """Return `low_passed` of an impulse, shape (2 k + 1,)."""
     reach = _reach(rate_hz, cutoff_hz)
     at = np.arange(-2 * reach, 2 * reach + 1)
@@ -67,7 +69,7 @@ def within(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
     return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
 
 
-def weights(unknown: NDArray[np.bool_], rise: int) -> NDArray[np.float64]:
+def weights(unknown: NDArray[np.bool_], rise: int) -> Floats:
     """Return weights, shape (n,): zero at unknown forces, rising to one."""
     if not unknown.any():
         return np.ones(len(unknown))
@@ -89,8 +91,8 @@ def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_
 
 
 def edge_noise_m_s2(
-    weight: NDArray[np.float64], kept: NDArray[np.int64], noise_m: float, rate_hz: float, cutoff_hz: float
-) -> NDArray[np.float64]:
+    weight: Floats, kept: NDArray[np.int64], noise_m: float, rate_hz: float, cutoff_hz: float
+) -> Floats:
     """Return the excess acceleration noise of compared samples.
 
     Returns:
@@ -108,6 +110,6 @@ def edge_noise_m_s2(
     return np.asarray(noise_m * rate_hz**2 * np.sqrt(np.maximum(more, 0.0)))
 
 
-def _of_second_difference(row: NDArray[np.float64]) -> float:
+def _of_second_difference(row: Floats) -> float:
     """Return the variance of weighted second differences of unit white noise."""
     return float(np.sum(np.diff(np.pad(row, 2), 2) ** 2))

@@ -9,13 +9,12 @@ import numpy as np
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
     from dbbstation.diagnosis.table.contract import TableSource
 
 
-def drive_columns(signals: Signals) -> dict[str, NDArray[np.float64]]:
+def drive_columns(signals: Signals) -> dict[str, Floats]:
     """Return what physics may be computed from, shape (n,) each, at all samples of a recording.
 
     `direction` is +1, -1, or 0 at standstill; `since_reversal_mm` is infinite before the first reversal.
@@ -45,7 +44,7 @@ def own_force(source: TableSource) -> DriveSource:
     """Return a source whose columns are forces [N], each a column of `COLUMNS` or computed from these."""
     shapes = [p.name for p in source.parameters() if p.grid]
 
-    def columns(signals: Signals, values: tuple[float, ...]) -> NDArray[np.float64]:
+    def columns(signals: Signals, values: tuple[float, ...]) -> Floats:
         known = drive_columns(signals)
         given = {name: known[name] for name in source.needs}
         return np.asarray(source.columns(given, dict(zip(shapes, values, strict=True))), dtype=np.float64)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.recordings import Recordings
 
@@ -64,7 +65,7 @@ def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
     return Edges(len(times), int(np.sum(_at_turns(recordings, times))), share)
 
 
-def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _at_turns(recordings: Recordings, times: Floats) -> NDArray[np.bool_]:
     """Return whether times, shape (t,), are at starts, stops or reversals."""
     found = np.zeros(len(times), dtype=bool)
     for rows, one in zip(recordings.blocks, recordings.signals, strict=True):
@@ -118,18 +119,18 @@ def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePa
     own, within = np.concatenate(columns), np.clip(np.vstack(ends), times[0], times[-1])
     values, covariance = after.values[own], after.covariance[np.ix_(own, own)]
 
-    def size(less: NDArray[np.float64]) -> Value:
+    def size(less: Floats) -> Value:
         return Value(float(less @ values), float(np.sqrt(max(float(less @ covariance @ less), 1e-300))), "N")
 
-    def differ(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    def differ(one: Floats, other: Floats) -> bool:
         found = size(one - other)
         return abs(found.value) > APART * found.uncertainty
 
-    def part(first: float, last: float, less: NDArray[np.float64]) -> CausePart:
+    def part(first: float, last: float, less: Floats) -> CausePart:
         return CausePart("", (first, last), {"force_n": size(less), "duration_s": Value(last - first, apart, "s")})
 
     edges = _distinct(np.concatenate([times[[0, -1]], within.ravel()]), apart)
-    levels: list[tuple[float, float, NDArray[np.float64]]] = []
+    levels: list[tuple[float, float, Floats]] = []
     for first, last in pairwise(edges):
         middle = 0.5 * (first + last)
         level = ((within[:, 0] < middle) & (within[:, 1] > middle)).astype(np.float64)
@@ -150,10 +151,10 @@ def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePa
 
 
 def _peak(
-    levels: list[tuple[float, float, NDArray[np.float64]]],
-    values: NDArray[np.float64],
-    differ: Callable[[NDArray[np.float64], NDArray[np.float64]], bool],
-) -> tuple[float, float, NDArray[np.float64]] | None:
+    levels: list[tuple[float, float, Floats]],
+    values: Floats,
+    differ: Callable[[Floats, Floats], bool],
+) -> tuple[float, float, Floats] | None:
     """Return the shortest outstanding level and its height, its surroundings merged; or None."""
     found: list[tuple[float, int]] = []
     for k in range(1, len(levels) - 1):
@@ -171,6 +172,6 @@ def _peak(
     return first, last, own - around
 
 
-def _distinct(times: NDArray[np.float64], apart: float) -> list[float]:
+def _distinct(times: Floats, apart: float) -> list[float]:
     rising = np.sort(times)
     return [float(part.mean()) for part in np.split(rising, np.flatnonzero(np.diff(rising) > apart) + 1)]

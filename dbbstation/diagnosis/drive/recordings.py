@@ -17,8 +17,7 @@ from dbbstation.errors import CalibrationError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
     from dbbstation.trace.drive_recording import DriveRecording
 
@@ -44,11 +43,11 @@ class Recordings:
     names: tuple[str, ...]
     signals: tuple[Signals, ...]
 
-    def compared(self, columns: Callable[[Signals], NDArray[np.float64]]) -> NDArray[np.float64]:
+    def compared(self, columns: Callable[[Signals], Floats]) -> Floats:
         """Return band columns at compared samples of all recordings, (m,) or (m, p)."""
         return np.concatenate([one.compared(columns(one)) for one in self.signals])
 
-    def at(self, values: Callable[[Signals], NDArray[np.float64]]) -> NDArray[np.float64]:
+    def at(self, values: Callable[[Signals], Floats]) -> Floats:
         """Return unfiltered values at compared samples, shape (m,)."""
         return np.concatenate([values(one)[one.kept] for one in self.signals])
 
@@ -59,12 +58,12 @@ class Recordings:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     @cached_property
-    def force_n(self) -> NDArray[np.float64]:
+    def force_n(self) -> Floats:
         """Return the band force, shape (m,) [N]."""
         return self.compared(lambda s: s.force_n)
 
     @cached_property
-    def motion(self) -> NDArray[np.float64]:
+    def motion(self) -> Floats:
         """Return band acceleration [m/s²] and speed [m/s] from the unfiltered position, shape (m, 2)."""
         return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
 
@@ -76,14 +75,14 @@ class Recordings:
         return max(float(over_one @ (over_one - over_two)) / 3.0 / max(float(over_one @ over_one), 1e-300), 0.0)
 
     @cached_property
-    def edge_noise_n(self) -> NDArray[np.float64]:
+    def edge_noise_n(self) -> Floats:
         """Return excess force noise at weight edges, shape (m,) [N]: acceleration noise times estimated mass."""
         direction = self.compared(lambda s: s.direction)
         mass = np.linalg.lstsq(np.column_stack([self.motion, direction]), self.force_n, rcond=None)[0][0]
         return np.asarray(abs(float(mass)) * np.concatenate([one.edge_noise_m_s2 for one in self.signals]))
 
     @cached_property
-    def time_s(self) -> NDArray[np.float64]:
+    def time_s(self) -> Floats:
         """Return concatenated time, shape (m,) [s]."""
         found, end = [], 0.0
         for one in self.signals:
@@ -119,7 +118,7 @@ class Recordings:
         one = self.signals[0]
         return float(np.median(np.diff(one.kept))) / one.rate_hz
 
-    def step_response(self, since: NDArray[np.float64]) -> NDArray[np.float64]:
+    def step_response(self, since: Floats) -> Floats:
         """Return the band's step response by samples since the step."""
         return np.interp(since * self.samples_apart_s, *self._response)
 
@@ -130,7 +129,7 @@ class Recordings:
         return float(np.abs(since[[0, -1]]).max()) / self.samples_apart_s
 
     @cached_property
-    def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _response(self) -> tuple[Floats, Floats]:
         one = self.signals[0]
         step = np.cumsum(impulse_response(one.rate_hz, one.cutoff_hz))
         return (np.arange(len(step)) - len(step) // 2) / one.rate_hz, step

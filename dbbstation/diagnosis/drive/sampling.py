@@ -11,8 +11,7 @@ from scipy.interpolate import CubicSpline
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.drive_recording import DriveRecording
 
 EVEN = 0.02
@@ -29,9 +28,9 @@ FEWEST = 100
 class Even:
     """Even signals, shape (n,) each, with notes."""
 
-    t_s: NDArray[np.float64]
-    position_mm: NDArray[np.float64]
-    force_n: NDArray[np.float64]
+    t_s: Floats
+    position_mm: Floats
+    force_n: Floats
     rate_hz: float
     notes: tuple[str, ...]
 
@@ -74,7 +73,7 @@ def evenly_sampled(recording: DriveRecording) -> Even:
     return Even(start + step * count, position, force, float(1.0 / step), tuple(notes))
 
 
-def _printed_resolution(t: NDArray[np.float64]) -> float:
+def _printed_resolution(t: Floats) -> float:
     """Return the stamps' printed resolution down to a microsecond [s]; zero if finer."""
     for digits in range(7):
         if np.abs(t - np.round(t, digits)).max() < 1e-3 * 10.0**-digits:

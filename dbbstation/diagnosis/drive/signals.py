@@ -37,6 +37,7 @@ from dbbstation.errors import CalibrationError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.trace.drive_recording import DriveRecording
 
 PER_CUTOFF = 2.5
@@ -91,40 +92,40 @@ class Signals:
         kept: compared samples, shape (m,).
     """
 
-    t_s: NDArray[np.float64]
-    measured_m: NDArray[np.float64]
-    position_m: NDArray[np.float64]
-    speed_m_s: NDArray[np.float64]
-    acceleration_m_s2: NDArray[np.float64]
-    force_n: NDArray[np.float64]
+    t_s: Floats
+    measured_m: Floats
+    position_m: Floats
+    speed_m_s: Floats
+    acceleration_m_s2: Floats
+    force_n: Floats
     rate_hz: float
     cutoff_hz: float
     acceleration_noise_m_s2: float
     position_noise_m: float
     standing_m_s: float
-    way: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    way: Floats
+    weight: Floats
     kept: NDArray[np.int64]
     notes: tuple[str, ...]
 
-    def compared(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def compared(self, columns: Floats) -> Floats:
         """Return weighted band means of columns, shape (n,) or (n, p)."""
         weight, share = (self.weight, self.share) if columns.ndim == 1 else (self.weight[:, None], self.share[:, None])
         found = low_passed(weight * columns, self.rate_hz, self.cutoff_hz)[self.kept]
         return np.ascontiguousarray(found / share)
 
     @cached_property
-    def share(self) -> NDArray[np.float64]:
+    def share(self) -> Floats:
         """Return the weighted share about each compared sample, shape (m,)."""
         return low_passed(self.weight, self.rate_hz, self.cutoff_hz)[self.kept]
 
     @cached_property
-    def edge_noise_m_s2(self) -> NDArray[np.float64]:
+    def edge_noise_m_s2(self) -> Floats:
         """Return excess acceleration noise of compared samples, shape (m,) [m/s²]."""
         return edge_noise_m_s2(self.weight, self.kept, self.position_noise_m, self.rate_hz, self.cutoff_hz)
 
     @cached_property
-    def direction(self) -> NDArray[np.float64]:
+    def direction(self) -> Floats:
         """Return direction of travel, shape (n,); zero at standstill and for contrary noise."""
         return np.where(self.speed_m_s * self.way > self.standing_m_s, self.way, 0.0)
 
@@ -136,7 +137,7 @@ class Signals:
         return (moving[turned] + moving[turned + 1]) // 2
 
     @cached_property
-    def since_reversal_m(self) -> NDArray[np.float64]:
+    def since_reversal_m(self) -> Floats:
         """Return travel since the last reversal, shape (n,) [m]; infinite before."""
         last = np.searchsorted(self.reversals, np.arange(len(self.t_s)), side="right") - 1
         if not len(self.reversals):
@@ -232,7 +233,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     )
 
 
-def _rests(standing: NDArray[np.bool_], force_n: NDArray[np.float64], rate_hz: float, step: int) -> list[str]:
+def _rests(standing: NDArray[np.bool_], force_n: Floats, rate_hz: float, step: int) -> list[str]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int64)))
     long = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > RESTS * step]
     if not long:
@@ -250,36 +251,36 @@ RESTS = 10
 """Samples of the comparison from which on a standstill is a rest and no reversal."""
 
 
-def derivatives(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def derivatives(position_m: Floats, rate_hz: float) -> tuple[Floats, Floats]:
     """Return speed [m/s] and acceleration [m/s²] by central differences, shape (n,) each, the latter zero at ends."""
     acceleration = np.zeros_like(position_m)
     acceleration[1:-1] = (position_m[2:] - 2.0 * position_m[1:-1] + position_m[:-2]) * rate_hz**2
     return np.gradient(position_m, 1.0 / rate_hz), acceleration
 
 
-def acceleration_over_two(position_m: NDArray[np.float64], rate_hz: float) -> NDArray[np.float64]:
+def acceleration_over_two(position_m: Floats, rate_hz: float) -> Floats:
     """Return acceleration [m/s²] over two samples each side, shape (n,), zero at ends."""
     found = np.zeros_like(position_m)
     found[2:-2] = (position_m[4:] - 2.0 * position_m[2:-2] + position_m[:-4]) * (0.5 * rate_hz) ** 2
     return found
 
 
-def _noise_floor(position_m: NDArray[np.float64], rate_hz: float) -> float:
+def _noise_floor(position_m: Floats, rate_hz: float) -> float:
     frequency, power = _spectrum(position_m, rate_hz)
     return float(np.median(power[frequency > 0.375 * rate_hz]))
 
 
-def _spectrum(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _spectrum(position_m: Floats, rate_hz: float) -> tuple[Floats, Floats]:
     frequency, power = welch(position_m, rate_hz, "hann", min(len(position_m), 4096))
     return np.asarray(frequency), np.asarray(power)
 
 
-def _acceleration_noise(floor: float, cutoff_hz: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+def _acceleration_noise(floor: float, cutoff_hz: float | Floats) -> float | Floats:
     """Return the mean square acceleration of white noise below a cut-off [m²/s⁴]."""
     return floor * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
 
 
-def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float) -> float:
+def _chosen_cutoff(position_m: Floats, rate_hz: float, floor: float) -> float:
     """Return the widest band with significant acceleration [Hz], else that of a hundred samples."""
     frequency, power = _spectrum(position_m, rate_hz)
     widest = min(rate_hz * WIDEST, HIGHEST_HZ)

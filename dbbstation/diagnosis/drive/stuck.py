@@ -11,6 +11,8 @@ from dbbstation.errors import CalibrationError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 TOGETHER = 5
 """Equal samples in a row, at the greatest or least value, that count as saturated."""
 
@@ -22,7 +24,7 @@ MOST_STUCK = 0.3
 
 
 def stuck_samples(
-    force_n: NDArray[np.float64], t_s: NDArray[np.float64], moving: NDArray[np.bool_], name: str
+    force_n: Floats, t_s: Floats, moving: NDArray[np.bool_], name: str
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Return samples with a stuck force, shape (n,), and notes; standstill does not count.
 

@@ -13,6 +13,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 RETREAT_SIGMA = 5.0
 """Standard deviations of the position by which it must retreat: noise does so once in ten thousand samples of a standing drive."""
 
@@ -30,7 +32,7 @@ def retreat_m(noise_m: float, resolution_m: float) -> float:
     return RETREAT_SIGMA * noise_m + 1.5 * resolution_m
 
 
-def resolution_of(position: NDArray[np.float64]) -> float:
+def resolution_of(position: Floats) -> float:
     """Return the position's rounding step, zero if none."""
     steps = np.abs(np.diff(position))
     steps = steps[steps > 0.0]
@@ -43,7 +45,7 @@ def resolution_of(position: NDArray[np.float64]) -> float:
     return size if float(np.median(np.abs(steps / size - np.round(steps / size)))) < WHOLE else 0.0
 
 
-def turning_points(position_m: NDArray[np.float64], retreat: float) -> NDArray[np.int64]:
+def turning_points(position_m: Floats, retreat: float) -> NDArray[np.int64]:
     """Return turning samples, rising, shape (t,)."""
     found: list[int] = []
     way = 0
@@ -65,7 +67,7 @@ def turning_points(position_m: NDArray[np.float64], retreat: float) -> NDArray[n
     return np.array(found, dtype=np.int64)
 
 
-def ways(position_m: NDArray[np.float64], turns: NDArray[np.int64]) -> NDArray[np.float64]:
+def ways(position_m: Floats, turns: NDArray[np.int64]) -> Floats:
     """Return direction, +1 or -1, shape (n,); zero without motion."""
     ends = np.concatenate([[0], turns, [len(position_m) - 1]])
     signs = np.sign(np.diff(position_m[ends]))

@@ -26,8 +26,7 @@ from dbbstation.inference.verdict import Verdict
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import Model
     from dbbstation.diagnosis.simulator.nodes import Challenge, Node
     from dbbstation.diagnosis.simulator.own import PortSource
@@ -82,7 +81,7 @@ class SimulatorComparison:
     left: LeftOver
     levels: Levels
     held_out: HeldOutError | None
-    as_simulated: NDArray[np.float64]
+    as_simulated: Floats
     nonlinear: Mapping[str, float]
     not_asked: Mapping[str, str]
     separations: tuple[SeparatingInput, ...] = ()
@@ -154,7 +153,7 @@ def find(
     return _said(nodes, base, found, held_out, as_simulated, stopped, gains=gains, matters=matters)
 
 
-def _scales(work: SimulationRuns, stated: FittedState) -> NDArray[np.float64]:
+def _scales(work: SimulationRuns, stated: FittedState) -> Floats:
     residual, outputs = work.residuals([stated])[0], len(work.model.outputs)
     noise = []
     for k in range(outputs):
@@ -171,7 +170,7 @@ def _said(
     base: Node,
     found: SearchOutcome,
     held_out: HeldOutError | None,
-    as_simulated: NDArray[np.float64],
+    as_simulated: Floats,
     stopped: str,
     *,
     gains: KnownGains | None,
@@ -305,7 +304,7 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[RefittedOfSimulator, 
     return tuple(found_parameters)
 
 
-def _uncertainties(rows: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
+def _uncertainties(rows: Floats, known: Floats) -> Floats:
     """Return standard uncertainties of unit white rows, shape (m,)."""
     normal = rows.T @ rows + np.diag(known)
     norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))

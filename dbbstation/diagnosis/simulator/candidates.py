@@ -18,8 +18,7 @@ from dbbstation.inference.patterns import DRIVEN_ODDS, log_odds
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import SimulatorPort
     from dbbstation.diagnosis.simulator.own import PortSource
 
@@ -67,9 +66,9 @@ class Candidate:
 
 def candidates(
     ports: Sequence[SimulatorPort],
-    signals: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    signals: Mapping[str, Mapping[str, Floats]],
     own: Sequence[PortSource] = (),
-    times: NDArray[np.float64] | None = None,
+    times: Floats | None = None,
 ) -> tuple[Candidate, ...]:
     """Return every form at every port.
 
@@ -109,12 +108,12 @@ def _weighed(one: Candidate, members: int, results: Collection[tuple[str, str]])
     return replace(one, log_odds=log_odds(members) + (DRIVEN_ODDS if driven else 0.0), driven=driven)
 
 
-def _span(times: NDArray[np.float64]) -> tuple[float, float]:
+def _span(times: Floats) -> tuple[float, float]:
     steps = np.diff(np.unique(times))
     return float(np.median(steps)), float(times.max() - times.min())
 
 
-def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: tuple[float, float]) -> list[Candidate]:
+def _at(port: SimulatorPort, signals: Mapping[str, Floats], span: tuple[float, float]) -> list[Candidate]:
     """Return a port's forms over varying signals, shape (calls,)."""
     found = [_candidate(port, TermForm.CONSTANT, (), ("value",), (port.unit,))]
     greatest = sizes(signals)
@@ -166,7 +165,7 @@ def _at(port: SimulatorPort, signals: Mapping[str, NDArray[np.float64]], span: t
 def _in_place(
     port: SimulatorPort,
     name: str,
-    values: NDArray[np.float64],
+    values: Floats,
     span: tuple[float, float],
     widths: tuple[float, ...],
 ) -> list[Candidate]:
@@ -208,15 +207,13 @@ def _candidate(
     )
 
 
-def inner_quantiles(values: NDArray[np.float64], count: int) -> tuple[float, ...]:
+def inner_quantiles(values: Floats, count: int) -> tuple[float, ...]:
     """Return a signal's distinct inner quantiles, rising; may be empty."""
     every = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count + 2)[1:-1]))
     return tuple(every[(every > values.min()) & (every < values.max())].tolist())
 
 
-def _curve(
-    port: SimulatorPort, values: NDArray[np.float64]
-) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
+def _curve(port: SimulatorPort, values: Floats) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
     low, high = float(values.min()), float(values.max())
     room = 0.05 * (high - low)
     inner = inner_quantiles(values, INNER)
@@ -229,7 +226,7 @@ def _per(unit: str, other: str, power: str = "") -> str:
     return f"{unit or '1'}/{f'({other})' if ' ' in other or '/' in other else other}{power}" if other else unit
 
 
-def basis(term: Term, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def basis(term: Term, values: Floats) -> Floats:
     """Return a curve's functions at signal values, shape (n, p)."""
     inside = np.clip(values, term.fixed[0], term.fixed[-1])
     splines = BSpline.design_matrix(inside, np.array(term.fixed), DEGREE).toarray()

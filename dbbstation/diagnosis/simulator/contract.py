@@ -15,8 +15,7 @@ from dbbstation.inference.memory import lagging
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import Model, SimulationRequest
     from dbbstation.diagnosis.simulator.terms import Evaluate
 
@@ -26,8 +25,8 @@ class Simulator(ABC):
 
     @abstractmethod
     def simulate(
-        self, inputs: Mapping[str, NDArray[np.float64]], parameters: Mapping[str, float], ports: Ports
-    ) -> Mapping[str, NDArray[np.float64]]:
+        self, inputs: Mapping[str, Floats], parameters: Mapping[str, float], ports: Ports
+    ) -> Mapping[str, Floats]:
         """Return outputs at recording times, shape (n,), in their units.
 
         Call `ports.NAME(t, signals)` at every step and add its value, zero unless a term is tried. Steps may repeat or

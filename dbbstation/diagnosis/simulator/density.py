@@ -13,6 +13,7 @@ from dbbstation.inference.uneven import log_student
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.channel import Channel
 
@@ -21,8 +22,8 @@ def log_density(
     work: SimulationRuns,
     channel: Channel,
     rows: NDArray[np.bool_],
-    residual: NDArray[np.float64],
-    columns: NDArray[np.float64],
+    residual: Floats,
+    columns: Floats,
 ) -> float:
     """Return log density of rows under a refit to others [Good, J. R. Stat. Soc. B 14 (1952) 107]; long-tailed noise uses Student's t.
 
@@ -36,7 +37,7 @@ def log_density(
     spread = sizes[work.output[rows]]
     whitening = noise.whitening(replace(channel, kept=rows, apart=1).stretches)
 
-    def white(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def white(values: Floats) -> Floats:
         even = (values[rows].T / spread).T
         return np.asarray(even if whitening is None else whitening @ even) / noise.innovation
 

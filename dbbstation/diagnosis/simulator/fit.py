@@ -18,12 +18,11 @@ from dbbstation.inference.triangle import rms
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import SimulatorParameter
     from dbbstation.diagnosis.simulator.work import SimulationRuns
 
-    Weigh = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    Weigh = Callable[[Floats], Floats]
 
 SPREAD = 0.3
 """Share of its value by which a parameter is started elsewhere, where neither uncertainty nor bounds are stated."""
@@ -46,14 +45,14 @@ class SimulatorFit:
     """
 
     state: FittedState
-    residual: NDArray[np.float64]
-    columns: NDArray[np.float64]
-    curved: NDArray[np.float64]
+    residual: Floats
+    columns: Floats
+    curved: Floats
     squares: float
     starts: tuple[float, ...] = ()
 
 
-def plain(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def plain(rows: Floats) -> Floats:
     """Return rows unchanged."""
     return rows
 
@@ -77,7 +76,7 @@ def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedPar
     return found
 
 
-def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[Floats, Floats]:
     """Return each number's bounds, shape (m,)."""
     low = [p.low for p in work.model.parameters]
     high = [p.high for p in work.model.parameters]
@@ -119,28 +118,26 @@ def fit(
 
 def _from(
     work: SimulationRuns, start: FittedState, weigh: Weigh, sigma: float, most_steps: int
-) -> tuple[FittedState, NDArray[np.float64]]:
+) -> tuple[FittedState, Floats]:
     low, high = bounds_of(work, start)
     if not len(low):
         return start, work.residuals([start])[0]
-    seen: dict[bytes, NDArray[np.float64]] = {}
+    seen: dict[bytes, Floats] = {}
 
-    def residual(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(numbers: Floats) -> Floats:
         if numbers.tobytes() not in seen:
             seen.clear()
             seen[numbers.tobytes()] = work.residuals([start.with_numbers(numbers)], strict=False)[0]
         return seen[numbers.tobytes()]
 
-    def weighed(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def weighed(numbers: Floats) -> Floats:
         state = start.with_numbers(numbers)
         return _weighed(work, state, residual(numbers), weigh, sigma)
 
     # Answers are asked for anew only where those that are there do not say what the last steps did.
-    about: list[
-        tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
-    ] = []  # numbers, rows and columns there
+    about: list[tuple[Floats, Floats, Floats]] = []  # numbers, rows and columns there
 
-    def columns(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+    def columns(numbers: Floats) -> Floats:
         rows = weighed(numbers)
         if about:
             before, rows_before, there = about[-1]
@@ -169,16 +166,14 @@ def _from(
     return start.with_numbers(numbers), residual(numbers)
 
 
-def _weighed(
-    work: SimulationRuns, state: FittedState, residual: NDArray[np.float64], weigh: Weigh, sigma: float
-) -> NDArray[np.float64]:
+def _weighed(work: SimulationRuns, state: FittedState, residual: Floats, weigh: Weigh, sigma: float) -> Floats:
     if not np.isfinite(residual).all():
         return np.full(len(weigh(np.zeros(len(residual)))) + len(_known(work.model.parameters, 0)[1]), np.inf)
     rows, stated = _known(work.model.parameters, len(state.numbers))
     return np.concatenate([weigh(residual) / sigma, rows @ state.numbers - stated])
 
 
-def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[Floats, Floats]:
     known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
     rows = np.zeros((len(known), max(count, len(parameters))))
     for row, (k, p) in enumerate(known):
@@ -211,7 +206,7 @@ def _elsewhere(
 
 def near(
     work: SimulationRuns, fitted: SimulatorFit, weigh: Weigh, sigma: float, rounds: int = 6
-) -> tuple[FittedState, NDArray[np.float64]]:
+) -> tuple[FittedState, Floats]:
     """Refit to some rows by simulated Gauss-Newton steps.
 
     Args:
@@ -253,7 +248,7 @@ SMALLEST = 0.1
 """Share of a step below which none is tried: the answers of all rows no longer hold there, or nothing is left to gain."""
 
 
-def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[tuple[str, tuple[str, ...]]]:
+def not_told_apart(names: Sequence[str], columns: Floats) -> list[tuple[str, tuple[str, ...]]]:
     """Return indistinguishable parameters with their substitutes."""
     norm = np.linalg.norm(columns, axis=0)
     found: list[tuple[str, tuple[str, ...]]] = []
@@ -273,5 +268,5 @@ def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[t
     return found
 
 
-def _norm(values: NDArray[np.float64]) -> float:
+def _norm(values: Floats) -> float:
     return float(np.linalg.norm(values))

@@ -14,13 +14,12 @@ from dbbstation.inference.channel import Law
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.candidates import Candidate
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
     from dbbstation.inference.channel import Discrepancy
 
-    Departures = Mapping[tuple[str, TermForm, tuple[str, ...]], NDArray[np.float64]]
+    Departures = Mapping[tuple[str, TermForm, tuple[str, ...]], Floats]
 
 FORM_UNCERTAINTY = 0.02
 """Share of its effect by which real objects depart from a form over their state, one standard deviation, as springs and geometry do in
@@ -86,7 +85,7 @@ def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candida
     """Return other terms' slack about a state; terms without effect are omitted."""
     points = [(one, point) for one in found for point in product(*(grid[::EVERY] for grid in one.grids))]
     answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
-    off: dict[tuple[str, TermForm, tuple[str, ...]], list[NDArray[np.float64]]] = {}
+    off: dict[tuple[str, TermForm, tuple[str, ...]], list[Floats]] = {}
     first = 0
     for one, _ in points:
         own = slice(first, first + len(one.term.amplitudes))
@@ -96,7 +95,7 @@ def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candida
     return {key: of_unit_size(parts) for key, parts in off.items()}
 
 
-def of_unit_size(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def of_unit_size(parts: Sequence[Floats]) -> Floats:
     """Return columns of one form, shape (n, p) each, scaled to rms one."""
     columns = np.hstack(parts)
     rms = np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)
@@ -107,7 +106,7 @@ EVERY = 2
 """Of the points of a grid every second is taken for what other forms may be off by: between them answers hardly differ."""
 
 
-def _off(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _off(columns: Floats) -> Floats:
     return of_unit_size(list(columns[::EVERY]))
 
 
@@ -125,9 +124,7 @@ def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
         return None
     columns = np.hstack(own)
 
-    def beside(
-        effect: NDArray[np.float64], _nonlinear: tuple[float, ...], _amplitudes: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def beside(effect: Floats, _nonlinear: tuple[float, ...], _amplitudes: Floats) -> Floats:
         return np.asarray(columns * float(np.sqrt(np.mean(np.square(effect)))))
 
     return beside
@@ -144,7 +141,7 @@ def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParam
     return [PerturbedParameter(key, 1e-3, k, term) for k, key in enumerate(keys)]
 
 
-def _law(one: Candidate, columns: NDArray[np.float64], size: float, off: Departures) -> Law:
+def _law(one: Candidate, columns: Floats, size: float, off: Departures) -> Law:
     rms = np.sqrt(np.mean(np.square(columns), axis=(0, 1)))
     return Law(
         name=one.name,
@@ -211,12 +208,10 @@ MOST_ANSWER = 100.0
 """Largest answer to something in the place of a signal, over the residual: beyond, the simulation runs away, or it would have shown."""
 
 
-def _between(
-    grids: tuple[tuple[float, ...], ...], columns: NDArray[np.float64]
-) -> Callable[[tuple[float, ...]], NDArray[np.float64]]:
+def _between(grids: tuple[tuple[float, ...], ...], columns: Floats) -> Callable[[tuple[float, ...]], Floats]:
     table = columns.reshape(*(len(grid) for grid in grids), *columns.shape[1:])
 
-    def at(point: tuple[float, ...]) -> NDArray[np.float64]:
+    def at(point: tuple[float, ...]) -> Floats:
         found = table
         for grid, value in zip(grids, point, strict=True):
             if len(grid) == 1:

@@ -10,8 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.terms import Term
 
 
@@ -80,8 +79,8 @@ class SimulatorRecording:
     """
 
     name: str
-    inputs: Mapping[str, NDArray[np.float64]]
-    measured: Mapping[str, NDArray[np.float64]]
+    inputs: Mapping[str, Floats]
+    measured: Mapping[str, Floats]
 
     def __len__(self) -> int:
         return len(self.inputs["t"])
@@ -113,7 +112,7 @@ class TrialInput:
 
     run: int
     about: str
-    inputs: Mapping[str, NDArray[np.float64]]
+    inputs: Mapping[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -140,5 +139,5 @@ class SimulationOutcome:
         signals: by port and name with `t`, if requested, shape (calls,).
     """
 
-    outputs: NDArray[np.float64]
-    signals: Mapping[str, Mapping[str, NDArray[np.float64]]] = field(default_factory=dict)
+    outputs: Floats
+    signals: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)

@@ -32,8 +32,7 @@ from dbbstation.inference.named_values import named_values
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.fit import Weigh
     from dbbstation.diagnosis.simulator.laws import Departures
     from dbbstation.diagnosis.simulator.own import PortSource
@@ -91,7 +90,7 @@ class Node:
         others = [one for one in self.outside if one.term.form in OFF and one.term.port in ports] if ports else []
         return {**found, **departures(self.work, self.fitted.state, others, self.size)}
 
-    def answers_of(self, name: str) -> NDArray[np.float64]:
+    def answers_of(self, name: str) -> Floats:
         """Return a term's answers, shape (n, p)."""
         first = len(self.work.model.parameters)
         for one, term in zip(self.inside, self.fitted.state.terms, strict=True):
@@ -134,7 +133,7 @@ class Node:
         laws_left = tuple(law for law in self.channel.laws if law.name not in refuted)
         return replace(self.channel, laws=laws_left)
 
-    def _law(self, one: Candidate, columns: NDArray[np.float64], numbers: Sequence[float], off: Departures) -> Law:
+    def _law(self, one: Candidate, columns: Floats, numbers: Sequence[float], off: Departures) -> Law:
         amplitudes, rms = len(one.term.amplitudes), np.sqrt(np.mean(np.square(columns), axis=0))
         usual = self.size / np.maximum(rms, 1e-300)
         usual[amplitudes:] = np.abs(numbers[amplitudes:])
@@ -241,7 +240,7 @@ class Nodes:
                     break
         return self.known.get(names)
 
-    def _beginnings(self, node: Node, one: Candidate, numbers: NDArray[np.float64]) -> list[FittedState]:
+    def _beginnings(self, node: Node, one: Candidate, numbers: Floats) -> list[FittedState]:
         amplitudes, states = len(one.term.amplitudes), []
         for share in SHARES:
             term = one.term.with_numbers([*(share * numbers[:amplitudes]), *numbers[amplitudes:]])
@@ -324,7 +323,7 @@ def _left(node: Node) -> float:
     return _rms(node.fitted.residual)
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Floats) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.sqrt(np.mean(np.square(values))))
 
@@ -342,7 +341,7 @@ def noise_of(settled: Settled) -> tuple[Weigh, float]:
     return settled.bank.whitened, settled.noise.innovation
 
 
-def spread_of(work: SimulationRuns, settled: Settled) -> NDArray[np.float64]:
+def spread_of(work: SimulationRuns, settled: Settled) -> Floats:
     """Return outputs' relative noise, shape (o,)."""
     kinds, spread = work.output[settled.channel.kept], settled.bank.spread
     return np.array([float(np.mean(spread[kinds == k])) for k in range(len(work.model.outputs))])

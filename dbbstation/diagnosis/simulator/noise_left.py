@@ -14,13 +14,12 @@ from dbbstation.inference.channel import Base, Channel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.channel import Law
 
 
-def channel_of(work: SimulationRuns, residual: NDArray[np.float64], base: Base, laws: Sequence[Law] = ()) -> Channel:
+def channel_of(work: SimulationRuns, residual: Floats, base: Base, laws: Sequence[Law] = ()) -> Channel:
     """Return the channel of all rows of a simulator's recordings."""
     outputs = work.model.outputs
     return Channel(
@@ -40,9 +39,9 @@ def channel_of(work: SimulationRuns, residual: NDArray[np.float64], base: Base, 
 
 def noise_left(
     work: SimulationRuns,
-    residual: NDArray[np.float64],
-    columns: NDArray[np.float64],
-    off: NDArray[np.float64] | None = None,
+    residual: Floats,
+    columns: Floats,
+    off: Floats | None = None,
     rows: Channel | None = None,
 ) -> Bank:
     """Return a refit's noise, measured beside all fitted columns.
@@ -68,7 +67,7 @@ def noise_left(
     return bank
 
 
-def log_probability_of(bank: Bank, residual: NDArray[np.float64], off: NDArray[np.float64], numbers: int) -> float:
+def log_probability_of(bank: Bank, residual: Floats, off: Floats, numbers: int) -> float:
     """Return rows' log probability with parameter cost [Schwarz's criterion], up to a constant.
 
     Args:

@@ -9,8 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import SimulatorPort
     from dbbstation.diagnosis.simulator.terms import Evaluate
 
@@ -35,7 +34,7 @@ class Ports:
         there = ", ".join(self.__dict__.get("_names", ()))
         raise SimulationFault(f"`ports.{name}` is no port of the model; there are {there or 'none'}")
 
-    def recorded(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+    def recorded(self) -> dict[str, dict[str, Floats]]:
         """Return times and signals of all calls by port, shape (calls,)."""
         found = {}
         for name, rows in self._kept.items():
@@ -44,9 +43,7 @@ class Ports:
             found[name] = {signal: table[:, k] for k, signal in enumerate(signals)}
         return found
 
-    def _port(
-        self, name: str, acting: Sequence[Evaluate], *, records: bool
-    ) -> Callable[..., float | NDArray[np.float64]]:
+    def _port(self, name: str, acting: Sequence[Evaluate], *, records: bool) -> Callable[..., float | Floats]:
         signals_of, kept = self._signals[name], self._kept[name]
 
         def at(t: float, signals: Mapping[str, float]) -> float:
@@ -60,7 +57,7 @@ class Ports:
                 total += act(t, signals)
             return total
 
-        def called(t: float, signals: Mapping[str, float]) -> float | NDArray[np.float64]:
+        def called(t: float, signals: Mapping[str, float]) -> float | Floats:
             if isinstance(t, np.ndarray):
                 columns = {s: np.broadcast_to(signals[s], t.shape).tolist() for s in signals_of}
                 rows = zip(*columns.values(), strict=True) if columns else ((),) * len(t)
@@ -71,7 +68,7 @@ class Ports:
         return called if records else _quickly(acting, called)
 
 
-PortCall: TypeAlias = "Callable[[float, Mapping[str, float]], float | NDArray[np.float64]]"
+PortCall: TypeAlias = "Callable[[float, Mapping[str, float]], float | Floats]"
 """What a simulator calls: time and signals to what acts there."""
 
 
@@ -82,7 +79,7 @@ def _quickly(acting: Sequence[Evaluate], called: PortCall) -> PortCall:
         only = acting[0]
         return lambda t, signals: only(t, signals) if type(t) is float else called(t, signals)
 
-    def summed(t: float, signals: Mapping[str, float]) -> float | NDArray[np.float64]:
+    def summed(t: float, signals: Mapping[str, float]) -> float | Floats:
         if type(t) is not float:
             return called(t, signals)
         total = 0.0

@@ -15,8 +15,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.verdict import OUT, Verdict
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import TrialInput
     from dbbstation.diagnosis.simulator.nodes import Nodes
     from dbbstation.diagnosis.simulator.search import SearchOutcome
@@ -118,7 +117,7 @@ def _repeated(repeats: int) -> str:
     return f"{repeats} times" if repeats > 1 else "once more"
 
 
-def _column(found: SearchOutcome, name: str) -> NDArray[np.float64]:
+def _column(found: SearchOutcome, name: str) -> Floats:
     settled, best = found.settled, found.settled.best
     if name in best.names:
         return settled.effect([name])

@@ -18,8 +18,7 @@ from scipy.linalg import null_space
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.own import PortSource
 
     Evaluate = Callable[[float, Mapping[str, float]], float]
@@ -188,7 +187,7 @@ DEGREE = 3
 """Of the splines of a curve."""
 
 
-def bends(knots: Sequence[float]) -> NDArray[np.float64]:
+def bends(knots: Sequence[float]) -> Floats:
     """Return spline coefficients without straight lines, orthonormal, shape (k, k - 2) [Greville abscissae; de Boor, A Practical Guide to Splines, ch. IX]."""
     count = len(knots) - DEGREE - 1
     means = np.array([np.mean(knots[k + 1 : k + 1 + DEGREE]) for k in range(count)])

@@ -14,8 +14,7 @@ from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import Model
     from dbbstation.diagnosis.simulator.terms import Term
 
@@ -39,10 +38,10 @@ def trial_inputs(model: Model) -> list[TrialInput]:
         return []
     share = (t - t[0]) / (t[-1] - t[0])
 
-    def made(about: str, of: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> TrialInput:
+    def made(about: str, of: Callable[[Floats], Floats]) -> TrialInput:
         return TrialInput(run, about, {**recorded.inputs, **{name: of(values) for name, values in own.items()}})
 
-    def between(values: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.float64]:
+    def between(values: Floats, height: Floats) -> Floats:
         return np.asarray(values.min() + np.ptp(values) * height)
 
     found = [made("the inputs as recorded", lambda values: values)]
@@ -72,9 +71,7 @@ def trial_inputs(model: Model) -> list[TrialInput]:
     return found
 
 
-def apart(
-    work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: NDArray[np.float64]
-) -> float:
+def apart(work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: Floats) -> float:
     """Return the standardised difference of two terms under an input."""
     model = work.model
     own = [k for k, p in enumerate(model.parameters) if p.run in {None, trial.run}]
@@ -97,7 +94,7 @@ def apart(
     return float(np.linalg.norm(beside(columns, effects[0])))
 
 
-def beside(columns: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
+def beside(columns: Floats, wanted: Floats) -> Floats:
     """Return rows beyond columns, shape (n, p), shape (n,)."""
     norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     values = np.linalg.lstsq(columns / norm, wanted, rcond=1e-10)[0]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome, TrialInput
     from dbbstation.diagnosis.simulator.terms import Term
 
@@ -57,11 +58,11 @@ class FittedState:
     terms: tuple[Term, ...] = ()
 
     @property
-    def numbers(self) -> NDArray[np.float64]:
+    def numbers(self) -> Floats:
         """Return values, then terms' numbers, shape (m,)."""
         return np.array([*self.values, *(number for term in self.terms for number in term.numbers)])
 
-    def with_numbers(self, numbers: NDArray[np.float64]) -> FittedState:
+    def with_numbers(self, numbers: Floats) -> FittedState:
         """Return the terms with other numbers, shape (m,)."""
         own, first, terms = numbers.tolist(), len(self.values), []
         for term in self.terms:
@@ -86,8 +87,8 @@ class Answers:
         seen: answering numbers, shape (m,).
     """
 
-    columns: NDArray[np.float64]
-    curved: NDArray[np.float64]
+    columns: Floats
+    curved: Floats
     seen: NDArray[np.bool_]
 
 
@@ -103,7 +104,7 @@ class SimulationRuns:
 
     model: Model
     run: Run
-    scales: NDArray[np.float64]
+    scales: Floats
     doses: dict[tuple[str, ...], float] = field(default_factory=dict)
     trial: TrialInput | None = None
 
@@ -121,7 +122,7 @@ class SimulationRuns:
         """Return rows of all runs and outputs."""
         return len(self.time)
 
-    def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
+    def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[Floats]:
         """Return simulated outputs of all rows at each state, shape (n,).
 
         Raises:
@@ -151,12 +152,12 @@ class SimulationRuns:
                 )
         return found
 
-    def residuals(self, states: Sequence[FittedState], *, strict: bool = True) -> list[NDArray[np.float64]]:
+    def residuals(self, states: Sequence[FittedState], *, strict: bool = True) -> list[Floats]:
         """Return scaled residuals, shape (n,)."""
         with np.errstate(over="ignore", invalid="ignore"):
             return [(self.measured - values) / self.scale for values in self.simulated(states, strict=strict)]
 
-    def signals(self, state: FittedState) -> dict[str, dict[str, NDArray[np.float64]]]:
+    def signals(self, state: FittedState) -> dict[str, dict[str, Floats]]:
         """Return port signals of all calls and runs."""
         runs = range(len(self.model.runs))
         answers = self.run(
@@ -245,6 +246,6 @@ def told(model: Model, ask: SimulationRequest) -> str:
 MEND = "narrow the bounds of the parameters, or mend `simulate` for these values"
 
 
-def sizes(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
+def sizes(columns: Mapping[str, Floats]) -> dict[str, float]:
     """Return signals' greatest absolute values; one for zero."""
     return {name: float(np.abs(values).max(initial=0.0)) or 1.0 for name, values in columns.items()}

@@ -21,8 +21,7 @@ from dbbstation.inference.settle import growth, moved, static_patterns
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.table.contract import TableSource
     from dbbstation.diagnosis.table.data import Table
     from dbbstation.diagnosis.table.mismatch import Mismatch
@@ -42,8 +41,8 @@ class AppliedCorrection:
         beyond: rows outside the fitted range by variable.
     """
 
-    values: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
+    values: Floats
+    uncertainty: Floats
     left_out: tuple[str, ...]
     beyond: dict[str, int]
 
@@ -97,7 +96,7 @@ def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) 
     )
 
 
-def _variances(rows: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _variances(rows: Floats, covariance: Floats) -> Floats:
     return np.asarray(np.maximum(np.sum(rows @ covariance * rows, axis=1), 0.0))
 
 
@@ -105,9 +104,7 @@ FORMED = frozenset({Family.LINEAR, Family.ONCE, Family.TWICE, Family.CURVE, Fami
 """Patterns that are their form over one variable and nothing else."""
 
 
-def _effect(
-    found: Mismatch, channel: Channel, member: Member, values: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _effect(found: Mismatch, channel: Channel, member: Member, values: Floats) -> tuple[Floats, Floats]:
     """Return a member's effect in other rows, shape (n,), and its slopes by amplitudes and slack, shape (n, p)."""
     name, bank, width = member.cause.name, found.settled.bank, len(member.variant.columns)
     slopes = np.zeros((len(channel.residual), len(values)))
@@ -131,7 +128,7 @@ def _effect(
     return effect, slopes
 
 
-def _samples(pattern: Pattern, channel: Channel, label: str) -> NDArray[np.float64]:
+def _samples(pattern: Pattern, channel: Channel, label: str) -> Floats:
     if pattern.family in FORMED and pattern.form is not None:
         (variable,) = (v for v in channel.variables if v.name == pattern.variables[0].name)
         return pattern.form.columns(variable.values)

@@ -11,8 +11,7 @@ from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy as np
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 
 class TableSource(ABC):
@@ -38,5 +37,5 @@ class TableSource(ABC):
         """Return amplitudes, and numbers with a `grid`."""
 
     @abstractmethod
-    def columns(self, variables: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, float]) -> NDArray[np.float64]:
+    def columns(self, variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
         """Return the effect of unit amplitudes, shape (n, p), in the measured unit."""

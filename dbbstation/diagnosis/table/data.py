@@ -16,8 +16,7 @@ from dbbstation.inference.variables import Kind, Variable
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.table.contract import TableSource
 
 REFITTED = 2.0
@@ -41,13 +40,13 @@ class Table:
         like: rows that effects were fitted to, if these are others.
     """
 
-    measured: NDArray[np.float64]
-    simulated: NDArray[np.float64]
+    measured: Floats
+    simulated: Floats
     unit: str
     simulated_name: str
     variables: tuple[Variable, ...]
-    derivatives: Mapping[str, NDArray[np.float64]]
-    columns: Mapping[str, NDArray[np.float64]]
+    derivatives: Mapping[str, Floats]
+    columns: Mapping[str, Floats]
     blocks: tuple[slice, ...]
     names: tuple[str, ...]
     clock: Variable | None
@@ -133,15 +132,15 @@ class Table:
         if follows is None and along in self.columns:
             follows = Variable(along, "", Kind.ANY, self.columns[along])
 
-        def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+        def columns(point: tuple[float, ...]) -> Floats:
             return np.asarray(source.columns(given, dict(zip(shaped, point, strict=True))), dtype=np.float64)
 
         return law_of(source.name, parameters, columns, form_uncertainty=source.form_uncertainty, follows=follows)
 
 
 def _sizes_of_noise(
-    variables: Sequence[Variable], time: NDArray[np.float64] | None, blocks: Sequence[slice]
-) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    variables: Sequence[Variable], time: Floats | None, blocks: Sequence[slice]
+) -> Iterator[tuple[str, Floats]]:
     """Return candidates for proportional noise: distances from range ends, and speeds."""
     for variable in variables:
         yield f"{variable.name} less its least value", variable.values - variable.low
@@ -150,14 +149,14 @@ def _sizes_of_noise(
             yield f"speed of {variable.name}", np.abs(variable.rates(time, blocks))
 
 
-def step_of(values: NDArray[np.float64]) -> float:
+def step_of(values: Floats) -> float:
     """Return the largest step of which all values, shape (n,), are multiples."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > EQUAL * np.ptp(values)]
     return float(steps.min()) if len(steps) else 0.0
 
 
-def rounding_of(values: NDArray[np.float64]) -> float:
+def rounding_of(values: Floats) -> float:
     """Return rounding's standard deviation [JCGM 100:2008, sec. F.2.2.1]."""
     return step_of(values) / float(np.sqrt(12.0))
 
@@ -166,7 +165,7 @@ EQUAL = 1e-9
 """Share of a range by which values differ that are equal."""
 
 
-def _is_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+def _is_same(one: Floats, other: Floats) -> bool:
     """Return whether columns are equal but for scale and origin, within a thousandth."""
     return abs(float(np.corrcoef(one, other)[0, 1])) > SAME
 

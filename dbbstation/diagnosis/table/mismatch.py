@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.table.contract import TableSource
     from dbbstation.diagnosis.table.data import Table
     from dbbstation.inference.cancelling import Cancelling
@@ -141,12 +142,12 @@ class Mismatch:
         return tuple(one for one in self.fitted if one.name != OFFSET)
 
     @property
-    def explained(self) -> NDArray[np.float64]:
+    def explained(self) -> Floats:
         """Return findings with base parameters over all rows, shape (n,)."""
         return self.settled.predicted()
 
     @property
-    def correction(self) -> NDArray[np.float64]:
+    def correction(self) -> Floats:
         """Return effects over variables, with base parameters, over all rows, shape (n,)."""
         return self.settled.channel.residual - left_with(self.settled, self.levels.corrects)
 
@@ -235,7 +236,7 @@ def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progres
     residual = settled.channel.residual
     parts = iter(parts_of(settled.channel))
 
-    def as_simulated(rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def as_simulated(rows: NDArray[np.bool_]) -> Floats:
         return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
 
     def choose(channel: Channel, out: NDArray[np.bool_]) -> Settled:

@@ -14,9 +14,7 @@ from dbbstation.nc.words import WordDialect
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath
 
@@ -65,9 +63,7 @@ class LinuxCNC(WordDialect):
         }
     )
 
-    def read(
-        self, text: str, name: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
-    ) -> Toolpath:
+    def read(self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
         return read_program(text, name, start=start, setup=setup)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:

@@ -16,7 +16,7 @@ from dbbstation.nc.words import CannotSayError, digits
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 COLUMNS = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed"
 """The feed of the tip in mm/min, of moves that only turn in deg/min; empty in rapids."""
@@ -49,7 +49,7 @@ class Poses(Dialect):
             lines.append(f"{form % tuple(pose)},{'' if math.isnan(feed) else digits(feed)}")
         return "\n".join(lines) + "\n"
 
-    def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:  # type: ignore[override]  # takes no setup
+    def read(self, text: str, name: str, *, start: Floats | None = None) -> Toolpath:  # type: ignore[override]  # takes no setup
         """Return the moves of a table."""
         path, faults, named = ToolpathBuilder(name, start), [], False
         for line, row in enumerate(csv.reader(text.splitlines()), 1):

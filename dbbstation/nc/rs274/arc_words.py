@@ -10,8 +10,7 @@ from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
 from dbbstation.nc.toolpath import PLANES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.state import ControlState
 
@@ -21,7 +20,7 @@ CENTRES = "IJK"
 def arc_of(
     block: ProgramBlock,
     state: ControlState,
-    target: NDArray[np.float64],
+    target: Floats,
     *,
     clockwise: bool,
     plane: int,

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.nc.toolpath import PLANES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from dbbstation.computing.arrays import Floats
 
 CHORD_ERROR_MM = 5e-5
 """How far a chord may lie inside its arc: 0.05 µm, which is 3800 chords for a full turn of 150 mm."""
@@ -44,8 +44,8 @@ class Arc:
         pieces: number of chords; 0: as many as `CHORD_ERROR_MM` needs.
     """
 
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
+    start: Floats
+    end: Floats
     centre_mm: tuple[float, float]
     clockwise: bool
     turns: int = 1
@@ -93,7 +93,7 @@ class Arc:
         rise = 3 - int(PLANES[self.plane].sum())
         return math.hypot(flat, float(self.end[rise] - self.start[rise]))
 
-    def poses(self) -> NDArray[np.float64]:
+    def poses(self) -> Floats:
         """Return end points of the chords, shape (k, 6) [mm, deg]."""
         (x, y), (first, last) = self.centre_mm, self.radii_mm()
         turned = -self.swept_rad if self.clockwise else self.swept_rad
@@ -105,14 +105,14 @@ class Arc:
         poses[-1] = self.end
         return poses
 
-    def _angle_rad(self, pose: NDArray[np.float64]) -> float:
+    def _angle_rad(self, pose: Floats) -> float:
         first, second = PLANES[self.plane]
         return math.atan2(pose[second] - self.centre_mm[1], pose[first] - self.centre_mm[0])
 
 
 def centre_by_radius(
-    start: NDArray[np.float64],
-    end: NDArray[np.float64],
+    start: Floats,
+    end: Floats,
     radius_mm: float,
     *,
     clockwise: bool,

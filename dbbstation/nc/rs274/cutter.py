@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.arcs import Arc
 
 TANGENT_RAD = 0.05
@@ -61,8 +62,8 @@ class Beside:
 
     element: Element
     added: int
-    start: NDArray[np.float64]
-    end: NDArray[np.float64]
+    start: Floats
+    end: Floats
     plane: NDArray[np.int64]
     arc: Arc | None
 
@@ -71,7 +72,7 @@ class Beside:
         """Return the place where the element ends in the plane."""
         return complex(*self.end[self.plane])
 
-    def bent(self, place: complex) -> tuple[NDArray[np.float64], tuple[float, float, float, float]]:
+    def bent(self, place: complex) -> tuple[Floats, tuple[float, float, float, float]]:
         """Return its poses and the arc of its chords if it ends elsewhere in the plane.
 
         Raises:
@@ -95,7 +96,7 @@ class Beside:
             raise NoRoomError
 
 
-def with_plane(pose: NDArray[np.float64], plane: NDArray[np.int64], place: complex) -> NDArray[np.float64]:
+def with_plane(pose: Floats, plane: NDArray[np.int64], place: complex) -> Floats:
     """Return a pose, shape (6,), with another place in a plane."""
     there = pose.copy()
     there[plane] = place.real, place.imag

@@ -25,8 +25,7 @@ from dbbstation.nc.toolpath import (
 from dbbstation.nc.words import number
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.tokens import BadLine, Word
     from dbbstation.nc.setup import ControlSetup
@@ -98,7 +97,7 @@ class Stored(NamedTuple):
 class Modes:
     """Modal state; begins as LinuxCNC does, in millimetres."""
 
-    def __init__(self, text: str, file: str, start: NDArray[np.float64] | None, setup: ControlSetup) -> None:
+    def __init__(self, text: str, file: str, start: Floats | None, setup: ControlSetup) -> None:
         self.path = ToolpathBuilder(file, start)
         self.path.ending = Ending.TEXT  # unless a block says otherwise
         self.path.units_said = False

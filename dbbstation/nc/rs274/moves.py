@@ -23,8 +23,7 @@ from dbbstation.nc.toolpath import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.cutter import Cutter, Element
     from dbbstation.nc.rs274.tokens import BadLine, Word
@@ -47,9 +46,7 @@ LEAST_F = 1e-3
 class Moves(Modes):
     """Adds moves to the toolpath."""
 
-    def _rapid(
-        self, block: ProgramBlock, target: NDArray[np.float64], axes: list[int], *, in_machine: bool = False
-    ) -> None:
+    def _rapid(self, block: ProgramBlock, target: Floats, axes: list[int], *, in_machine: bool = False) -> None:
         self._begin_move(block, target)
         unknown = (self.path.unknown & ~sum(1 << axis for axis in axes)) | bits_of(np.isnan(target))
         self.path.rapid(target, line=block.place.line, in_machine=in_machine, unknown=unknown)
@@ -80,7 +77,7 @@ class Moves(Modes):
         for letter in (*named, *POLAR):
             block.words.pop(letter, None)
 
-    def _arc(self, block: ProgramBlock, target: NDArray[np.float64]) -> Arc:
+    def _arc(self, block: ProgramBlock, target: Floats) -> Arc:
         if self._left_contour:
             raise block.place.fault(block.first_column, "the move behind G40 is an arc", "leave it straight")
         arc = arc_of(
@@ -95,7 +92,7 @@ class Moves(Modes):
             raise too_long(block)
         return arc
 
-    def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: NDArray[np.float64]) -> None:
+    def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: Floats) -> None:
         arc = self._arc(block, target) if self._motion in ARCS else None
         if self._motion != RAPID:
             self._check_feed(block, block.first_column)
@@ -116,9 +113,7 @@ class Moves(Modes):
             raise block.place.fault(block.first_column, what, remedy) from None
         self._state.pose = target
 
-    def _along(
-        self, cutter: Cutter, element: Element, arc: Arc | None, block: ProgramBlock, target: NDArray[np.float64]
-    ) -> None:
+    def _along(self, cutter: Cutter, element: Element, arc: Arc | None, block: ProgramBlock, target: Floats) -> None:
         plane, last = PLANES[self._plane], self._beside
         if last is None:
             element = cutter.entered(element, element.begin) if arc else element
@@ -143,7 +138,7 @@ class Moves(Modes):
             self._beside.check(element.swept_rad)
         self._piece(block, there, arc)
 
-    def _piece(self, block: ProgramBlock, target: NDArray[np.float64], arc: Arc | None = None) -> None:
+    def _piece(self, block: ProgramBlock, target: Floats, arc: Arc | None = None) -> None:
         line = block.place.line
         if self._motion == RAPID:
             self.path.rapid(target, line=line)
@@ -168,7 +163,7 @@ class Moves(Modes):
     def _cut(
         self,
         block: ProgramBlock,
-        poses: NDArray[np.float64],
+        poses: Floats,
         length: tuple[float, float],
         *,
         in_machine: bool = False,
@@ -182,7 +177,7 @@ class Moves(Modes):
         self.path.feed(poses, *speed, line=block.place.line, in_machine=in_machine, arc=arc, unknown=unknown)
         self._state.pose = poses[-1]
 
-    def _begin_move(self, block: ProgramBlock, target: NDArray[np.float64]) -> None:
+    def _begin_move(self, block: ProgramBlock, target: Floats) -> None:
         if not self._moved:
             if self._given and self._motion != RAPID:  # the begin of a cut is corrected as well
                 self.path.rapid(self._state.pose, line=block.place.line)
@@ -209,7 +204,7 @@ class Moves(Modes):
                 column, f"{name('G', self._motion or 0.0)} without a feed", "give F in this line or before"
             )
 
-    def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> NDArray[np.float64]:
+    def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> Floats:
         """Return the pose that a block leads to in machine coordinates, shape (6,)."""
         target: list[float] = self._state.pose.tolist()  # six numbers are sooner done without arrays
         offset = (0.0,) * 6 if in_machine else self._state.offset
@@ -291,7 +286,7 @@ class Moves(Modes):
         for letter in (*named, *POLAR):
             block.words.pop(letter, None)
 
-    def _target_of_cycle(self, block: ProgramBlock) -> NDArray[np.float64]:
+    def _target_of_cycle(self, block: ProgramBlock) -> Floats:
         motion, self._motion = self._motion, RAPID
         target = self._target(block)
         self._motion = motion

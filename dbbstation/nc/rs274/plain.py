@@ -11,6 +11,8 @@ from dbbstation.machine.compiled import compiled, inlined
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
+
 LEAST_LINES, MOST_LINES = 4, 20_000
 """Lines that are read at once: fewer are sooner read one by one."""
 
@@ -38,9 +40,9 @@ class PlainLines(NamedTuple):
     """
 
     numbers: NDArray[np.int64]
-    motion: NDArray[np.float64]
-    feed: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    motion: Floats
+    feed: Floats
+    axes: Floats
 
 
 def letters_of(text: str) -> NDArray[np.uint8]:
@@ -137,9 +139,9 @@ def _number(letters: NDArray[np.uint8], at: int) -> tuple[int, int, int]:
     return (at, sign * value, places) if count else (-1, 0, 0)
 
 
-def going_on(values: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:
+def going_on(values: Floats, before: Floats) -> Floats:
     """Return modal values, shape (n, k), each NaN as the value above it; `before`, shape (k,), stands above the first."""
     known = np.vstack([before, values])
     at = np.where(np.isnan(known), 0, np.arange(len(known))[:, None])
-    filled: NDArray[np.float64] = np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]
+    filled: Floats = np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]
     return filled

@@ -24,8 +24,7 @@ from dbbstation.nc.toolpath import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.flow import Flow
     from dbbstation.nc.rs274.tokens import Place
 
@@ -42,9 +41,7 @@ PAUSE, OPTIONAL_STOP = 0.0, 1.0
 ENDS = frozenset({2.0, 30.0})
 
 
-def read_program(
-    text: str, file: str, *, start: NDArray[np.float64] | None = None, setup: ControlSetup | None = None
-) -> Toolpath:
+def read_program(text: str, file: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
     """Return what a program commands.
 
     Args:

@@ -12,8 +12,7 @@ from dbbstation.nc.toolpath import SYSTEMS
 from dbbstation.nc.words import digits
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.tokens import BadLine, Word
     from dbbstation.nc.setup import ControlSetup
@@ -34,7 +33,7 @@ class ControlState:
         tool: in the spindle; None if not known.
     """
 
-    def __init__(self, setup: ControlSetup, pose: NDArray[np.float64]) -> None:
+    def __init__(self, setup: ControlSetup, pose: Floats) -> None:
         self.setup, self.pose, self.unit_mm, self.system = setup, pose, 1.0, 1
         self.lengths, self.diameters = dict(setup.lengths), dict(setup.diameters)
         self.tools_set: set[int] = set()

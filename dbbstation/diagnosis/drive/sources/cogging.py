@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 
@@ -47,6 +46,6 @@ class Cogging(DriveSource):
         return tuple(found)
 
 
-def _columns(signals: Signals, period_mm: tuple[float, ...]) -> NDArray[np.float64]:
+def _columns(signals: Signals, period_mm: tuple[float, ...]) -> Floats:
     angle = 2.0 * np.pi * 1e3 * signals.position_m / period_mm[0]
     return np.column_stack([np.cos(angle), np.sin(angle)])

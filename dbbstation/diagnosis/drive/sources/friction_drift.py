@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 5.0)
@@ -53,7 +52,7 @@ class FrictionDrift(DriveSource):
         )
 
 
-def _growth(signals: Signals, time_constant_s: float) -> NDArray[np.float64]:
+def _growth(signals: Signals, time_constant_s: float) -> Floats:
     since = signals.t_s - signals.t_s[0]
     done = -np.expm1(-since / time_constant_s)
     return np.asarray(done / done[-1] - np.mean(done / done[-1]))

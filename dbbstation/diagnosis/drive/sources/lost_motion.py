@@ -12,8 +12,7 @@ from dbbstation.diagnosis.drive.sources.coulomb_friction import MOST_OF_COULOMB
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 GAPS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
@@ -56,7 +55,7 @@ class LostMotion(DriveSource):
         return values["lost_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 
-def _columns(signals: Signals, shape: tuple[float, ...]) -> NDArray[np.float64]:
+def _columns(signals: Signals, shape: tuple[float, ...]) -> Floats:
     gap_mm, rise = shape
     since = 1e3 * signals.since_reversal_m
     missing = np.clip((gap_mm * (1.0 + rise) - since) / (gap_mm * rise), 0.0, 1.0)

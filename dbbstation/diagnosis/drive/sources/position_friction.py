@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 
@@ -36,7 +34,7 @@ class PositionFriction(DriveSource):
         bow = Parameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
         middle, half = 0.5 * (scale.low_m + scale.high_m), 0.5 * scale.travel_m
 
-        def place(signals: Signals) -> NDArray[np.float64]:
+        def place(signals: Signals) -> Floats:
             return (signals.position_m - middle) / half
 
         return (

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 POWERS = (1.5, 2.0, 2.5, 3.0)
@@ -41,7 +40,7 @@ class PowerLawFriction(DriveSource):
         power = Parameter("power", "1", 1.0, "exponent of the speed", POWERS)
         top = scale.speed_m_s
 
-        def columns(one: Signals, exponent: tuple[float, ...]) -> NDArray[np.float64]:
+        def columns(one: Signals, exponent: tuple[float, ...]) -> Floats:
             return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent[0])[:, None]
 
         return (DriveForm((size, power), columns),)

@@ -12,8 +12,7 @@ from dbbstation.diagnosis.drive.sources.coulomb_friction import MOST_OF_COULOMB
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
@@ -57,5 +56,5 @@ class Presliding(DriveSource):
         return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 
-def _columns(signals: Signals, length_mm: tuple[float, ...]) -> NDArray[np.float64]:
+def _columns(signals: Signals, length_mm: tuple[float, ...]) -> Floats:
     return (-2.0 * signals.direction * np.exp(-1e3 * signals.since_reversal_m / length_mm[0]))[:, None]

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.02, 0.04, 0.07, 0.1, 0.14, 0.2, 0.28)
@@ -41,5 +40,5 @@ class StribeckFriction(DriveSource):
         return (DriveForm((size, speed), _columns),)
 
 
-def _columns(signals: Signals, speed_m_s: tuple[float, ...]) -> NDArray[np.float64]:
+def _columns(signals: Signals, speed_m_s: tuple[float, ...]) -> Floats:
     return (signals.direction * np.exp(-np.abs(signals.speed_m_s) / speed_m_s[0]))[:, None]

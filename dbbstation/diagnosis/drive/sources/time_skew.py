@@ -11,8 +11,7 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Paramete
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
 
 MOST_SAMPLES = 5.0
@@ -44,6 +43,6 @@ class ForceTimeSkew(DriveSource):
         return abs(values.get("delay_ms", 0.0)) <= MOST_SAMPLES * 1e3 * scale.sample_s
 
 
-def _columns(signals: Signals, _: tuple[float, ...]) -> NDArray[np.float64]:
+def _columns(signals: Signals, _: tuple[float, ...]) -> Floats:
     # The low-pass of the comparison bounds what the difference makes of noise.
     return -1e-3 * np.gradient(signals.force_n, 1.0 / signals.rate_hz)[:, None]

@@ -41,7 +41,7 @@ from dbbstation.inference.uneven import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
@@ -71,6 +71,7 @@ class Bank:
         measures_beside_members: `measure` uses the hypothesis's residual, not everything's.
         grows_with: variable of the variance; may be empty.
         nameless: causes that do not count as the name of an effect.
+        refused: laws that cannot be, with the reason.
     """
 
     nameless: frozenset[str] = frozenset()
@@ -79,6 +80,7 @@ class Bank:
         self.channel = channel
         self.measures_beside_members, self.long_tails = False, False
         self.patterns: dict[str, Pattern] = {}
+        self.refused: dict[str, str] = {}
         self.laws: dict[str, Law] = {law.name: law for law in channel.laws}
         self.noise = Coloured(channel.size)
         self.whitening: csr_array | None = None
@@ -95,17 +97,15 @@ class Bank:
         other: Bank = copy(self)
         other.patterns, other._of_patterns = dict(self.patterns), dict(self._of_patterns)
         other._of_laws, other._everywhere = dict(self._of_laws), list(self._everywhere)
+        other.refused = dict(self.refused)
         other._columns = self._columns.copy()
         return other
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """Return all causes, laws first."""
-        return (*self._of_laws.values(), *self._of_patterns.values())
-
-    def but_for(self, refused: Container[str]) -> list[Cause]:
-        """Return causes without refused ones."""
-        return [cause for cause in self.causes if cause.name not in refused]
+        """Return all causes that can be, laws first."""
+        every = (*self._of_laws.values(), *self._of_patterns.values())
+        return tuple(cause for cause in every if cause.name not in self.refused)
 
     def worthy(self, left: Left, found: Sequence[Pattern]) -> list[Pattern]:
         """Return patterns worth their prior odds beside the fit."""
@@ -317,7 +317,7 @@ class Bank:
             scan = beside.comparison(self.target).scan((), found)
             idle = {c.name for c, worth in zip(found, scan.log_factor, strict=True) if worth + c.log_prior_odds <= 0.0}
         sd = np.zeros(self._columns.count)
-        for cause in self.but_for(idle):
+        for cause in (one for one in self.causes if one.name not in idle):
             for variant in cause.variants:
                 sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
         return sd

@@ -21,7 +21,7 @@ from dbbstation.inference.blocks import Block, Columns, compress
 from dbbstation.inference.square_root import lost_directions, solve
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -88,6 +88,7 @@ class Law:
         way: `direction` or `late` outside families; empty: by value.
         acts_once: no other rows can show it.
         confirm: a measurement that shows it by itself; empty if unknown.
+        possible: whether values of it and of the laws beside it, by name, can be.
     """
 
     name: str
@@ -112,6 +113,7 @@ class Law:
     way: str = ""
     acts_once: bool = False
     confirm: str = ""
+    possible: Callable[[Mapping[str, float]], bool] = lambda _: True
 
     def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return usual amplitudes, shape (p,), of columns, shape (n, p)."""

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
+    from dbbstation.facts.value import Value
     from dbbstation.inference.channel import Law
 
 NEGATIVE_SIGMA = 3.0
@@ -35,6 +38,14 @@ def beyond_reach(law: Law, rms: float) -> str:
     if law.family is None or law.reach is None or rms <= BEYOND * law.reach:
         return ""
     return f"It would have to be {rms / law.reach:.2g} times the difference itself, and cancel with others."
+
+
+def impossible_beside(law: Law, values: Mapping[str, Value], every: Mapping[str, float]) -> str:
+    """Return why values of a law cannot be beside those of others, by name, or an empty text."""
+    if law.possible(every):
+        return ""
+    shown = ", ".join(f"{name} {value.value:.3g} {value.unit}" for name, value in values.items())
+    return f"It would have to be {shown}, which it cannot be beside the rest: something else is at work."
 
 
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:

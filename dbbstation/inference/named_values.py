@@ -10,7 +10,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
-from dbbstation.inference.settle import growth, moved
+from dbbstation.inference.model_comparison import amplitude_size
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -62,6 +62,28 @@ def values_of_law(
         u = float(np.sqrt(max(slopes @ covariance[:2, :2] @ slopes, 0.0)))
         found["zero"] = Value(law.zero_from - moved_by, u, law.variables[0].unit)
     return found
+
+
+def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:
+    """Return nonlinear parameters moved along tangents within grids.
+
+    Args:
+        per: `growth` for tangents of another form.
+    """
+    nonlinear = list(member.variant.nonlinear)
+    if len(member.variant.slack):
+        for k, grid in enumerate(law.grids):
+            by = values[len(member.variant.columns) + k] / per
+            nonlinear[k] = float(np.clip(nonlinear[k] + by, grid[0], grid[-1]))
+    return tuple(nonlinear)
+
+
+def growth(member: Member, values: NDArray[np.float64]) -> float:
+    """Return a member's amplitudes over those of its tangents."""
+    if not len(member.variant.slack):
+        return 1.0
+    size = amplitude_size(member, values[: len(member.variant.columns)])
+    return size / member.variant.slack_at if size > 0.0 else 1.0
 
 
 def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:

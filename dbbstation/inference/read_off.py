@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping  # noqa: TC003 - types of fields are read when results are written
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -12,9 +13,9 @@ from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.by_level import VerdictsByLevel
-from dbbstation.inference.impossible import impossible
+from dbbstation.inference.impossible import impossible, impossible_beside
 from dbbstation.inference.model_comparison import SCALES
-from dbbstation.inference.named_values import named_values, with_jackknife
+from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
@@ -322,12 +323,25 @@ class CauseJudge:
         if not alike and not any(shown.variant.positive):
             return ""
         found = self._settled.comparison.estimates([shown, *self._best.without(*alike)])
-        width = len(shown.variant.columns)
+        width = len(shown.columns)
         return self._impossible(shown, found.values[:width], found.covariance[:width, :width])
 
     def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
         law = self._settled.bank.laws.get(shown.cause.name)
-        return impossible(law, values, np.diag(covariance)) if law is not None and any(law.positive) else ""
+        if law is None:
+            return ""
+        own = values_of_law(law, shown, values, covariance, law.form_uncertainty)
+        every = self._of_laws | {name: value.value for name, value in own.items()}
+        # What is negative by less than its uncertainty allows may be zero.
+        every |= {name: max(every[name], 0.0) for name, sign in zip(law.parameters, law.positive, strict=False) if sign}
+        return impossible(law, values, np.diag(covariance)) or impossible_beside(law, own, every)
+
+    @cached_property
+    def _of_laws(self) -> dict[str, float]:
+        """Return values of all laws of the best set by name."""
+        laws = self._settled.bank.laws
+        told = [values_of_law(laws[n], m, *self._values[n], 0.0).items() for n, m in self._members.items() if n in laws]
+        return {name: value.value for values in told for name, value in values}
 
     def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
         seen = self._seen(cause, self._best.members)

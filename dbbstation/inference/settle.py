@@ -11,18 +11,17 @@ from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
-from dbbstation.inference.impossible import beyond_reach, impossible
-from dbbstation.inference.model_comparison import amplitude_size
+from dbbstation.inference.impossible import beyond_reach, impossible, impossible_beside
+from dbbstation.inference.named_values import moved, values_of_law
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import Beginning, Settled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.inference.channel import Channel, Law
+    from dbbstation.facts.value import Value
+    from dbbstation.inference.channel import Channel
     from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.patterns import Pattern
@@ -80,13 +79,13 @@ def settle(
             continue
         share = stages - number
         if one in BESIDE_NOTHING:
-            found.append(_from(laid_out.copy(), (), {}, one, how.part(share), found))
+            found.append(_from(laid_out.copy(), (), one, how.part(share), found))
             continue
         if begun is None:
             # What stands beside everything is worked out once, and gone on with under each kind of noise.
             bank = laid_out.copy()
             begun, share = (bank, _settled(bank, how.part(share))), share - 1
-        found.append(_from(begun[0].copy(), begun[1].best.members, begun[1].refused, one, how.part(share), found))
+        found.append(_from(begun[0].copy(), begun[1].best.members, one, how.part(share), found))
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
 
@@ -107,13 +106,12 @@ LONG_TAILS = (Beginning.EVERYTHING_LONG_TAILS, Beginning.NOTHING_LONG_TAILS)
 def _from(
     bank: Bank,
     members: tuple[Member, ...],
-    refused: Mapping[str, str],
     beginning: Beginning,
     how: _How,
     known: Sequence[Settled],
 ) -> Settled:
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
-    settled = _settled(bank, how, members, refused, known)
+    settled = _settled(bank, how, members, known)
     if settled.bank is not bank:
         return replace(settled, beginning=beginning)
     return replace(settled, beginning=beginning, log_probability=log_probability(bank, settled.best.members))
@@ -148,13 +146,11 @@ def _settled(
     bank: Bank,
     how: _How,
     best: tuple[Member, ...] = (),
-    impossible: Mapping[str, str] | None = None,
     known: Sequence[Settled] = (),
 ) -> Settled:
     channel, look, work = bank.channel, how.look, how.work
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
-    refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
     most_probable, times_placed = -np.inf, 0
@@ -166,17 +162,17 @@ def _settled(
         _measured(bank, best, work)
         starts: list[tuple[Member, ...]] = []
         if looking:
-            best, starts = _looked_about(bank, best, refused, how, first=blank and compared is None)
-            if compared is not None and _would_be_the_same(compared, bank, best, refused):
+            best, starts = _looked_about(bank, best, how, first=blank and compared is None)
+            if compared is not None and _would_be_the_same(compared, bank, best):
                 return compared
         how.progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
-        causes = bank.but_for(refused)
+        causes = bank.causes
         starts = [grown(comparison, causes, members, work) for members in (*starts, best)]
         posterior = search(comparison, causes, [*starts, *seeds.values()], how.most_expanded, work=work)
         seeds |= {h.names: h.members for h in posterior.hypotheses[: BOUNDS.seeds]}
-        settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
+        settled = met = Settled(channel, bank, bank.noise, causes, comparison, posterior, dict(bank.refused))
         best = posterior.best.members
         compared = settled if looking else None
         if rough := _rough(settled, laid_out, work):
@@ -184,7 +180,7 @@ def _settled(
             _lay_out(bank, beside, posterior.best, rough)
             continue
         if cannot := _impossible(settled):
-            refused |= cannot
+            bank.refused |= cannot
             continue
         if times_placed < BOUNDS.placed and (moved := _placed(bank, best)):
             times_placed += 1
@@ -215,8 +211,8 @@ def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
     return better if [one.cause.name for one in better] != [one.cause.name for one in members] else ()
 
 
-def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member], refused: Mapping[str, str]) -> bool:
-    there = {cause.name: cause.variants for cause in bank.but_for(refused)}
+def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member]) -> bool:
+    there = {cause.name: cause.variants for cause in bank.causes}
     before = {cause.name: cause.variants for cause in compared.causes}
     same = {member.cause.name for member in best} == compared.best.names and there == before
     return same and alike(bank.noise, compared.noise)
@@ -230,7 +226,6 @@ def _measured(bank: Bank, members: Sequence[Member], work: SearchWork) -> Colour
 def _looked(
     bank: Bank,
     members: tuple[Member, ...],
-    refused: Mapping[str, str],
     how: _How,
     *,
     in_time: bool = True,
@@ -245,7 +240,7 @@ def _looked(
         noise = _measured(bank, members, work)
         how.progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
-        more = places_anew(bank, grown(comparison, bank.but_for(refused), members, work), set(new))
+        more = places_anew(bank, grown(comparison, bank.causes, members, work), set(new))
         fresh = set(bank.patterns) - known
         taken = {member.cause.name for member in more}
         # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
@@ -264,7 +259,6 @@ def _looked(
 def _looked_about(
     bank: Bank,
     best: tuple[Member, ...],
-    refused: Mapping[str, str],
     how: _How,
     *,
     first: bool,
@@ -274,10 +268,10 @@ def _looked_about(
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
         # follow variables have a start of their own, and what comes at once has one beside the laws alone.
         begun = _grown_in(bank)
-        starts.append(_looked(bank, begun, refused, how, in_time=False))
+        starts.append(_looked(bank, begun, how, in_time=False))
         laws = tuple(member for member in begun if member.cause.name in bank.laws)
-        starts.append(_looked(bank, laws, refused, how) if laws else ())
-    best = _looked(bank, best, refused, how, in_time=how.in_time)
+        starts.append(_looked(bank, laws, how) if laws else ())
+    best = _looked(bank, best, how, in_time=how.in_time)
     return best, starts
 
 
@@ -393,44 +387,30 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
     return (value,)
 
 
-def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:
-    """Return nonlinear parameters moved along tangents within grids.
-
-    Args:
-        per: `growth` for tangents of another form.
-    """
-    nonlinear = list(member.variant.nonlinear)
-    if len(member.variant.slack):
-        for k, grid in enumerate(law.grids):
-            by = values[len(member.variant.columns) + k] / per
-            nonlinear[k] = float(np.clip(nonlinear[k] + by, grid[0], grid[-1]))
-    return tuple(nonlinear)
-
-
-def growth(member: Member, values: NDArray[np.float64]) -> float:
-    """Return a member's amplitudes over those of its tangents."""
-    if not len(member.variant.slack):
-        return 1.0
-    size = amplitude_size(member, values[: len(member.variant.columns)])
-    return size / member.variant.slack_at if size > 0.0 else 1.0
-
-
 def _impossible(settled: Settled) -> dict[str, str]:
-    """Return laws whose values cannot be: significantly negative, or many times the difference."""
-    members = settled.best.members
+    """Return laws whose values cannot be: significantly negative, many times the difference, or not beside the others."""
+    members, laws = settled.best.members, settled.bank.laws
     if not members:
         return {}
     estimates = settled.comparison.estimates(members)
     found: dict[str, str] = {}
+    own: dict[str, dict[str, Value]] = {}
     first = 0
     for member in members:
-        law = settled.bank.laws.get(member.cause.name)
-        own = slice(first, first + len(member.variant.columns))
-        values, variances, why = estimates.values[own], np.diag(estimates.covariance)[own], ""
-        if law is not None:
-            effect = settled.bank.samples(member.variant.columns) @ values
-            why = impossible(law, values, variances) or beyond_reach(law, float(np.std(effect)))
-        if why:
-            found[member.cause.name] = why
-        first += len(member.columns)
-    return found
+        name, part = member.cause.name, slice(first, first + len(member.columns))
+        first = part.stop
+        if name not in laws:
+            continue
+        width, values, covariance = (
+            len(member.variant.columns),
+            estimates.values[part],
+            estimates.covariance[part, part],
+        )
+        effect = settled.bank.samples(member.variant.columns) @ values[:width]
+        why = impossible(laws[name], values[:width], np.diag(covariance)[:width])
+        if why := why or beyond_reach(laws[name], float(np.std(effect))):
+            found[name] = why
+        own[name] = values_of_law(laws[name], member, values, covariance, laws[name].form_uncertainty)
+    every = {parameter: value.value for values in own.values() for parameter, value in values.items()}
+    beside = {name: impossible_beside(laws[name], values, every) for name, values in own.items()}
+    return {name: why for name, why in beside.items() if why} | found

@@ -393,7 +393,7 @@ def test_a_spent_search_that_meets_an_earlier_outcome_is_judged_in_its_columns(r
     first = settle(whole, look=False, static=False, beginnings=(Beginning.NOTHING,))
     monkeypatch.setattr(settling, "_meets", lambda *_: True)
     how = settling._How(look=False, static=False, work=SearchWork(1.0))
-    spent = settling._from(Bank(whole), (), {}, Beginning.NOTHING, how, [first])
+    spent = settling._from(Bank(whole), (), Beginning.NOTHING, how, [first])
     assert first.best.members[0].columns.max() >= Bank(whole).count
     assert spent.stopped
     assert spent.log_probability == first.log_probability

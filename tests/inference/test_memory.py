@@ -13,7 +13,7 @@ from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.memory import lagging, memory_laws
 from dbbstation.inference.model_comparison import Member
-from dbbstation.inference.settle import growth, moved
+from dbbstation.inference.named_values import growth, moved
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
 from tests.diagnosis.table.nulls import moving, table_of

@@ -22,7 +22,7 @@ from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import SURE, Acts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -80,7 +80,6 @@ def drive_channel(
     recordings: Recordings,
     sources: Sequence[DriveSource],
     base: Sequence[str] = (MASS, VISCOUS),
-    refused: Collection[str] = (),
 ) -> DriveChannel:
     """Make the channel of recordings."""
     variables = _variables(recordings)
@@ -96,9 +95,8 @@ def drive_channel(
     for source in sources:
         for form in source.forms(scale):
             name = f"{source.name} {form.label}".strip()
-            if name not in refused:
-                of_law[name] = (source, form)
-                laws.append(_law(name, source, form, recordings, variables))
+            of_law[name] = (source, form)
+            laws.append(_law(name, source, form, recordings, variables))
     channel = Channel(
         residual=recordings.force_n,
         unit="N",
@@ -173,6 +171,14 @@ def _law(
     def columns(values: tuple[float, ...]) -> NDArray[np.float64]:
         return recordings.compared(lambda signals: form.columns(signals, values))
 
+    positive = [p.name for p in form.amplitudes if p.positive]
+
+    def possible(values: Mapping[str, float]) -> bool:
+        # What comes out negative is probably zero.
+        return min((values[name] for name in positive), default=0.0) >= 0.0 and source.possible(
+            values, recordings.scale
+        )
+
     odds = np.log(source.prior_probability / (1.0 - source.prior_probability)) - np.log(form.tried)
     along = "time" if source.varies_with.startswith("time") else "position"
     return law_of(
@@ -186,6 +192,7 @@ def _law(
         way="direction" if source.varies_with.endswith(" by direction") else "",
         acts_once=acts(source.name) is Acts.ONCE,
         confirm=source.texts.confirm,
+        possible=possible,
     )
 
 

@@ -28,17 +28,15 @@ class ExplainedDrive:
     settled: Settled
     before: DriveFit
     after: DriveFit
-    refused: Mapping[str, str] = field(default_factory=dict)
     dropped: Mapping[str, str] = field(default_factory=dict)
 
 
 def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> ExplainedDrive:
-    """Compare sets of causes, refusing impossible ones."""
-    refused: dict[str, str] = {}
+    """Compare sets of causes, leaving out an impossible mass or friction."""
     dropped: dict[str, str] = {}
     for number in range(DRIVES.rounds):
         base = [name for name in (MASS, VISCOUS) if name not in dropped]
-        drive = drive_channel(recordings, sources, base, refused)
+        drive = drive_channel(recordings, sources, base)
         settled = settle(
             drive.channel,
             most_expanded=DRIVES.expanded_of_table,
@@ -50,12 +48,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
         after = fit(drive, settled, settled.best.members)
         if number == 0:
             first = fit(drive, settled, ())
-        last = number == DRIVES.rounds - 1
-        impossible = _impossible(drive, after)
-        if impossible and not last:
-            refused |= impossible
-            continue
-        if after.impossible and not last and len(base) > 1:
+        if after.impossible and number < DRIVES.rounds - 1 and len(base) > 1:
             name = after.impossible[0]
             value = after.base[name]
             dropped[name] = (
@@ -64,7 +57,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
             continue
         break
     after = measured(drive, settled, settled.best.members)
-    return ExplainedDrive(drive, settled, first, after, {**refused, **settled.refused}, dropped)
+    return ExplainedDrive(drive, settled, first, after, dropped)
 
 
 POINTS_TO = {
@@ -90,23 +83,3 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
         top = max(top, hypotheses[number].log_posterior)
     found = Posterior(tuple(sorted(hypotheses, key=lambda h: -h.log_posterior)), weights)
     return replace(settled, posterior=found)
-
-
-def _impossible(drive: DriveChannel, fitted: DriveFit) -> dict[str, str]:
-    """Return impossible laws by their sources.
-
-    Negative amplitudes are probably zero.
-    """
-    values = fitted.all_values()
-    found = {}
-    for member in fitted.members:
-        name = member.cause.name
-        if name not in drive.of_law:
-            continue
-        source, form = drive.of_law[name]
-        parameters = fitted.parameters(name)
-        below = any(p.positive and parameters[p.name].value < 0.0 for p in form.amplitudes)
-        if below or not source.possible(values, drive.scale):
-            shown = ", ".join(f"{k} {v.value:.3g} {v.unit}" for k, v in parameters.items())
-            found[name] = f"It would have to be {shown}, which it cannot be beside the rest: something else is at work."
-    return found

@@ -154,16 +154,6 @@ class Verdicts(CauseJudge):
             return found
         return dict.fromkeys(found, ()) | {next(iter(found)): [part.parameters["force_n"] for part in self._pulses]}
 
-    def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
-        if (why := super()._impossible(shown, values, covariance)) or shown.cause.name not in self._drive.of_law:
-            return why
-        source, form = self._drive.of_law[shown.cause.name]
-        sizes = dict(zip([p.name for p in form.amplitudes], values.tolist(), strict=True))
-        if source.possible(self._explained.after.all_values() | sizes, self._drive.scale):
-            return ""
-        said = ", ".join(f"{p.name} {sizes[p.name]:.3g} {p.unit}" for p in form.amplitudes)
-        return f"It would have to be {said}, which it cannot be beside the rest."
-
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
         there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
@@ -263,7 +253,7 @@ class Verdicts(CauseJudge):
             if finding.verdict in {Verdict.NOT_TESTABLE, Verdict.AMBIGUOUS}:
                 return Verdict.NOT_TESTABLE, finding.text
         refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
-        refused += [why for name, why in self._explained.refused.items() if name.split(" ")[0] == source.name]
+        refused += [why for name, why in self._settled.refused.items() if name.split(" ")[0] == source.name]
         if not refused and own and self._probability(own) > source.prior_probability:
             return Verdict.NOT_TESTABLE, "This recording leaves it open: it neither shows nor excludes it."
         not_needed = "It would have been seen at its plausible size and was not needed."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import click
 
@@ -253,7 +253,7 @@ def _print_schema(name: str) -> None:
     from dbbstation.instrument.profiles import ProtocolFile
     from dbbstation.results.schemas import RESULTS, result_schema
 
-    formats = {**SCHEMAS, "dbb-instrument/1": ProtocolFile}
+    formats: dict[str, Any] = {**SCHEMAS, "dbb-instrument/1": ProtocolFile}
     if name in RESULTS:
         print_plain_json(result_schema(name))
     elif name in formats:

@@ -233,10 +233,8 @@ class Front:
             NoNumberError: a text is no number.
         """
         numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
-        number, calibrator, day, last = (
-            values[name] for name in ("serial_number", "calibrator", "certified", "valid_until")
-        )
-        return Stated(number, calibrator, certified=day, valid_until=last, **numbers)
+        texts = {name: values[name] for name in ("serial_number", "calibrator", "certified", "valid_until")}
+        return Stated(**texts, **numbers)  # type: ignore[arg-type] # texts are texts, numbers numbers
 
     def fault_of_stated(self, name: str, text: str, line: Line, reads_mm: float | None) -> str:
         """Return the fault of a typed text, or an empty text.

@@ -177,11 +177,9 @@ def compensate(
         pose[3:] = np.asarray(angles_deg, dtype=np.float64).reshape(3)
     both = (("parameter file", parameters), ("tool table", tools))
     files = {what: Path(file) for what, file in both if file is not None}
-    folder = None if subprograms is None else Path(subprograms)
-    setup = None
-    if offsets or tool_lengths_mm or files or folder or block_delete is not None:
-        of_control, tool_table = (files.get(what) for what, _ in both)
-        setup = setup_of(offsets or {}, tool_lengths_mm or {}, of_control, tool_table, folder, block_delete)
+    three = [None if file is None else Path(file) for file in (parameters, tools, subprograms)]
+    declared = bool(offsets or tool_lengths_mm or any(three) or block_delete is not None)
+    setup = setup_of(offsets or {}, tool_lengths_mm or {}, *three, block_delete=block_delete) if declared else None
     if out is not None:
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)

@@ -121,7 +121,9 @@ class Table:
     @property
     def simulated_is_variable(self) -> bool:
         """Return whether the simulated value varies and is no variable over again."""
-        return bool(np.ptp(self.simulated) > 0.0) and not any(_is_same(v.values, self.simulated) for v in self.variables)
+        return bool(np.ptp(self.simulated) > 0.0) and not any(
+            _is_same(v.values, self.simulated) for v in self.variables
+        )
 
     def _law(self, source: TableSource) -> Law:
         parameters = source.parameters()

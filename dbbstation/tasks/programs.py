@@ -124,6 +124,7 @@ def setup_of(
     parameters: Path | None = None,
     tools: Path | None = None,
     subprograms: Path | None = None,
+    *,
     block_delete: str | None = None,
 ) -> ControlSetup:
     """Return the offsets and tool lengths of a control, declared ones before those of its files.

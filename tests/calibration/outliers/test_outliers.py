@@ -15,7 +15,7 @@ from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.calibration.outliers.outlier import Outlier, OutlierKind
 from dbbstation.calibration.outliers.robust import calibrate_robust
-from dbbstation.calibration.outliers.strange_runs import in_place_after_all
+from dbbstation.calibration.outliers.strange_runs import _step, in_place_after_all
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity
@@ -209,3 +209,14 @@ def test_runs_left_out_for_want_of_physics_are_taken_back_with_it_and_bumped_one
     belonging, staying = in_place_after_all(with_it, runs, left_out)
     assert [run.label for run in belonging] == [run.label for k, run in enumerate(runs) if k != bumped]
     assert staying == left_out[-1:]
+
+
+@pytest.mark.parametrize("begin", [0.12, 0.5, 0.9])
+def test_the_step_is_the_split_with_the_most_significant_difference_of_means(rng, begin):
+    """Every split tried: of two means of white noise, the difference over sqrt(1/a + 1/b) has the same variance."""
+    count = 200
+    residual = rng.normal(0.0, 1.0, count) + 2.0 * (np.arange(count) >= begin * count)
+    splits = range(count // 20 + 1, count - count // 20)
+    differences = {at: np.mean(residual[at:]) - np.mean(residual[:at]) for at in splits}
+    best = max(splits, key=lambda at: abs(differences[at]) / np.sqrt(1.0 / at + 1.0 / (count - at)))
+    assert _step(residual) == (pytest.approx(differences[best]), best)

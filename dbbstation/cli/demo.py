@@ -30,8 +30,7 @@ def demo(
 ) -> None:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
 
-    Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. They are shown
-    as they run, and the files they read and write stay in the folder.
+    Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. The commands are shown as they run. Their files stay in the folder.
 
     With --control, LinuxCNC drives the machine: nominal, with compensated programs, with refitted parameters, and with a
     kinematics of the model. An interrupted comparison goes on if the command is repeated with the same --out.

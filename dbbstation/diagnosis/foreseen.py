@@ -39,7 +39,7 @@ SPACING_S = 200.0
 
 @dataclass(frozen=True)
 class Proposal:
-    """A possible circle at a time after the last run."""
+    """A proposed circle and its time after the last run."""
 
     circle: Circle
     wait_s: float

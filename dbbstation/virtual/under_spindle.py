@@ -1,4 +1,4 @@
-"""A fixed ball under the spindle and the moving ball attached after it [CAL III-A, Fig 4]."""
+"""A fixed ball that was put up under the spindle, and the moving ball, which was attached later [CAL III-A, Fig 4]."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class DriveFit:
         return {n: v if np.isfinite(v.uncertainty) else replace(v, uncertainty=ends[n]) for n, v in found.items()}
 
     def at_end(self, name: str) -> dict[str, tuple[float, float]]:
-        """Return a law's numbers at grid ends, with these ends."""
+        """Return those numbers of a law that are at an end of their grid, with these ends."""
         law, found = self._law(name), self.parameters(name)
         grids = zip(law.parameters[len(law.plausible) :], law.grids, strict=True)
         ends = {shape: (grid[0], grid[-1]) for shape, grid in grids if len(grid) > 1}

@@ -77,7 +77,7 @@ parts, and what lags behind these or sticks. A spring has a little of a hysteres
 
 
 def departing(one: Candidate) -> tuple[str, TermForm, tuple[str, ...]]:
-    """Return port, form and signals of possible departures."""
+    """Return port, form and signals of terms that may be missing."""
     return one.term.port, one.term.form, one.term.signals
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class AppliedCorrection:
-    """What is added to simulated values of other rows.
+    """The correction of simulated values in other rows.
 
     Attributes:
         values: shape (n,).

@@ -15,8 +15,9 @@ from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.levels import ONCE
-from dbbstation.inference.named_values import growth, moved, static_patterns
+from dbbstation.inference.named_values import growth, moved
 from dbbstation.inference.patterns import Family
+from dbbstation.inference.settle import static_patterns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

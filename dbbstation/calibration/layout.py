@@ -16,9 +16,7 @@ from dbbstation.sources.contract import ErrorSource, Fitted, Need, Parameter
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Motion
@@ -69,7 +67,7 @@ class Layout:
         """Return source, set and parameter of every column."""
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
 
-    def columns_of(self, source: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def columns_of(self, source: str) -> tuple[Integers, Integers]:
         """Return columns of a source's amplitudes and of its shape parameters, over all sets."""
         numbered = [
             (term.columns.start + k, bool(parameter.grid))
@@ -86,14 +84,14 @@ class Layout:
         each = [p.limits for term in self.terms for p in term.parameters]
         return np.array([low for low, _ in each]), np.array([high for _, high in each])
 
-    def held_at(self, x: Floats, columns: NDArray[np.int64]) -> Layout:
+    def held_at(self, x: Floats, columns: Integers) -> Layout:
         """Return the layout with some columns known as in x, shape (k,)."""
         nominal, prior = self.nominal.copy(), self.known.prior.copy()
         nominal[columns], prior[columns] = x[columns], HELD * self.known.scale[columns]
         return replace(self, nominal=nominal, known=replace(self.known, prior=prior))
 
     @property
-    def bounded(self) -> NDArray[np.bool_]:
+    def bounded(self) -> Flags:
         """Return whether a tolerance bounds each column, shape (k,)."""
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 

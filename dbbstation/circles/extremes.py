@@ -21,10 +21,8 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.circles.form import FormAndNoise
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
     Statistic = Callable[[Floats, Floats, Floats], Floats]
 
@@ -86,8 +84,8 @@ class DrawnPath:
     theta_deg: Floats
     sigma_um: float
     least: float
-    order: NDArray[np.int64]
-    starts: NDArray[np.int64]
+    order: Integers
+    starts: Integers
 
     def with_form(self, form_um: Floats) -> DrawnPath:
         """Return the noise with another form in time order, shape (n,) [µm]."""
@@ -139,7 +137,7 @@ def drawn_paths(
     return tuple(found)
 
 
-def _sectors(theta_deg: Floats, passed: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+def _sectors(theta_deg: Floats, passed: Floats) -> tuple[Integers, Integers, Floats]:
     count = len(theta_deg)
     # Undulations up to which the filter passes a hundredth of the noise's power.
     points = POINTS_PER_UNDULATION * int(np.flatnonzero(passed > PASSED).max(initial=1))
@@ -155,7 +153,7 @@ def _sectors(theta_deg: Floats, passed: Floats) -> tuple[NDArray[np.int64], NDAr
     return order, starts, (sector[starts] + 0.5) * (FULL_TURN_DEG / sectors)
 
 
-def _waves(lines: int, at: NDArray[np.int64], count: int) -> Floats:
+def _waves(lines: int, at: Integers, count: int) -> Floats:
     undulations = np.arange(lines)[:, None]
     angles = undulations * at * (2.0 * np.pi / count)
     share = np.where(undulations > 0, 2.0, 1.0) / count
@@ -167,8 +165,8 @@ def _extremes(
     noise: Floats,
     sizes: Floats,
     waves: Floats,
-    order: NDArray[np.int64],
-    edges: NDArray[np.int64],
+    order: Integers,
+    edges: Integers,
     highest: Floats,
     lowest: Floats,
 ) -> None:
@@ -186,7 +184,7 @@ def _extremes(
             highest[draw, sector], lowest[draw, sector] = high, low
 
 
-def _means(values: Floats, order: NDArray[np.int64], starts: NDArray[np.int64]) -> Floats:
+def _means(values: Floats, order: Integers, starts: Integers) -> Floats:
     return np.asarray(np.add.reduceat(values[order], starts) / np.diff(np.append(starts, len(order))))
 
 

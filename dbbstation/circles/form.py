@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.circles.continued import ContinuedNoise
     from dbbstation.circles.pushes import Pushes
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
 
 CHANCE = 0.01
 """Chance at which noise alone has one line anywhere in its spectrum that counts as form."""
@@ -101,7 +101,7 @@ MEDIAN_OF_NORMAL = 0.6745
 """Median of the size of a standard normal value."""
 
 
-def _floor(power: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _floor(power: Floats) -> tuple[Floats, Flags]:
     standing = np.zeros(len(power), dtype=bool)
     limit = np.log(max(len(power), 1) / CHANCE)  # the power of a line of noise is exponentially distributed
     floor = power

@@ -11,10 +11,8 @@ from dbbstation.circles.quantity import FIRST
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, coefficients
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 HIGHEST = 60
 """Undulations per revolution up to which amplitudes are given: twice as many as a machine's form usually reaches."""
@@ -29,7 +27,7 @@ class FormSpectrum:
         noise_um: rms amplitude of noise; NaN if unknown.
     """
 
-    undulations: NDArray[np.int64]
+    undulations: Integers
     amplitude_um: Floats
     noise_um: float
 

@@ -9,9 +9,7 @@ import numpy as np
 from dbbstation.machine.compiled import compiled, inlined
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 MOST_ROUNDS = 40
 """Rounds of the exchange; traces with noise need five to ten."""
@@ -45,7 +43,7 @@ def _exchange(
     inner: Floats,
     cosine: Floats,
     sine: Floats,
-    points: NDArray[np.int64],
+    points: Integers,
     width: Floats,
 ) -> None:
     above, below = np.empty(len(cosine)), np.empty(len(cosine))
@@ -88,7 +86,7 @@ def _solve(rows: Floats) -> None:
 
 
 @inlined
-def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
+def _put(four: Integers, new: int, kind: int) -> None:
     first, second = four[1 - kind], four[3 - kind]
     most = new
     for k in range(4):
@@ -101,7 +99,7 @@ def _put(four: NDArray[np.int64], new: int, kind: int) -> None:
     four[(2 if is_inside else 0) if kind == 0 else (1 if is_inside else 3)] = new
 
 
-def _first_points(outer: Floats, inner: Floats, theta_deg: Floats) -> NDArray[np.int64]:
+def _first_points(outer: Floats, inner: Floats, theta_deg: Floats) -> Integers:
     edges = np.searchsorted(theta_deg, [0.0, 90.0, 180.0, 270.0, 360.0])
     return np.column_stack(
         [

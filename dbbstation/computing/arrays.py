@@ -1,4 +1,4 @@
-"""Arrays of numbers."""
+"""Arrays of numbers, of any shape: docstrings say which."""
 
 from __future__ import annotations
 
@@ -8,4 +8,5 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
-"""An array of any shape; docstrings say which."""
+Integers: TypeAlias = NDArray[np.int64]
+Flags: TypeAlias = NDArray[np.bool_]

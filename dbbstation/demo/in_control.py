@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.tasks.telling import Progress
 
@@ -176,7 +175,7 @@ def _way(job: DemoJob, name: str, driven: Path, seed: int, **more: str) -> Contr
     return ControlWay(name, tuple(as_objects(json.loads(text_of(kept))).runs), took)
 
 
-def home_mm_of(machine: Machine) -> NDArray[np.float64]:
+def home_mm_of(machine: Machine) -> Floats:
     """Return the driven lengths in the middle of the travel, where the machine is switched on, shape (6,)."""
     return (strut_lengths(machine.hexapod, middle(machine)) - machine.reference_length_error_mm)[0]
 

@@ -13,9 +13,7 @@ from dbbstation.machine.geometry import STRUTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.shapes import Samples
 
 WITHIN_S = (0.5, 1.0, 2.0, 4.0)
@@ -69,6 +67,6 @@ def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[Floats]) -> A
     return min(found, key=lambda one: (one.probability, -one.beyond_um), default=None)
 
 
-def _reversals(sign: Floats) -> NDArray[np.int64]:
+def _reversals(sign: Floats) -> Integers:
     moving = np.flatnonzero(sign)
     return moving[1:][np.diff(sign[moving]) != 0.0]

@@ -26,10 +26,8 @@ from dbbstation.inference.triangle import axes_of
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.blocks import Columns
     from dbbstation.inference.harmonics import Spectrum
     from dbbstation.machine.geometry import Machine
@@ -107,7 +105,7 @@ class CircleChannel:
             found.append(Cause(name, tuple(variants), NAMED_ODDS))
         return tuple(found)
 
-    def columns_of(self, variants: Sequence[Variant]) -> NDArray[np.int64]:
+    def columns_of(self, variants: Sequence[Variant]) -> Integers:
         """Return the amplitudes' columns of several forms."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(variant.columns for variant in variants)])
 
@@ -147,8 +145,8 @@ class CircleChannel:
         self,
         noise_mm: float,
         scatter: float = 1.0,
-        but_for: NDArray[np.bool_] | None = None,
-        only: NDArray[np.int64] | None = None,
+        but_for: Flags | None = None,
+        only: Integers | None = None,
     ) -> BesideBase:
         """Return causes beside the base; ball scatter is `scatter` times as stated.
 
@@ -183,7 +181,7 @@ class CircleChannel:
         phases = [np.radians(o.raw.theta_deg) for o in self.observations]
         return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])
 
-    def blocks(self, columns: NDArray[np.int64], target: Floats) -> list[Block]:
+    def blocks(self, columns: Integers, target: Floats) -> list[Block]:
         """Return compressed runs of base, then causes' columns, a block each."""
         every = np.arange(self.columns.base.shape[1] + len(columns))
         found = []

@@ -22,10 +22,8 @@ from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.settled import Settled
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.outliers.outlier import Outlier
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import Explained, SettledCircles
     from dbbstation.inference.chosen_anew import KnownGains
@@ -45,11 +43,11 @@ class CircleBank(Bank):
         self._columns, self._circles, self._scatter = circles.columns, circles, settled.scatter
         self.nameless = frozenset(cause.name for cause in settled.causes if not cause.named)
 
-    def samples(self, columns: NDArray[np.int64]) -> Floats:
+    def samples(self, columns: Integers) -> Floats:
         """Return columns over all rows, shape (n, p) [mm]."""
         return self._columns.of(columns)
 
-    def beside(self, but_for: NDArray[np.bool_] | None = None, only: NDArray[np.int64] | None = None) -> BesideBase:
+    def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
         """Return causes beside the base."""
         return self._circles.beside_base(self.noise.sigma, self._scatter, but_for, only)
 

@@ -16,10 +16,8 @@ from dbbstation.model.machine_model import MachineModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.diagnosis.explained import SettledCircles
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.levels import Levels
@@ -108,13 +106,13 @@ def _per_sample(effect: Effect, count: int) -> Floats:
     return np.broadcast_to(np.asarray(effect.strut_mm), (count, 6))
 
 
-def _strut(contribution: Floats | None, rows: NDArray[np.int64]) -> int | None:
+def _strut(contribution: Floats | None, rows: Integers) -> int | None:
     if contribution is None:
         return None
     return 1 + int(np.argmax(np.sum(contribution[rows] ** 2, axis=0)))
 
 
-def _stretches(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _stretches(marked: Flags) -> list[tuple[int, int]]:
     """Return begin and end of marked stretches of a ring; ends may exceed its length."""
     if marked.all():
         return [(0, len(marked))]

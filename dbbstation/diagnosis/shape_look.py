@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.blocks import Columns
 
 PIECE_MM = 0.5
@@ -108,7 +108,7 @@ class TemplateScan:
         )
         self._rest = np.concatenate(residual) / noise_mm
 
-    def sums(self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], NDArray[np.int64]]) -> Sums:
+    def sums(self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], Integers]) -> Sums:
         """Sum over pieces of a variable."""
         values = np.concatenate([run.values[variable] for run in self._runs])
         gain = np.vstack([run.gain[moves] for run in self._runs])
@@ -223,15 +223,15 @@ _BUMPS_APART, _TURNS_APART, _LINES_APART, _RINGS_APART = 3.0, 4.0, 6.0, 4.0
 """How many neighbours in a list of forms are about the same: only every so many-th counts as another try."""
 
 
-def _piece(values: Floats, low: float, width: float) -> NDArray[np.int64]:
+def _piece(values: Floats, low: float, width: float) -> Integers:
     return np.floor((values - low) / width).astype(np.int64)
 
 
-def _since(values: Floats) -> NDArray[np.int64]:
+def _since(values: Floats) -> Integers:
     return np.round(np.clip(values, -RINGING_S, RINGING_S) / RINGING_PIECE_S).astype(np.int64)
 
 
-def _place(values: Floats) -> NDArray[np.int64]:
+def _place(values: Floats) -> Integers:
     x, y = np.floor(values / PLACE_MM).astype(np.int64).T
     return np.asarray(x * 100_000 + y, dtype=np.int64)
 

@@ -18,9 +18,8 @@ from dbbstation.machine.geometry import STRUTS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.computing.arrays import Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.inference.model_comparison import Member
 
@@ -100,8 +99,8 @@ class Unmodelled:
             self.follows[name] = family[0].follows
             self.causes.append(Cause(name, tuple(self._variants(name, family, own)), odds, named=False))
 
-    def _variants(self, name: str, family: Sequence[Shape], columns: Sequence[NDArray[np.int64]]) -> Iterator[Variant]:
-        forms: list[tuple[tuple[Shape, ...], NDArray[np.int64]]] = [
+    def _variants(self, name: str, family: Sequence[Shape], columns: Sequence[Integers]) -> Iterator[Variant]:
+        forms: list[tuple[tuple[Shape, ...], Integers]] = [
             ((shape,), own) for shape, own in zip(family, columns, strict=True)
         ]
         single = [form for form in forms if form[0][0].strut is not None]

@@ -18,9 +18,7 @@ from dbbstation.inference.verdict import OUT, SURE
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.levels import Levels
@@ -187,7 +185,7 @@ class _CircleJudge(CauseJudge):
                 values[key] = Value(float(found[column]), float(np.sqrt(variance[column])), parameter.unit)
         return values
 
-    def _beside_nameless(self, name: str) -> tuple[NDArray[np.int64], Floats, Floats]:
+    def _beside_nameless(self, name: str) -> tuple[Integers, Floats, Floats]:
         amplitudes = self._joint.after.layout.columns_of(name)[0]
         if self._best.members == self._joint.members:
             return amplitudes[:0], np.zeros(0), np.zeros(0)

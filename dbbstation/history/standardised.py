@@ -15,9 +15,7 @@ import numpy as np
 from scipy.special import chdtrc, ndtri, stdtr
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 BASELINE = 10
 """Values from which level and scatter are known well enough to stand for the stated uncertainty: the level to u / 3, the scatter
@@ -69,7 +67,7 @@ class Standardised:
     """
 
     z: Floats
-    by_stated: NDArray[np.bool_]
+    by_stated: Flags
     residual: Floats
     level: Floats
     u_level: Floats
@@ -120,7 +118,7 @@ def standardised(
     return Standardised(z, early & (hindsight is None), residual, level, u_level, scatter)
 
 
-def _normal(residual: Floats, scatter: Floats, freedom: NDArray[np.int64]) -> Floats:
+def _normal(residual: Floats, scatter: Floats, freedom: Integers) -> Floats:
     # Values that are all alike have no scatter: the smallest departure is then beyond it, and none is none.
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(residual == 0.0, 0.0, residual / scatter)

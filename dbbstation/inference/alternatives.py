@@ -13,9 +13,7 @@ from dbbstation.inference.verdict import SURE
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 
@@ -100,7 +98,7 @@ class Alternatives:
             return False
         return self._best.log_factor(member.cause.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
 
-    def _cosine(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> float:
+    def _cosine(self, one: Integers, other: Integers, others: tuple[Member, ...]) -> float:
         """Return the least cosine between two causes' spans beside base and others; 1: equal effects."""
         products = self._comparison.beside(others, np.concatenate([one, other]))
         size = len(one)
@@ -118,7 +116,7 @@ def named_already(
         named: forms of named causes, with their relative inaccuracy.
     """
     found = np.zeros(len(nameless), dtype=bool)
-    by_size: dict[int, list[tuple[NDArray[np.int64], float]]] = {}
+    by_size: dict[int, list[tuple[Integers, float]]] = {}
     for variant, share in named:
         if share > 0.0 and len(variant.columns) <= MOST_ALIKE:
             by_size.setdefault(len(variant.columns), []).append((variant.columns, share))
@@ -174,7 +172,7 @@ def norm_over_sigma(products: Floats, values: Floats, covariance: Floats) -> flo
     return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
 
 
-def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], Floats, dict[str, int]]:
+def _inclusions(posterior: Posterior) -> tuple[Flags, Floats, dict[str, int]]:
     top = max(posterior.weights.values())
     sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
     place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}

@@ -12,9 +12,7 @@ from dbbstation.inference.triangle import triangle_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +27,7 @@ class Block:
         noise: own, of another instrument; None: the channel's.
     """
 
-    columns: NDArray[np.int64]
+    columns: Integers
     triangle: Floats
     target: Floats
     count: int
@@ -37,7 +35,7 @@ class Block:
     noise: float | None = None
 
 
-def compress(columns: NDArray[np.int64], jacobian: Floats, target: Floats) -> Block:
+def compress(columns: Integers, jacobian: Floats, target: Floats) -> Block:
     """Compress a run to its triangle."""
     stacked = np.column_stack([jacobian, target])
     triangle = triangle_of(stacked)[: jacobian.shape[1] + 1]
@@ -56,7 +54,7 @@ def spread(blocks: Sequence[Block], columns: int) -> Floats:
     return wide
 
 
-def spread_over(blocks: Sequence[Block], columns: NDArray[np.int64]) -> Floats:
+def spread_over(blocks: Sequence[Block], columns: Integers) -> Floats:
     """Return all blocks' rows over some columns, shape (k,), target last, shape (r, k + 1)."""
     order = np.argsort(columns)
     narrow = np.zeros((sum(len(block.target) for block in blocks), len(columns) + 1))
@@ -96,7 +94,7 @@ class Columns:
 
     prior: Floats
     scale: Floats
-    random: NDArray[np.bool_]
+    random: Flags
 
 
 def with_random(known: Columns, sd: Floats) -> Columns:

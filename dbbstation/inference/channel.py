@@ -23,8 +23,7 @@ from dbbstation.inference.square_root import lost_directions, solve
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.curves import Clock
     from dbbstation.inference.patterns import Family, Pattern
     from dbbstation.inference.square_root import Solution
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 NAMED_ODDS = float(np.log(0.05 / 0.95))
 """Log prior odds of a law: one object in twenty has any one of them so that it matters."""
 
-Discrepancy: TypeAlias = "Callable[[NDArray[np.float64], tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]]"
+Discrepancy: TypeAlias = "Callable[[Floats, tuple[float, ...], Floats], Floats]"
 """What a formula may be off by, from its effect, nonlinear parameters and amplitudes."""
 
 LARGEST = 10.0
@@ -52,12 +51,12 @@ class Base:
     """
 
     names: tuple[str, ...]
-    samples: NDArray[np.float64]
-    prior: NDArray[np.float64]
-    random: NDArray[np.bool_]
+    samples: Floats
+    prior: Floats
+    random: Flags
 
     @classmethod
-    def flat(cls, names: Sequence[str], samples: NDArray[np.float64]) -> Base:
+    def flat(cls, names: Sequence[str], samples: Floats) -> Base:
         """Return columns without prior knowledge."""
         count = samples.shape[1]
         return cls(tuple(names), samples, np.full(count, np.inf), np.zeros(count, dtype=bool))
@@ -92,8 +91,8 @@ class Law:
     """
 
     name: str
-    columns: Callable[[tuple[float, ...]], NDArray[np.float64]]
-    plausible: NDArray[np.float64]
+    columns: Callable[[tuple[float, ...]], Floats]
+    plausible: Floats
     parameters: tuple[str, ...]
     units: tuple[str, ...]
     grids: tuple[tuple[float, ...], ...] = ()
@@ -102,7 +101,7 @@ class Law:
     follows: Variable | None = None
     discrepancy: Discrepancy | None = None
     log_odds: float = NAMED_ODDS
-    at: Callable[[tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]] | None = None
+    at: Callable[[tuple[float, ...], Floats], Floats] | None = None
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
     zero_from: float | None = None
     reach: float | None = None
@@ -115,7 +114,7 @@ class Law:
     confirm: str = ""
     possible: Callable[[Mapping[str, float]], bool] = lambda _: True
 
-    def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    def plausible_of(self, samples: Floats) -> Floats:
         """Return usual amplitudes, shape (p,), of columns, shape (n, p)."""
         if self.reach is None:
             return self.plausible
@@ -150,28 +149,28 @@ class Channel:
         rows_are: name of the rows in answers: `rows` or `tests`.
     """
 
-    residual: NDArray[np.float64]
+    residual: Floats
     unit: str
     blocks: tuple[slice, ...]
     names: tuple[str, ...]
     variables: tuple[Variable, ...]
     base: Base
     laws: tuple[Law, ...] = ()
-    time: NDArray[np.float64] | None = None
+    time: Floats | None = None
     time_unit: str = "s"
     simulated: Variable | None = None
-    kept: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    kept: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     apart: int = 1
     static: tuple[Pattern, ...] | None = None
     least_noise: float = 0.0
     step: float = 0.0
     surely: float | None = None
-    grows: NDArray[np.float64] | None = None
-    noise_follows: tuple[tuple[str, NDArray[np.float64]], ...] = ()
-    known_noise: NDArray[np.float64] | None = None
-    levels: NDArray[np.int64] | None = None
+    grows: Floats | None = None
+    noise_follows: tuple[tuple[str, Floats], ...] = ()
+    known_noise: Floats | None = None
+    levels: Integers | None = None
     clock: Clock | None = None
-    direction: NDArray[np.float64] | None = None
+    direction: Floats | None = None
     interchangeable: float = 0.9
     rows_are: str = "rows"
 
@@ -179,7 +178,7 @@ class Channel:
         if not len(self.kept):
             object.__setattr__(self, "kept", np.ones(len(self.residual), dtype=bool))
 
-    def without(self, rows: NDArray[np.bool_]) -> Channel:
+    def without(self, rows: Flags) -> Channel:
         """Return the channel with rows held back, shape (n,)."""
         return replace(self, kept=self.kept & ~rows)
 
@@ -194,7 +193,7 @@ class Channel:
         return replace(self, kept=self.kept & grid, apart=apart)
 
     @property
-    def target(self) -> NDArray[np.float64]:
+    def target(self) -> Floats:
         """Return the residual of the kept rows."""
         return self.residual[self.kept]
 
@@ -218,15 +217,15 @@ class Channel:
         return Columns(self.base.prior, scale, self.base.random)
 
     @cached_property
-    def held(self) -> NDArray[np.float64]:
+    def held(self) -> Floats:
         """Return base directions invisible to the rows, held at zero, shape (h, f)."""
         return lost_directions([self._block(self.target)], self.known, self._about)
 
-    def fitted(self, target: NDArray[np.float64], noise: float) -> Solution:
+    def fitted(self, target: Floats, noise: float) -> Solution:
         """Fit the base to kept rows of a target at a row's noise."""
         return solve([self._block(target)], self.known, noise, self.held)
 
-    def refitted(self) -> NDArray[np.float64]:
+    def refitted(self) -> Floats:
         """Return the base's ordinary least-squares values, shape (k,)."""
         rows = self.base.samples[self.kept]
         scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
@@ -252,5 +251,5 @@ class Channel:
             float(np.std(self.target)), self.least_noise, 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300
         )
 
-    def _block(self, target: NDArray[np.float64]) -> Block:
+    def _block(self, target: Floats) -> Block:
         return compress(np.arange(self.base.samples.shape[1]), self.base.samples[self.kept], target)

@@ -21,8 +21,7 @@ from dbbstation.inference.verdict import DensityGains
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags, Integers
     from dbbstation.inference.folds import Kind
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.settled import Settled
@@ -69,7 +68,7 @@ class KnownGains:
         anew: what was chosen without each part; None where gains are all that is known.
     """
 
-    rows: Sequence[NDArray[np.bool_]]
+    rows: Sequence[Flags]
     gains: Mapping[frozenset[str], ClassGain]
     errors: Sequence[float]
     anew: ChosenAnew | None = None
@@ -87,7 +86,7 @@ class KnownGains:
         return list(self.errors)
 
 
-def rows_of_groups(groups: Sequence[int], blocks: Sequence[slice]) -> list[NDArray[np.bool_]]:
+def rows_of_groups(groups: Sequence[int], blocks: Sequence[slice]) -> list[Flags]:
     """Return the rows of each group of blocks, shape (n,)."""
     lengths = [block.stop - block.start for block in blocks]
     return [np.repeat(np.array(groups) == group, lengths) for group in sorted(set(groups))]
@@ -95,7 +94,7 @@ def rows_of_groups(groups: Sequence[int], blocks: Sequence[slice]) -> list[NDArr
 
 def gains_of_tests(
     settled: Settled,
-    rows: Sequence[NDArray[np.bool_]],
+    rows: Sequence[Flags],
     errors: Callable[[Sequence[Collection[str]]], Sequence[float]],
     asked: Callable[[Cause], bool] = lambda _: True,
     **limits: Any,  # noqa: ANN401 - as of `search`
@@ -134,7 +133,7 @@ SHARE = 0.7
 def selection_frequency(
     groups: Sequence[int],
     causes: Sequence[Cause],
-    without: Callable[[NDArray[np.bool_]], ModelComparison],
+    without: Callable[[Flags], ModelComparison],
     rng: np.random.Generator,
     begin: Sequence[Member] = (),
     most_members: int | None = None,
@@ -159,7 +158,7 @@ def selection_frequency(
     return {name: count / BOUNDS.selection_draws for name, count in times.items()}
 
 
-def columns_of(causes: Iterable[Cause]) -> NDArray[np.int64]:
+def columns_of(causes: Iterable[Cause]) -> Integers:
     """Return all columns of causes, rising."""
     variants = (variant for cause in causes for variant in cause.variants)
     return np.unique(np.concatenate([part for one in variants for part in (one.columns, one.slack)]))

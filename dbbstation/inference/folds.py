@@ -16,9 +16,7 @@ from dbbstation.inference.verdict import Gains, is_worse
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.settled import Settled
 
@@ -111,11 +109,11 @@ class HeldOutError:
 
 def held_out_error(
     channel: Channel,
-    choose_without: Callable[[Channel, NDArray[np.bool_]], Settled],
+    choose_without: Callable[[Channel, Flags], Settled],
     progress: Callable[[str, int, int], None] = lambda _text, _done, _of: None,
     *,
     alike: float = 1.0,
-    reference: Callable[[NDArray[np.bool_]], Floats] | None = None,
+    reference: Callable[[Flags], Floats] | None = None,
 ) -> HeldOutError:
     """Hold back parts in turn [`part_numbers`].
 
@@ -140,7 +138,7 @@ def held_out_error(
     return HeldOutError(tuple(found))
 
 
-def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
+def _gains(settled: Settled, rows: Flags) -> dict[Kind, float]:
     with_all = float(np.sum(np.square(left_without(settled, ())[rows])))
     found: dict[Kind, float] = {}
     for member in settled.best.members:
@@ -149,7 +147,7 @@ def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
     return found
 
 
-def beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[np.bool_]:
+def beside(channel: Channel, rows: Flags, alike: float) -> Flags:
     """Return rows of a block within a correlation time of a part, shape (n,)."""
     found = np.zeros(len(rows), dtype=bool)
     gap = min(int(np.ceil(alike)), int(WIDEST_GAP * rows.sum())) if channel.time is not None and alike > 1.0 else 0
@@ -160,7 +158,7 @@ def beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[n
     return found & ~rows
 
 
-def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:
+def parts_of(channel: Channel) -> list[tuple[str, Flags]]:
     """Return named parts to hold back: rows, shape (n,)."""
     number = part_numbers([block.stop - block.start for block in channel.blocks])
     found = []
@@ -171,7 +169,7 @@ def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:
     return found
 
 
-def part_numbers(lengths: Sequence[int]) -> NDArray[np.int64]:
+def part_numbers(lengths: Sequence[int]) -> Integers:
     """Return each row's part, parts of similar size and whole blocks, shape (n,).
 
     Long blocks are split evenly; short neighbours are joined to at most `FOLDS` parts of at least half an even share.

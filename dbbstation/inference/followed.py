@@ -22,9 +22,7 @@ from dbbstation.inference.verdict import SURE, DensityGains
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.settled import Settled
@@ -45,7 +43,7 @@ VALUE = "value"
 class WithoutPart:
     """Everything chosen anew without one part."""
 
-    rows: NDArray[np.bool_]
+    rows: Flags
     settled: Settled
 
 
@@ -217,7 +215,7 @@ def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause
     return found
 
 
-def estimated(settled: Settled, names: Collection[str]) -> tuple[NDArray[np.int64], Floats, Floats]:
+def estimated(settled: Settled, names: Collection[str]) -> tuple[Integers, Floats, Floats]:
     """Return columns of some members, their values, shape (p,), and covariance."""
     members = settled.best.members
     every = settled.comparison.estimates(members)
@@ -269,7 +267,7 @@ class ChosenWithoutParts:
     ignored: frozenset[str] = frozenset()
 
     @property
-    def rows(self) -> Sequence[NDArray[np.bool_]]:
+    def rows(self) -> Sequence[Flags]:
         """Return the parts' rows, shape (n,) each."""
         return [part.rows for part in self.parts]
 
@@ -326,7 +324,7 @@ def left_without(one: Settled, names: Collection[str], unseen: Collection[str] =
     return np.asarray(one.channel.residual - shown - one.channel.base.samples @ one.base_values(effect))
 
 
-def log_density(one: Settled, rows: NDArray[np.bool_], left: Floats) -> float:
+def log_density(one: Settled, rows: Flags, left: Floats) -> float:
     """Return a part's log residual density in the others' noise, up to a constant.
 
     Row spacing is that of the noise measurement.

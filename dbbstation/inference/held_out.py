@@ -13,9 +13,7 @@ from dbbstation.inference.square_root import Solution, solve
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ def held_out(
     blocks: Sequence[Block],
     groups: Sequence[int],
     known: Columns,
-    active: NDArray[np.int64],
+    active: Integers,
     noise: float,
     held: Floats,
     single: float | None = None,
@@ -63,7 +61,7 @@ def held_out(
     return HeldOut(float(np.sqrt(square / count)), float(np.sqrt(weighted / max(rows, 1))))
 
 
-def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
+def _restricted(block: Block, active: Integers) -> Block:
     place = {int(column): k for k, column in enumerate(active)}
     inside = np.array([int(column) in place for column in block.columns], dtype=bool)
     columns = np.array([place[int(c)] for c in block.columns[inside]], dtype=np.int64)

@@ -9,8 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.facts.value import Value
     from dbbstation.inference.channel import Law
 
@@ -18,7 +17,7 @@ NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
 
 
-def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.float64]) -> str:
+def impossible(law: Law, values: Floats, variances: Floats) -> str:
     """Return why amplitudes are impossible, or an empty text."""
     for k, positive in enumerate(law.positive[: len(values)]):
         value = float(values[k])

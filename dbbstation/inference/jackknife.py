@@ -16,9 +16,7 @@ from dbbstation.inference.square_root import solve
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
 
@@ -57,7 +55,7 @@ def widening(variances: Floats, moved: Floats, variances_without: Floats) -> Flo
     return np.maximum(found / np.sqrt(np.where(variances > 0.0, variances, np.inf)), 1.0)
 
 
-def refits_without(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> tuple[Solution, ...]:
+def refits_without(settled: Settled, parts: Sequence[Flags]) -> tuple[Solution, ...]:
     """Return refits of base and best members without each part, nothing chosen anew."""
     bank, channel, members = settled.bank, settled.channel, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])

@@ -19,9 +19,7 @@ from dbbstation.inference.verdict import ABSENT, SURE
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.inference.followed import VariableClass
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
@@ -32,7 +30,7 @@ SURELY = float(np.log(SURE / ABSENT))
 def law_form(
     settled: Settled,
     one: VariableClass,
-    parts: Sequence[NDArray[np.bool_]] | None,
+    parts: Sequence[Flags] | None,
     refuted: Collection[str] = (),
 ) -> LawForm:
     """Score single causes, and the best set's own sum, over the variables of a class.
@@ -61,7 +59,7 @@ def _place(
     settled: Settled,
     names: Collection[str],
     wanted: Collection[str],
-    parts: Sequence[NDArray[np.bool_]] | None,
+    parts: Sequence[Flags] | None,
     barred: Collection[str],
 ) -> LawForm:
     others = _sure(settled, names)
@@ -138,7 +136,7 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
     return not impossible(law, found.values[:width], np.diag(found.covariance)[:width])
 
 
-def _is_worse(best: Floats, other: Floats, parts: Sequence[NDArray[np.bool_]] | None) -> bool:
+def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:
     """Return whether parts other than the best one's strongest, or all rows if none were held back, surely prefer it."""
     apart = best - other
     return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
@@ -148,7 +146,7 @@ def _scores(
     settled: Settled,
     candidates: dict[str, tuple[Member, ...]],
     others: Sequence[Member],
-    parts: Sequence[NDArray[np.bool_]],
+    parts: Sequence[Flags],
 ) -> dict[str, Floats]:
     """Return each part's conditional log evidence over an empty place, shape (parts,) each."""
     bank = settled.bank

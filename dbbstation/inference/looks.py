@@ -16,9 +16,7 @@ from dbbstation.inference.variables import Kind
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.inference.forms import Form
     from dbbstation.inference.pieces import Left
     from dbbstation.inference.variables import Variable
@@ -43,7 +41,7 @@ NEIGHBOUR = 0.7
 frequency away explains sinc²(1/4) = 0.81 of it, a bump half a step away and a factor of 1.4 wider 0.92."""
 
 
-def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_], size: float) -> list[Pattern]:
+def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: float) -> list[Pattern]:
     """Return the best waves, bumps and steps over variables.
 
     Args:
@@ -129,7 +127,7 @@ def _least(tried: float) -> float:
     return -2.0 * NEIGHBOUR * log_odds(1, tried)
 
 
-def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: float) -> Pattern:
+def placed_better(pattern: Pattern, left: Left, kept: Flags, size: float) -> Pattern:
     """Return a pattern refined in frequency, place and width."""
     (variable,), form = pattern.variables, pattern.form
     if form is None:

@@ -11,9 +11,7 @@ from scipy.stats import f as f_distribution
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 FEWEST = 8
 """Stretches of either kind that a comparison of their mean squares needs, at the least."""
@@ -33,7 +31,7 @@ class Louder:
         return float(np.sqrt(max(self.rms**2 - self.elsewhere**2, 0.0)))
 
 
-def louder(residuals: Sequence[Floats], begins: Sequence[NDArray[np.int64]], length: int) -> Louder | None:
+def louder(residuals: Sequence[Floats], begins: Sequence[Integers], length: int) -> Louder | None:
     """Compare stretches from given rows with equally long others; None if too few.
 
     Freedom of correlated mean squares is 2 mean² / variance [Satterthwaite, Biometrics Bulletin 2 (1946) 110].

@@ -21,9 +21,7 @@ from scipy.linalg.lapack import dtrtrs
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 """Standard deviations of amplitudes that are averaged over, in units of the plausible size."""
@@ -46,7 +44,7 @@ MOST_SLACK = 1.5
 _Eliminated: TypeAlias = "tuple[Floats, Floats, float]"
 """Cholesky factor, what it makes of the target, log evidence."""
 
-_Group: TypeAlias = "tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]"
+_Group: TypeAlias = "tuple[Integers, Integers, Floats, Floats]"
 """Forms of one number of amplitudes: their numbers, columns, plausible sizes, and products of the columns."""
 
 
@@ -65,14 +63,14 @@ class Variant:
         positive: shape (p,); may be empty.
     """
 
-    columns: NDArray[np.int64]
+    columns: Integers
     plausible: Floats
     nonlinear: tuple[float, ...] = ()
     label: str = ""
     law: str = ""
-    whole: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    whole: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     log_weight: float = 0.0
-    slack: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    slack: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     slack_sd: Floats = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
     tangents: int = 0
@@ -110,7 +108,7 @@ class Member:
     slack_share: float = 1.0
 
     @cached_property
-    def columns(self) -> NDArray[np.int64]:
+    def columns(self) -> Integers:
         """Return columns of amplitudes, then slack."""
         return np.concatenate([self.variant.columns, self.variant.slack])
 
@@ -138,8 +136,8 @@ class Scan:
     log_factor: Floats
     factors: Floats
     weighted: Floats
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
+    first: Integers
+    last: Integers
     slim: tuple[list[int], ...]
 
     def best_of(self, k: int) -> Member:
@@ -202,7 +200,7 @@ class _OfCause:
         groups: by p: forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
     """
 
-    def __init__(self, cause: Cause, gram: Floats, at: Callable[[NDArray[np.int64]], NDArray[np.int64]]) -> None:
+    def __init__(self, cause: Cause, gram: Floats, at: Callable[[Integers], Integers]) -> None:
         by_size: dict[int, list[int]] = {}
         for number, variant in enumerate(cause.variants):
             by_size.setdefault(len(variant.columns), []).append(number)
@@ -237,7 +235,7 @@ class _Forms:
             for size, (numbers, columns, plausible, blocks) in one.groups.items():
                 of_sizes.setdefault(size, []).append((numbers + first, columns, plausible, blocks))
                 wanted[columns] = True
-        self.needed: NDArray[np.int64] = np.flatnonzero(wanted)
+        self.needed: Integers = np.flatnonzero(wanted)
         place = np.zeros(count, dtype=np.int64)
         place[self.needed] = np.arange(len(self.needed))
         self.groups: list[_Group] = []
@@ -260,7 +258,7 @@ class ModelComparison:
         self,
         gram: Floats,
         towards: Floats,
-        columns: NDArray[np.int64] | None = None,
+        columns: Integers | None = None,
         evidence: float = 0.0,
     ) -> None:
         self._gram, self._towards = gram, towards
@@ -283,7 +281,7 @@ class ModelComparison:
         across = self._across((member,), lower, np.arange(len(self._gram)))
         return ModelComparison(self._gram - across.T @ across, self._towards - across.T @ z, self._columns, evidence)
 
-    def _across(self, members: Sequence[Member], lower: Floats, places: NDArray[np.int64]) -> Floats:
+    def _across(self, members: Sequence[Member], lower: Floats, places: Integers) -> Floats:
         """Return the members' factor applied to columns, shape (p, q)."""
         if not members:
             return np.zeros((0, len(places)))
@@ -292,7 +290,7 @@ class ModelComparison:
         products *= sd
         return _solved(lower, products.T)
 
-    def _at(self, columns: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _at(self, columns: Integers) -> Integers:
         return columns if self._columns is None else np.searchsorted(self._columns, columns)
 
     def log_evidence(self, members: Sequence[Member]) -> float:
@@ -319,7 +317,7 @@ class ModelComparison:
         inverse = cho_solve((factor, True), np.eye(len(sd)))
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
-    def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> Floats:
+    def beside(self, members: Sequence[Member], columns: Integers) -> Floats:
         """Return products of columns beside base and members, shape (p, p)."""
         columns = self._at(columns)
         own = self._gram[np.ix_(columns, columns)]
@@ -407,7 +405,7 @@ class ModelComparison:
             found.append((replace(member, scale=float(SCALES[best])), averaged, float(factors[best])))
         return found
 
-    def _information(self, columns: NDArray[np.int64], sd: Floats) -> Floats:
+    def _information(self, columns: Integers, sd: Floats) -> Floats:
         own = self._at(columns)
         information = self._gram[np.ix_(own, own)]
         information *= sd[:, None]
@@ -567,5 +565,5 @@ def _log_factors(seen: Floats, along: Floats) -> Floats:
     )
 
 
-def _stacked(members: Sequence[Member]) -> tuple[NDArray[np.int64], Floats]:
+def _stacked(members: Sequence[Member]) -> tuple[Integers, Floats]:
     return np.concatenate([m.columns for m in members]), np.concatenate([m.sd for m in members])

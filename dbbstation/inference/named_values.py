@@ -15,16 +15,13 @@ from dbbstation.inference.model_comparison import amplitude_size
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.channel import Law
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
 
 
-def named_values(
-    settled: Settled, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> dict[str, Value]:
+def named_values(settled: Settled, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
     """Return amplitudes and nonlinear parameters, slack included in uncertainty."""
     law = settled.bank.laws.get(member.cause.name)
     if law is not None:
@@ -42,9 +39,7 @@ def named_values(
     }
 
 
-def values_of_law(
-    law: Law, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64], share: float
-) -> dict[str, Value]:
+def values_of_law(law: Law, member: Member, values: Floats, covariance: Floats, share: float) -> dict[str, Value]:
     """Return amplitudes, uncertain by at least a share of themselves, and nonlinear numbers, NaN if not laid out."""
     sigma, width, every = np.sqrt(np.diag(covariance).clip(0.0)), len(member.variant.columns), len(law.plausible)
     found = {
@@ -64,7 +59,7 @@ def values_of_law(
     return found
 
 
-def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.0) -> tuple[float, ...]:
+def moved(law: Law, member: Member, values: Floats, per: float = 1.0) -> tuple[float, ...]:
     """Return nonlinear parameters moved along tangents within grids.
 
     Args:
@@ -78,7 +73,7 @@ def moved(law: Law, member: Member, values: NDArray[np.float64], per: float = 1.
     return tuple(nonlinear)
 
 
-def growth(member: Member, values: NDArray[np.float64]) -> float:
+def growth(member: Member, values: Floats) -> float:
     """Return a member's amplitudes over those of its tangents."""
     if not len(member.variant.slack):
         return 1.0

@@ -26,8 +26,7 @@ from dbbstation.inference.verdict import ABSENT, OUT, Acts, Gains, Verdict
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.levels import Levels
@@ -160,7 +159,7 @@ class CauseJudge:
         )
         self._classes = self._alternatives.classes
         estimates = settled.comparison.estimates(self._best.members) if self._members else None
-        self._values: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        self._values: dict[str, tuple[Floats, Floats]] = {}
         self._own: dict[str, slice] = {}
         first = 0
         for name, member in self._members.items():
@@ -269,9 +268,7 @@ class CauseJudge:
         (first, last), blocks = rows[0], self._settled.channel.blocks
         return any(0 <= first - b.start < SHORTEST or 0 <= b.stop - 1 - last < SHORTEST for b in blocks)
 
-    def _values_of(
-        self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> dict[str, Value]:
+    def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
         """Return parameters with the larger of model and jackknife uncertainty."""
         found = named_values(self._settled, member, values, covariance)
         own = self._own.get(member.cause.name)
@@ -326,7 +323,7 @@ class CauseJudge:
         width = len(shown.columns)
         return self._impossible(shown, found.values[:width], found.covariance[:width, :width])
 
-    def _impossible(self, shown: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> str:
+    def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:
         law = self._settled.bank.laws.get(shown.cause.name)
         if law is None:
             return ""
@@ -366,34 +363,32 @@ class CauseJudge:
             products = samples.T @ samples
         return float(np.median(standing_out(products, variant.plausible)))
 
-    def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+    def _sigmas(self, member: Member, values: Floats, covariance: Floats) -> float:
         return norm_over_sigma(self._settled.comparison.beside((), member.columns), values, covariance)
 
-    def _concealed(
-        self, _shown: Member, effect: NDArray[np.float64], _values: NDArray[np.float64]
-    ) -> tuple[float, float, float]:
+    def _concealed(self, _shown: Member, effect: Floats, _values: Floats) -> tuple[float, float, float]:
         kept = effect[self._settled.channel.kept]
         fitted = self._settled.bank.base_values(-effect) - self._without
         rest = kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept]
         return concealed(kept - kept.mean(), rest)
 
 
-def concealed(effect: NDArray[np.float64], rest: NDArray[np.float64]) -> tuple[float, float, float]:
+def concealed(effect: Floats, rest: Floats) -> tuple[float, float, float]:
     """Return the rms of an effect and of the rest that fitted parameters leave, and the share of squares that they take."""
     whole, left = rms(effect), rms(rest)
     return whole, left, float(np.clip(1.0 - (left / whole) ** 2 if whole > 0.0 else 0.0, 0.0, 1.0))
 
 
-def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _at_half(effect: Floats) -> Flags:
     away = np.abs(effect - np.median(effect))
     return np.asarray(away >= HALF * away.max())
 
 
-def _span(values: NDArray[np.float64], name: str, unit: str) -> Span:
+def _span(values: Floats, name: str, unit: str) -> Span:
     return Span(name, float(values.min()), float(values.max()), unit)
 
 
-def _stretches(effect: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
+def _stretches(effect: Floats) -> tuple[tuple[int, int], ...]:
     inside = np.concatenate([[False], np.abs(effect) > 0.0, [False]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int64)))
     return tuple((int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True))

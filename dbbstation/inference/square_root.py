@@ -18,9 +18,7 @@ from dbbstation.inference.arrow import arrow_of, triangles_without
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.blocks import Block, Columns
 
 
@@ -38,8 +36,8 @@ class Spreads:
     """
 
     shared: Floats
-    own: tuple[tuple[NDArray[np.int64], Floats], ...]
-    alone: NDArray[np.int64]
+    own: tuple[tuple[Integers, Floats], ...]
+    alone: Integers
     prior: Floats
 
     @cached_property
@@ -69,7 +67,7 @@ class Spreads:
             factor[self.alone] * self.prior,
         )
 
-    def square_of(self, columns: NDArray[np.int64], rows: Floats) -> float:
+    def square_of(self, columns: Integers, rows: Floats) -> float:
         """Return the trace of rows, shape (r, j), times covariance times rows."""
         square = float(np.sum((rows @ self.shared[columns]) ** 2))
         for group, root in self.own:
@@ -241,7 +239,7 @@ def complement(rows: Floats) -> Floats:
     return vt[len(rows) :]
 
 
-def free_directions(base: Columns, fitted: NDArray[np.int64], held: Floats) -> Floats:
+def free_directions(base: Columns, fitted: Integers, held: Floats) -> Floats:
     """Return fitted columns along free directions, in scales, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])

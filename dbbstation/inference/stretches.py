@@ -15,9 +15,7 @@ from dbbstation.inference.patterns import Family, Pattern
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.pieces import Left
     from dbbstation.inference.variables import Variable
@@ -38,7 +36,7 @@ class _Window:
 def stretches(
     left: Left,
     blocks: Sequence[slice],
-    kept: NDArray[np.bool_],
+    kept: Flags,
     size: float,
     *,
     clock: Clock | None = None,
@@ -78,7 +76,7 @@ def refined(
     count: int,
     lefts: Callable[[int, Floats], Left],
     blocks: Sequence[slice],
-    kept: NDArray[np.bool_],
+    kept: Flags,
     size: float,
     *,
     clock: Clock | None = None,
@@ -167,11 +165,11 @@ class _Look:
         self,
         left: Left,
         blocks: Sequence[slice],
-        kept: NDArray[np.bool_],
+        kept: Flags,
         size: float,
         clock: Clock,
         factor: Floats,
-        windows: NDArray[np.int64] | None = None,
+        windows: Integers | None = None,
     ) -> None:
         self._left, self._size, self._clock, self._factor = left, size, clock, factor
         self._rows, self._at = np.flatnonzero(kept), clock.rows[kept]
@@ -187,7 +185,7 @@ class _Look:
         self._own = self._information(self._windows[:, 0], self._windows[:, 1])
         self.tried = max(float(len(self._windows)) / INDEPENDENT, 1.0)
 
-    def _all_windows(self) -> NDArray[np.int64]:
+    def _all_windows(self) -> Integers:
         per = max(1, int(np.ceil(len(self._rows) / BOUNDS.pieces_of_time)))
         found = [np.zeros((0, 2), dtype=np.int64)]
         for first, last in self._blocks:
@@ -205,7 +203,7 @@ class _Look:
         starts, ends = np.divmod(np.unique(np.vstack(found) @ np.array([per_row, 1])), per_row)
         return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
 
-    def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> Floats:
+    def _information(self, starts: Integers, ends: Integers) -> Floats:
         own, along = self._whole[ends] - self._whole[starts] + self._edges[ends - starts], self._along_axes.columns
         for many in range(0, len(starts), BOUNDS.stretches_at_once):
             rows = slice(many, many + BOUNDS.stretches_at_once)

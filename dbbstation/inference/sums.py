@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Sums:
     """
 
     at: Floats
-    place: NDArray[np.int64]
+    place: Integers
     rest: Floats
     gains: Floats
     base: Floats
@@ -99,7 +99,7 @@ FINER = (1.0 / 30.0, 1.0 / 450.0)
 other."""
 
 
-def peaks(explained: Floats, most: int) -> NDArray[np.int64]:
+def peaks(explained: Floats, most: int) -> Integers:
     """Return local maxima, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     found = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))

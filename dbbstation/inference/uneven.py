@@ -11,9 +11,7 @@ from scipy.special import gammaln
 from dbbstation.inference.bounds import BOUNDS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
@@ -36,7 +34,7 @@ def most_probable_variance(powers: Floats, even: Floats, grows: Floats, odds: fl
     return float(priced[k]), even + squares @ np.square(every[k])
 
 
-def spread_by_kind(powers: Floats, kinds: NDArray[np.int64]) -> Floats:
+def spread_by_kind(powers: Floats, kinds: Integers) -> Floats:
     """Return rows' relative standard deviations by kind, shape (m,)."""
     count = np.maximum(np.bincount(kinds), 1)
     mean = np.bincount(kinds, powers) / count

@@ -17,9 +17,7 @@ import numpy as np
 from dbbstation.machine.compiled import compiled, inlined
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 CONVERGED = 0
 SINGULAR = 1
@@ -193,7 +191,7 @@ def _compare(
     tolerance: float,
     residual: Floats,
     square: Floats,
-    state: NDArray[np.int64],
+    state: Integers,
 ) -> int:
     """Set the residual to wanted less present lengths, (6, LANES); return the number of searching lanes."""
     for lane in range(LANES):
@@ -219,7 +217,7 @@ def _newton(
     residual: Floats,
     step: Floats,
     sound: Floats,
-    state: NDArray[np.int64],
+    state: Integers,
 ) -> None:
     if not reuse:
         _orthogonalise(matrix, triangle, sound)
@@ -230,7 +228,7 @@ def _newton(
 
 
 @inlined
-def _move(t: Floats, r: Floats, step: Floats, state: NDArray[np.int64]) -> None:
+def _move(t: Floats, r: Floats, step: Floats, state: Integers) -> None:
     """Move searching platforms by (dt, w), shape (6, LANES) [mm, rad].
 
     Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4) is an exact rotation without sine; its angle is |w| less |w|³/12.
@@ -267,7 +265,7 @@ def forward(
     near_rotation: Floats,
     position: Floats,
     rotation: Floats,
-    outcome: NDArray[np.int64],
+    outcome: Integers,
 ) -> None:
     """Newton-Raphson on strut lengths [CAL eq 2], from near poses to lengths `target` (n, 6).
 
@@ -311,7 +309,7 @@ def adjoint(
     direction: Floats,
     moment: Floats,
     gain: Floats,
-    outcome: NDArray[np.int64],
+    outcome: Integers,
 ) -> None:
     """Solve J^T g = [direction, moment] per pose: g (n, 6) is the effect of one unit of strut error.
 
@@ -388,7 +386,7 @@ def bar(
     lengths: Floats,
     directions: Floats,
     gain: Floats,
-    outcome: NDArray[np.int64],
+    outcome: Integers,
 ) -> None:
     """Return a bar's length and sensitivities by the adjoint: one solution per pose.
 

@@ -27,9 +27,7 @@ from dbbstation.nc.splitting import (
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.curve import SpanBehind
@@ -151,8 +149,8 @@ def _commanded(
     curve: CommandCurve,
     model: MachineModel,
     chord_mm: float | None,
-    runs: NDArray[np.int64],
-    whole: NDArray[np.bool_],
+    runs: Integers,
+    whole: Flags,
 ) -> tuple[Pieces, Floats, Floats]:
     """Return pieces, poses to command at their ends, shape (k, 6) [mm, deg], and the curve's distance from them, shape (k,) [mm]."""
     if chord_mm is None:
@@ -209,9 +207,9 @@ def _needed_mm(toolpath: Toolpath, planner: Planner) -> Floats:
 def _assembled(
     toolpath: Toolpath,
     pieces: Pieces,
-    written: NDArray[np.bool_],
+    written: Flags,
     commanded: Floats,
-    runs: NDArray[np.int64],
+    runs: Integers,
     machine: Machine,
     corner_mm: float,
 ) -> Toolpath:
@@ -232,7 +230,7 @@ def _assembled(
     )
 
 
-def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
+def _written(toolpath: Toolpath, pieces: Pieces) -> Flags:
     row = pieces.row
     last = np.append(row[1:] != row[:-1], True)[: len(row)]
     return np.asarray(last | (toolpath.kind[row] == RowKind.FEED))

@@ -13,9 +13,7 @@ from dbbstation.sources.contract import Motion
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.model.compensation import Passed
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.toolpath import Toolpath
@@ -132,7 +130,7 @@ class CommandCurve:
         return np.hstack([command[:, :3], programmed]), behind
 
 
-def row_and_share(places: Floats) -> tuple[NDArray[np.int64], Floats]:
+def row_and_share(places: Floats) -> tuple[Integers, Floats]:
     """Return rows and shares passed, shapes (k,); the end of a row belongs to it, its begin does not."""
     row = np.maximum(np.ceil(places).astype(np.int64) - 1, 0)
     return row, places - row

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.nc.toolpath import Toolpath
 
 BITS = {2: 16, 3: 11, 4: 7}
@@ -127,20 +127,20 @@ def _off(numbers: Floats, decimals: int) -> float:
     return float(np.abs(numbers - np.round(numbers, decimals)).max(initial=0.0))
 
 
-def _as_bits(axes: NDArray[np.bool_]) -> NDArray[np.int64]:
-    bits: NDArray[np.int64] = axes @ (1 << np.arange(6))
+def _as_bits(axes: Flags) -> Integers:
+    bits: Integers = axes @ (1 << np.arange(6))
     return bits
 
 
 @compiled
 def _first_marked(
     sums: NDArray[np.uint64],
-    fixed: NDArray[np.int64],
+    fixed: Integers,
     step_sums: NDArray[np.uint64],
-    moved: NDArray[np.int64],
+    moved: Integers,
     mixing: NDArray[np.uint64],
     shifts: NDArray[np.uint64],
-) -> NDArray[np.int64]:
+) -> Integers:
     """Return the first step that marks each row without moving a fixed axis, -1 if none, shape (n,); as `_has_mark`."""
     chosen = np.full(len(sums), -1)
     for row in range(len(sums)):
@@ -153,24 +153,22 @@ def _first_marked(
     return chosen
 
 
-def _numbers(poses: Floats, decimals: Sequence[int]) -> NDArray[np.int64]:
-    numbers: NDArray[np.int64] = np.rint(poses * 10.0 ** np.array(decimals)).astype(np.int64)
+def _numbers(poses: Floats, decimals: Sequence[int]) -> Integers:
+    numbers: Integers = np.rint(poses * 10.0 ** np.array(decimals)).astype(np.int64)
     return numbers
 
 
-def _sums(numbers: NDArray[np.int64], axes: slice = slice(None)) -> NDArray[np.uint64]:
+def _sums(numbers: Integers, axes: slice = slice(None)) -> NDArray[np.uint64]:
     weighted: NDArray[np.uint64] = numbers.astype(np.uint64) @ _ODD[axes]
     return weighted
 
 
-def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
+def _has_mark(sums: NDArray[np.uint64], bits: int) -> Flags:
     return _begin_with_zeros(sums, _MIXING, np.append(_SHIFTS, np.uint64(64 - bits)))
 
 
 @compiled
-def _begin_with_zeros(
-    sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]
-) -> NDArray[np.bool_]:
+def _begin_with_zeros(sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> Flags:
     found = np.zeros(len(sums), dtype=np.bool_)
     for row in range(len(sums)):
         found[row] = _mixed(sums[row], mixing, shifts) >> shifts[3] == 0
@@ -184,13 +182,13 @@ def _mixed(mixed: np.uint64, mixing: NDArray[np.uint64], shifts: NDArray[np.uint
     return mixed ^ (mixed >> shifts[2])
 
 
-def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int]) -> NDArray[np.bool_]:
+def _free(toolpath: Toolpath, moves: Integers, decimals: Sequence[int]) -> Flags:
     poses = toolpath.poses[moves]
     way = np.abs(np.diff(poses, axis=0))
     tips = way[:, :3].max(axis=1) > 0.0
     least = np.where(tips[:, None], [LEAST_WAY_MM] * 3 + [LEAST_TURN_DEG] * 3, [np.inf] * 3 + [LEAST_ONLY_TURN_DEG] * 3)
     steps = np.where(tips[:, None], [STEPS_APART] * 3 + [STEPS_TURNED] * 3, STEPS_ONLY_TURNED)
-    moving: NDArray[np.bool_] = way > np.maximum(least, 0.99 * steps / 10.0 ** np.array(decimals))
+    moving: Flags = way > np.maximum(least, 0.99 * steps / 10.0 ** np.array(decimals))
     free = np.ones(poses.shape, dtype=np.bool_)
     free[:-1] &= moving
     free[1:] &= moving
@@ -199,12 +197,12 @@ def _free(toolpath: Toolpath, moves: NDArray[np.int64], decimals: Sequence[int])
 
 
 @cache
-def _steps(angle: int, angle_and_place: int) -> NDArray[np.int64]:
+def _steps(angle: int, angle_and_place: int) -> Integers:
     """Return steps of the six last decimals, shape (k, 6), the least felt first, beginning with none."""
     alone, beside = np.arange(-angle, angle + 1), np.arange(-angle_and_place, angle_and_place + 1)
     place = np.arange(-FARTHEST_PLACE, FARTHEST_PLACE + 1)
     both = np.stack(np.meshgrid(*[place] * 3, *[beside] * 3, indexing="ij"), axis=-1).reshape(-1, 6)
     turned = np.stack(np.meshgrid(*[[0]] * 3, *[alone] * 3, indexing="ij"), axis=-1).reshape(-1, 6)
     tried = np.unique(np.vstack([both, turned]), axis=0).astype(np.int64)
-    ordered: NDArray[np.int64] = tried[np.argsort(np.linalg.norm(_FELT_NM * tried, axis=1), kind="stable")]
+    ordered: Integers = tried[np.argsort(np.linalg.norm(_FELT_NM * tried, axis=1), kind="stable")]
     return ordered

@@ -9,17 +9,15 @@ import numpy as np
 from dbbstation.machine.compiled import compiled
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 
 def longest(
     way: Floats,
     curve: Floats,
-    may_end: NDArray[np.bool_],
+    may_end: Flags,
     tolerance_mm: float,
-) -> NDArray[np.int64]:
+) -> Integers:
     """Return the ends of pieces, each as long as the tolerance allows.
 
     Args:
@@ -52,9 +50,9 @@ def _distance_mm(way: Floats, curve: Floats, start: int, end: int) -> float:
 def _farthest(
     way: Floats,
     curve: Floats,
-    may_end: NDArray[np.bool_],
+    may_end: Flags,
     tolerance_mm: float,
-) -> NDArray[np.int64]:
+) -> Integers:
     count = len(way)
     ended = np.zeros(count, np.int64)
     start = pieces = 0

@@ -16,9 +16,7 @@ from dbbstation.nc.splitting import moves_of
 from dbbstation.nc.toolpath import RowKind
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.nc.toolpath import Toolpath
 
 CYCLES = 1.5
@@ -81,7 +79,7 @@ class Planner:
         return float(np.where(turns, toolpath.duration_s, cutting_s).sum())
 
 
-def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
+def cuts(toolpath: Toolpath) -> Flags:
     """Return the rows at feed that move the tool tip, shape (n,)."""
     return (toolpath.kind == RowKind.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 

@@ -11,9 +11,7 @@ from dbbstation.machine.travel import check_travel
 from dbbstation.nc.toolpath import RowKind, in_pieces
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
 
@@ -71,7 +69,7 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
 class _Poses:
     """Known poses within rows of a toolpath, its start first."""
 
-    def __init__(self, toolpath: Toolpath, row: NDArray[np.int64], share: Floats) -> None:
+    def __init__(self, toolpath: Toolpath, row: Integers, share: Floats) -> None:
         poses = toolpath.between(row, share)
         known = toolpath.is_move[row]
         self.row, self.poses = row[known], poses[known]

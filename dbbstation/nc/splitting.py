@@ -17,9 +17,7 @@ from dbbstation.nc.toolpath import RowKind, in_pieces
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.curve import CommandCurve
@@ -77,7 +75,7 @@ class Pieces:
     end: Floats
 
     @property
-    def row(self) -> NDArray[np.int64]:
+    def row(self) -> Integers:
         """Return the row in which each piece ends, shape (k,)."""
         return row_and_share(self.end)[0]
 
@@ -93,17 +91,17 @@ def rows_as_pieces(toolpath: Toolpath) -> Pieces:
     return _in(toolpath, np.where(toolpath.kind == RowKind.RAPID, history, 1.0))
 
 
-def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
+def moves_of(toolpath: Toolpath) -> Integers:
     """Return the written move of each row, shape (n,); an arc is one move."""
     goes_on = np.zeros(len(toolpath), dtype=np.bool_)
     if toolpath.arc is not None and len(toolpath) > 1:
         same = (toolpath.arc[1:] == toolpath.arc[:-1]).all(axis=1) & (toolpath.arc[1:, 2] != 0.0)
         goes_on[1:] = same & (toolpath.line[1:] == toolpath.line[:-1]) & (toolpath.kind[1:] == toolpath.kind[:-1])
-    moves: NDArray[np.int64] = np.cumsum(~goes_on) - 1
+    moves: Integers = np.cumsum(~goes_on) - 1
     return moves
 
 
-def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
+def parts_of(toolpath: Toolpath, runs: Integers) -> list[slice]:
     """Return rows to compensate part by part, so that long programs take little memory."""
     leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
     # The first move shows where the machine comes from.
@@ -122,7 +120,7 @@ def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
     return [slice(begin, end) for begin, end in pairwise([*cuts, len(toolpath)])]
 
 
-def runs_of(toolpath: Toolpath, needed_mm: Floats) -> NDArray[np.int64]:
+def runs_of(toolpath: Toolpath, needed_mm: Floats) -> Integers:
     """Return the run of each row, shape (n,): a written move, or several shorter than their feed needs.
 
     Moves of a run share F and work system, may round their corners, and nearly keep one direction.
@@ -140,7 +138,7 @@ def runs_of(toolpath: Toolpath, needed_mm: Floats) -> NDArray[np.int64]:
     alike = (toolpath.feed[1:] == toolpath.feed[:-1]) & (toolpath.offset[1:] == toolpath.offset[:-1])
     joined = (short[1:] | short[:-1]) & cuts[1:] & cuts[:-1] & along & alike & ~(toolpath.corners_mm[:-1] <= 0.0)
     joined |= moves[1:] == moves[:-1]
-    runs: NDArray[np.int64] = np.concatenate([[0], np.cumsum(~joined)])
+    runs: Integers = np.concatenate([[0], np.cumsum(~joined)])
     return runs
 
 
@@ -148,9 +146,9 @@ def split(
     curve: CommandCurve,
     model: MachineModel,
     tolerance_mm: float,
-    runs: NDArray[np.int64],
+    runs: Integers,
     *,
-    whole: NDArray[np.bool_],
+    whole: Flags,
 ) -> tuple[Pieces, Floats, Floats]:
     """Return the longest pieces in which a toolpath keeps the tolerance.
 
@@ -199,7 +197,7 @@ class _Nodes:
         begin: float,
         places: Floats,
         at: Floats,
-        steps: NDArray[np.bool_],
+        steps: Flags,
     ) -> None:
         toolpath = curve.toolpath
         self.places = np.concatenate([[begin], places.reshape(-1)])
@@ -228,7 +226,7 @@ def looked_at(
     curve: CommandCurve,
     pieces: Pieces,
     shares: Floats,
-    bends: NDArray[np.bool_] | None = None,
+    bends: Flags | None = None,
 ) -> Floats:
     """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6).
 
@@ -251,7 +249,7 @@ def looked_at(
     return at
 
 
-def _halved(curve: CommandCurve, cells: Pieces, shares: Floats, at: Floats, halves: NDArray[np.bool_]) -> Floats:
+def _halved(curve: CommandCurve, cells: Pieces, shares: Floats, at: Floats, halves: Flags) -> Floats:
     """Return what `looked_at` does, from the same of cells of which some are halves now."""
     if curve.has_history:
         return looked_at(curve, cells, shares)
@@ -279,7 +277,7 @@ def _cells(
     curve: CommandCurve,
     model: MachineModel,
     tolerance_mm: float,
-    whole: NDArray[np.bool_],
+    whole: Flags,
 ) -> tuple[Pieces, Floats, Floats]:
     """Return cells, the curve at their begin and at shares of each, and these shares."""
     toolpath = curve.toolpath
@@ -332,7 +330,7 @@ def _check_number(toolpath: Toolpath, cells: float) -> None:
         raise StationError(what, where=toolpath.name, remedy="compensate it in parts, or allow a larger chord error")
 
 
-def _runs(number: NDArray[np.int64], chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
+def _runs(number: Integers, chosen: Flags) -> Iterator[Integers]:
     which = np.flatnonzero(chosen)
     if len(which):
         yield from np.split(which, np.flatnonzero(np.diff(number[which])) + 1)

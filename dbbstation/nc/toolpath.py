@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 DECIMALS = (6, 6, 6, 7, 7, 7)
 """Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding costs at most 0.0009 µm in space, and as much a metre from the tip."""
@@ -113,12 +113,12 @@ class Toolpath:
     feed_mm_min: Floats
     feed_deg_min: Floats
     dwell_s: Floats
-    line: NDArray[np.int64]
+    line: Integers
     corners_mm: Floats
     offset: NDArray[np.int32]
     offsets: Floats
     unknown: NDArray[np.uint8]
-    in_machine: NDArray[np.bool_]
+    in_machine: Flags
     text: Mapping[int, str] = field(default_factory=dict)
     start: Floats | None = None
     holds: Mapping[str, tuple[float, ...]] | None = None
@@ -148,7 +148,7 @@ class Toolpath:
         corners = self.corners_mm[self.is_move]
         return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
 
-    def divided(self, row: NDArray[np.int64], poses: Floats) -> Toolpath:
+    def divided(self, row: Integers, poses: Floats) -> Toolpath:
         """Return the toolpath with some rows in several pieces."""
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
         place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
@@ -166,7 +166,7 @@ class Toolpath:
         begins = rows.indices(len(self))[0]
         return replace(self.only(rows), start=self.start if begins == 0 else self.before[begins])
 
-    def only(self, rows: slice | NDArray[np.int64]) -> Toolpath:
+    def only(self, rows: slice | Integers) -> Toolpath:
         """Return some rows as a toolpath without texts; each move begins at the end of the move before."""
         return replace(
             self,
@@ -185,7 +185,7 @@ class Toolpath:
         )
 
     @property
-    def is_move(self) -> NDArray[np.bool_]:
+    def is_move(self) -> Flags:
         """Return which rows are moves, with or without distance, shape (n,)."""
         return (self.kind == RowKind.RAPID) | (self.kind == RowKind.FEED)
 
@@ -215,7 +215,7 @@ class Toolpath:
         return _norm(self.poses[:, 3:] - self.before[:, 3:], LEAST_DEG)
 
     @property
-    def only_turns(self) -> NDArray[np.bool_]:
+    def only_turns(self) -> Flags:
         """Return the rows that only turn, shape (n,)."""
         return (self.tip_mm == 0.0) & (self.turn_deg > 0.0)
 
@@ -248,7 +248,7 @@ class Toolpath:
         nodes, ends_s = np.vstack([self.before[:1], self.poses]), np.concatenate([[0.0], self.end_s])
         return np.column_stack([np.interp(time_s, ends_s, nodes[:, axis]) for axis in range(6)])
 
-    def between(self, row: NDArray[np.int64], share: Floats) -> Floats:
+    def between(self, row: Integers, share: Floats) -> Floats:
         """Return poses within rows, shape (k, 6); `share` 0 before the row, 1 after it, both of shape (k,)."""
         before, after = self.before[row], self.poses[row]
         inside = before + share[:, None] * (after - before)
@@ -260,11 +260,11 @@ class Toolpath:
         # The end of a row is its programmed pose to the last bit.
         return np.where(share[:, None] == 1.0, after, inside)
 
-    def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], Floats]:
+    def subdivided(self, step_mm: float, step_deg: float) -> tuple[Integers, Floats]:
         """Divide rows into pieces no longer than the steps; return row and share of each end, shapes (k,)."""
         return in_pieces(self.pieces(step_mm, step_deg))
 
-    def pieces(self, step_mm: float, step_deg: float) -> NDArray[np.int64]:
+    def pieces(self, step_mm: float, step_deg: float) -> Integers:
         """Return the number of pieces of each row, shape (n,)."""
         pieces = np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg))
         return np.maximum(pieces, 1.0).astype(np.int64)
@@ -379,7 +379,7 @@ class ToolpathBuilder:
         added: int,
         poses: Floats,
         arc: tuple[float, float, float, float],
-        plane: NDArray[np.int64],
+        plane: Integers,
     ) -> None:
         """Replace the poses of rows that were added together; all behind stand at their end in the axes of a plane."""
         self._rows[added].poses[:] = poses
@@ -454,13 +454,13 @@ class ToolpathBuilder:
         return self._count
 
     @staticmethod
-    def _within(count: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _within(count: Integers) -> Integers:
         """Return the number of each row among those that were added together, from 0, shape (n,)."""
         behind = np.cumsum(count)
-        numbers: NDArray[np.int64] = np.arange(behind[-1] if len(count) else 0) - np.repeat(behind - count, count)
+        numbers: Integers = np.arange(behind[-1] if len(count) else 0) - np.repeat(behind - count, count)
         return numbers
 
-    def _corners_mm(self, count: NDArray[np.int64]) -> Floats:
+    def _corners_mm(self, count: Integers) -> Floats:
         """Return the rounding of each row; an arc as chords stops only at its own ends."""
         corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
         last = np.repeat(np.array([rows.step > 0 for rows in self._rows], dtype=np.bool_), count)
@@ -489,7 +489,7 @@ class ToolpathBuilder:
         self._pose = poses[-1]
 
 
-def bits_of(axes: NDArray[np.bool_]) -> int:
+def bits_of(axes: Flags) -> int:
     """Return axes, shape (6,), as a bit each."""
     return int(axes @ (1 << np.arange(6)))
 
@@ -509,7 +509,7 @@ def _on_arc(
     return centre + np.column_stack([cos * x - sin * y, sin * x + cos * y])
 
 
-def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats]:
+def in_pieces(pieces: Integers) -> tuple[Integers, Floats]:
     """Return rows and end shares of pieces, shapes (k,), for the piece count of each row, shape (n,)."""
     row = np.repeat(np.arange(len(pieces)), pieces)
     number = np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1

@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from datetime import date
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.quality.knowledge import Planned, Seen
 
 MISTAKE = LOG_ODDS_LIMIT
@@ -330,7 +328,7 @@ class _Beside:
         white = np.linalg.solve(root, apart)
         return _mean_of(logs - 0.5 * np.sum(white**2, axis=(2, 3)) - log_diagonal(root))
 
-    def _of(self, runs: Sequence[int], labels: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats, Floats]:
+    def _of(self, runs: Sequence[int], labels: Integers) -> tuple[Integers, Floats, Floats]:
         """Return circles, shape (m, k), readings minus expectation, (m, 7 k), and their own covariance, (m, 7 k, 7 k)."""
         circles = np.column_stack([self._read[run].shows(labels[:, k]) for k, run in enumerate(runs)])
         off = np.hstack([self._read[run].off[labels[:, k]] for k, run in enumerate(runs)])
@@ -340,13 +338,13 @@ class _Beside:
             scatter[:, rows, rows] = self._read[run].scatter[labels[:, k]]
         return circles, off, scatter
 
-    def _between(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> Floats:
+    def _between(self, one: Integers, other: Integers) -> Floats:
         """Return covariances of circles, shape (9, m, 7 k, 7 k) [µm²]."""
         found = self._covariance[:, one[:, :, None], :, other[:, None, :], :]
         wide = COEFFICIENTS * one.shape[1]
         return found.transpose(3, 0, 1, 4, 2, 5).reshape(len(SIZES), -1, wide, wide)
 
-    def _means(self, circles: NDArray[np.int64]) -> Floats:
+    def _means(self, circles: Integers) -> Floats:
         return self._mean[:, circles].reshape(len(SIZES), len(circles), -1)
 
 

@@ -15,10 +15,8 @@ from dbbstation.trace.gaussian import gaussian
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 FORM_UPR = 30.0
 """Undulations per revolution that count as form, as in `evaluate`: a bump is shorter, below 12 degrees."""
@@ -67,9 +65,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     )
 
 
-def near_reversals(
-    theta_deg: Floats, reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG
-) -> NDArray[np.int64]:
+def near_reversals(theta_deg: Floats, reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG) -> Integers:
     """Return the reversal near each sample, -1 for none, shape (n,)."""
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
@@ -78,7 +74,7 @@ def near_reversals(
     return near
 
 
-def _peaks(one: CircleAnalysis, rest: Floats, near: NDArray[np.int64], width_deg: float) -> list[_Peak]:
+def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) -> list[_Peak]:
     samples = max(round(width_deg / FULL_TURN_DEG * len(rest)), 1)
     if samples < FEWEST and width_deg < WIDTHS_DEG[-1]:
         return []
@@ -112,5 +108,5 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: NDArray[np.int64], width_deg
     return found_peaks
 
 
-def _top(means: Floats, among: NDArray[np.int64]) -> int:
+def _top(means: Floats, among: Integers) -> int:
     return int(among[int(np.argmax(np.abs(means[among])))])

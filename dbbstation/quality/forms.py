@@ -19,9 +19,7 @@ from dbbstation.quality.stated import unseen_um2
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.quality.knowledge import Seen
 
 SIZES = np.geomspace(0.03, 3.0, 9)
@@ -141,7 +139,7 @@ class Forms:
         rates = [form.drift_um_s for held, form in self._held if _key(held) in counted]
         return FormsBesides(self, left_out, float(np.sqrt(np.mean(np.square(rates)))))
 
-    def rows(self, runs: Sequence[Held]) -> NDArray[np.int64]:
+    def rows(self, runs: Sequence[Held]) -> Integers:
         """Return the rows of held runs."""
         wanted = {_key(one) for one in runs}
         return rows_of([k for k, (held, _) in enumerate(self._held) if _key(held) in wanted])
@@ -197,7 +195,7 @@ class FormsBesides:
         covariance = root @ _turned(root) + self._variance * drift @ _turned(drift)
         return own_um[:, None] * (off - drift @ self._amount), own_um[:, None] * covariance * own_um
 
-    def length_without(self, size: int, rows: NDArray[np.int64]) -> float:
+    def length_without(self, size: int, rows: Integers) -> float:
         """Return distances of runs from their prediction by the others, in standard deviations."""
         basis, drift = self._basis[size], self._drift[size]
         seen = self._whitening[size][:, rows]
@@ -233,7 +231,7 @@ class _Columns:
         return self._effects[n:behind, :wide] @ self._effects[:behind, :wide].T
 
 
-def rows_of(places: Sequence[int]) -> NDArray[np.int64]:
+def rows_of(places: Sequence[int]) -> Integers:
     """Return the rows of forms by their places."""
     return (COEFFICIENTS * np.array(places, dtype=np.int64)[:, None] + np.arange(COEFFICIENTS)).ravel()
 

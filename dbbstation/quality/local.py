@@ -16,9 +16,7 @@ from dbbstation.quality.limits import FEWEST_OTHERS, SCATTERING, length_limit
 from dbbstation.quality.stated import apart_by, limit_along
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.quality.knowledge import Others, Seen
 
 LOWEST = 3
@@ -80,7 +78,7 @@ def locally_apart_um(one: Seen, against: Seen) -> float:
     return float(np.linalg.norm((one.local_um - against.local_um)[_compared(one, against)]))
 
 
-def _compared(one: Seen, against: Seen) -> NDArray[np.bool_]:
+def _compared(one: Seen, against: Seen) -> Flags:
     alike = one.run.circle.direction is against.run.circle.direction
     return (ORDERS >= LOWEST) & (alike | (ORDERS % 2 == 1))
 

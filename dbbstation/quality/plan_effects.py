@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.quality.knowledge import Planned, Seen
 
 ELSEWHERE_UM = 1e3
@@ -128,7 +128,7 @@ class RunEffects:
         self.planned = plan.label(one.run.test, one.run.circle.direction)
         self._products: dict[int, Floats] = {}
 
-    def shows(self, labels: ArrayLike) -> NDArray[np.int64]:
+    def shows(self, labels: ArrayLike) -> Integers:
         """Return the circles whose effects a run has under labels, the last for no circle."""
         labels = np.asarray(labels)
         own = np.where(labels == ELSEWHERE, len(self._plan.circles), self.planned)

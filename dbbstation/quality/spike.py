@@ -15,10 +15,8 @@ from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 BESIDE = 2
 """Readings on either side whose median a reading is held against: a spike of one or two readings does not move it, and what is
@@ -83,7 +81,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     )
 
 
-def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, Flags]:
     count = len(values_um)
     apart, sound = np.zeros(count), np.zeros(count, dtype=np.bool_)
     if count <= 2 * BESIDE:
@@ -98,7 +96,7 @@ def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, NDArray[np.bool_
     return apart, sound
 
 
-def _scales(apart: Floats, among: NDArray[np.bool_]) -> tuple[Floats, float]:
+def _scales(apart: Floats, among: Flags) -> tuple[Floats, float]:
     """Return the standard deviation about each reading, shape (n,) [µm], and its freedom."""
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))
@@ -118,5 +116,5 @@ def _scales(apart: Floats, among: NDArray[np.bool_]) -> tuple[Floats, float]:
     return np.maximum(each, LEAST_UM), ROBUST_SHARE * float(among.sum()) / 2.0
 
 
-def _top(apart: Floats, among: NDArray[np.int64]) -> int:
+def _top(apart: Floats, among: Integers) -> int:
     return int(among[int(np.argmax(np.abs(apart[among])))])

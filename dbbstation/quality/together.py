@@ -20,9 +20,7 @@ from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, median_length
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.forms import Forms, FormsBesides
     from dbbstation.quality.knowledge import Expected, Planned, Run, Seen
@@ -40,7 +38,7 @@ class Together:
 
     runs: tuple[Seen, ...]
     others: FormsBesides
-    rows: Mapping[str, NDArray[np.int64]]
+    rows: Mapping[str, Integers]
     apart_um: Floats
     covariance_um2: Floats
 

@@ -15,9 +15,7 @@ import numpy as np
 from scipy.special import ndtri, stdtr, stdtrit
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 FALSE_ALARMS = 0.01
 """Probability that a fleet of like machines shows any unlike value."""
@@ -51,7 +49,7 @@ class Sisters:
         smallest_seen: departure that would count as unlike, in the quantity's unit.
     """
 
-    unlike: NDArray[np.bool_]
+    unlike: Flags
     score: Floats
     middle: Floats
     scatter: Floats
@@ -64,7 +62,7 @@ def held_against_sisters(values: Floats, u: Floats, false_alarms: float = FALSE_
     return _scored(values, u, unlike, _share(values, false_alarms))
 
 
-def unlike_machines(values: Floats, u: Floats, false_alarms: float = FALSE_ALARMS) -> NDArray[np.bool_]:
+def unlike_machines(values: Floats, u: Floats, false_alarms: float = FALSE_ALARMS) -> Flags:
     """Return unlike machines, shape (q, n); arguments as of `held_against_sisters`."""
     known = np.isfinite(values)
     left = known.copy()
@@ -98,7 +96,7 @@ def _share(values: Floats, false_alarms: float) -> float:
     return false_alarms / max(compared, 1)
 
 
-def _middle(values: Floats, variance: Floats, taken: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _middle(values: Floats, variance: Floats, taken: Flags) -> tuple[Floats, Floats]:
     """Return weighted mean and squared scatter, shape (q,) each.
 
     The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero. Newton starts below, with the greatest u
@@ -144,7 +142,7 @@ class _Departure:
         return np.asarray(np.where(np.isfinite(probability), probability, 0.5))
 
 
-def _departure(values: Floats, variance: Floats, others: NDArray[np.bool_], machine: NDArray[np.int64]) -> _Departure:
+def _departure(values: Floats, variance: Floats, others: Flags, machine: Integers) -> _Departure:
     """Return one machine of each quantity against the others.
 
     Scatter of unequal uncertainties has Satterthwaite's freedom by its Fisher information [Viechtbauer 2005, J. Educ.
@@ -161,7 +159,7 @@ def _departure(values: Floats, variance: Floats, others: NDArray[np.bool_], mach
     return _Departure(values[rows, machine] - middle, np.sqrt(of_one + of_middle), freedom, middle, np.sqrt(square))
 
 
-def _scored(values: Floats, u: Floats, unlike: NDArray[np.bool_], share: float) -> Sisters:
+def _scored(values: Floats, u: Floats, unlike: Flags, share: float) -> Sisters:
     variance = np.where(np.isfinite(u), u, 0.0) ** 2
     alike = np.isfinite(values) & ~unlike
     score, middle, scatter, smallest = (np.full(values.shape, np.nan) for _ in range(4))

@@ -23,9 +23,7 @@ from dbbstation.inference.variables import Kind, Variable
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.recordings.table_csv import Columns
 
@@ -399,12 +397,12 @@ class _Reader:
 
     def order(
         self, values: Mapping[str, Floats], used: Sequence[str], clock: str | None
-    ) -> tuple[NDArray[np.int64], tuple[slice, ...], tuple[str, ...]]:
+    ) -> tuple[Integers, tuple[slice, ...], tuple[str, ...]]:
         """Return complete rows, by block in time order, with the blocks and their names."""
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
         if not good.all():
             self.notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
-        order: list[NDArray[np.int64]] = []
+        order: list[Integers] = []
         names: list[str] = []
         first = 0
         sorted_blocks = 0
@@ -428,7 +426,7 @@ class _Reader:
         blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
         return np.concatenate([np.zeros(0, dtype=np.int64), *order]), blocks, tuple(names)
 
-    def _runs(self, file: TableFile) -> list[tuple[str, NDArray[np.int64]]]:
+    def _runs(self, file: TableFile) -> list[tuple[str, Integers]]:
         stem = re.sub(r"^.*[/\\]", "", file.file)
         if self._asked.run is None:
             return [(stem, np.arange(len(file)))]
@@ -491,7 +489,7 @@ ROUNDED = 1e-9
 """Share of a column's size by which it may depart from a line in another that it is."""
 
 
-def _by_clock(rows: NDArray[np.int64], clock: Floats) -> list[NDArray[np.int64]]:
+def _by_clock(rows: Integers, clock: Floats) -> list[Integers]:
     back = np.flatnonzero(np.diff(clock[rows]) < 0.0) + 1
     if len(back) and len(rows) >= MOST_RESETS * (len(back) + 1):
         return np.split(rows, back)

@@ -13,13 +13,11 @@ from dbbstation.trace.columns import each
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.trace.circle import RawCircle
 
 
-def sector_of(raw: RawCircle, sectors: int) -> NDArray[np.int64]:
+def sector_of(raw: RawCircle, sectors: int) -> Integers:
     """Return every sample's sector, from 0 without gaps, shape (n,)."""
     sector = np.minimum((raw.phi_deg * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
     _, counted = np.unique(sector, return_inverse=True)
@@ -38,7 +36,7 @@ def averaged(raw: RawCircle, sectors: int) -> RawCircle:
     )
 
 
-def means(values: Floats, group: NDArray[np.int64]) -> Floats:
+def means(values: Floats, group: Integers) -> Floats:
     """Return each group's mean row, shape (groups, ...); groups count from 0 without gaps."""
     count = np.bincount(group)
     if values.ndim == 1:

@@ -18,9 +18,7 @@ from dbbstation.trace.loss import AFTER_LOSS, lost_samples, share_lost
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.recording import Recording
 
@@ -364,7 +362,7 @@ def _match(
     return turn, remaining / float(np.sqrt(spread)), remaining, of_noise
 
 
-def _slopes(t_s: Floats, piece: NDArray[np.int64]) -> Callable[[Floats], Floats]:
+def _slopes(t_s: Floats, piece: Integers) -> Callable[[Floats], Floats]:
     middle, half_s = 0.5 * (t_s[0] + t_s[-1]), 0.5 * (t_s[-1] - t_s[0])
     powers = np.polynomial.polynomial.polyvander((t_s - middle) / half_s, SHAPE_ORDER)
     orthogonal, upper = np.linalg.qr(powers)
@@ -393,7 +391,7 @@ def one_turn_deg(theta_deg: Floats, circle: Circle) -> Floats:
     return np.where(inside, phi, np.nan)
 
 
-def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: NDArray[np.bool_]) -> RawCircle:
+def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: Flags) -> RawCircle:
     """Return usable rows of the turn; refuse holes and a bar off the circle."""
     if recording.usable is not None:
         rows = rows & recording.usable

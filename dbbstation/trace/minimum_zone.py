@@ -11,9 +11,7 @@ import numpy as np
 from dbbstation.errors import TraceError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 FEWEST_POINTS = 4
 """Three points lie on one circle: the zone of fewer than four has no width and no place."""
@@ -72,7 +70,7 @@ def minimum_zone(points_mm: Floats) -> MinimumZone:
     raise TraceError("its minimum zone was not found", remedy="report this recording: this is a fault of the program")
 
 
-def _extremes(points_mm: Floats) -> NDArray[np.int64]:
+def _extremes(points_mm: Floats) -> Integers:
     # Sorting all points takes longer than the search: those of a sound path differ from the first.
     first = points_mm[:FEWEST_POINTS]
     if len(np.unique(first, axis=0)) < FEWEST_POINTS and len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:

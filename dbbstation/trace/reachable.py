@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.plan.circle import Circle
 
 OVERRIDE = 1.2
@@ -67,7 +65,7 @@ class Reachable:
         self._believe(_Seen(t_s, length_mm, t_uncertainty_s))
 
     @classmethod
-    def standing(cls, lengths_mm: Floats) -> NDArray[np.bool_]:
+    def standing(cls, lengths_mm: Floats) -> Flags:
         """Return which readings of a resting bar are possible, shape (n,)."""
         bar = cls(None)
         bar.note(0.0, float(np.median(lengths_mm)))

@@ -9,10 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.trace.columns import WithLogged, each
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.trace.columns import Logged
 
 
@@ -32,7 +29,7 @@ class Recording(WithLogged):
     length_mm: Floats
     theta_deg: Floats | None = None
     logged: Logged = field(default_factory=dict)
-    usable: NDArray[np.bool_] | None = None
+    usable: Flags | None = None
 
     def __len__(self) -> int:
         return len(self.t_s)

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
 
-    Plane: TypeAlias = NDArray[np.bool_]
+    Plane: TypeAlias = Flags
 
 CELL_WIDE, CELL_HIGH = 2, 4
 """Dots in a cell."""

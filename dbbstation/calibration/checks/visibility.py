@@ -13,10 +13,8 @@ from dbbstation.inference.blocks import spread_over
 from dbbstation.inference.square_root import complement
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.blocks import Block
 
 WEAKEST = 3
@@ -151,7 +149,7 @@ def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
     )
 
 
-def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, float]:
+def _leverage(calibration: Calibration, fitted: Integers) -> dict[str, float]:
     """Return the trace of covariance times a test's own information, averaged over its random effects.
 
     The trace approximates how many parameters are lost without the test. Shared effects, such as the bar's length, count as

@@ -21,10 +21,8 @@ from dbbstation.trace.columns import currents
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.layout import Layout
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Motion
 
@@ -51,7 +49,7 @@ def cleaned(labels: Sequence[str], current_a: Sequence[Floats]) -> tuple[list[Fl
     return kept, notes
 
 
-def one_way(growing: Sequence[NDArray[np.bool_]], usable: Sequence[NDArray[np.bool_]]) -> list[str]:
+def one_way(growing: Sequence[Flags], usable: Sequence[Flags]) -> list[str]:
     """Name motors whose struts never reverse, shapes (n, 6) per run."""
     notes = []
     for motor in range(STRUTS):
@@ -141,7 +139,7 @@ class CurrentChannel:
 
     motions: tuple[Motion, ...]
     current_a: tuple[Floats, ...]
-    usable: tuple[NDArray[np.bool_], ...]
+    usable: tuple[Flags, ...]
     notes: tuple[str, ...]
 
 
@@ -257,7 +255,7 @@ def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, F
 
 def by_themselves(
     blocks: Sequence[Block], known: Columns, noise: float = 1.0, nominal: Sequence[Block] | None = None
-) -> tuple[NDArray[np.int64], Solution]:
+) -> tuple[Integers, Solution]:
     """Solve for the columns of some blocks, from these blocks alone."""
     columns = np.unique(np.concatenate([block.columns for block in blocks]))
     part = Columns(known.prior[columns], known.scale[columns], known.random[columns])

@@ -13,11 +13,9 @@ from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.currents.channel import CurrentChannel
     from dbbstation.calibration.layout import Layout
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.blocks import Block
     from dbbstation.inference.noise import Noise
     from dbbstation.inference.square_root import Solution
@@ -102,7 +100,7 @@ def _drives(layout: Layout) -> set[str]:
 
 
 def _centre_of_gravity(
-    layout: Layout, alone: Mapping[str, tuple[NDArray[np.int64], Solution]]
+    layout: Layout, alone: Mapping[str, tuple[Integers, Solution]]
 ) -> dict[str, dict[str, tuple[float, float] | None]]:
     term = next((term for term in layout.terms if term.source.name == "cog-shift"), None)
     if term is None:

@@ -28,9 +28,7 @@ from dbbstation.trace.circle import RawCircle
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.sources.contract import ErrorSource, Motion
@@ -376,7 +374,7 @@ def linearise(
 
 def _predicted(
     layout: Layout, model: MachineModel, observation: Observation, motion: Motion, x: Floats
-) -> tuple[NDArray[np.int64], Floats, Floats]:
+) -> tuple[Integers, Floats, Floats]:
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])

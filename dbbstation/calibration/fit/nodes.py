@@ -17,9 +17,7 @@ from dbbstation.inference.blocks import compress
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.blocks import Block
     from dbbstation.model.observation import Observation
 
@@ -85,7 +83,7 @@ class RunNodes:
 
     def compressed(
         self,
-        columns: NDArray[np.int64],
+        columns: Integers,
         jacobian: Floats,
         length_mm: Floats,
         shift: Floats,
@@ -143,7 +141,7 @@ def nodes_of(run: Observation) -> RunNodes | None:
     )
 
 
-def _in_sectors(phi_deg: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _in_sectors(phi_deg: Floats) -> tuple[Integers, Floats]:
     place = phi_deg * (SECTORS / FULL_TURN_DEG)
     sector = np.clip(place.astype(np.int64), 0, SECTORS - 1)
     return sector, 2.0 * (place - sector) - 1.0

@@ -18,9 +18,7 @@ from dbbstation.inference.channel import Law
 from dbbstation.sources.contract import Effect, LinearSource, Need
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.sources.contract import ErrorSource, Parameter
 
@@ -153,7 +151,7 @@ class Change:
         return [p for p in self._parameters if not p.grid]
 
     @cached_property
-    def _groups(self) -> NDArray[np.int64]:
+    def _groups(self) -> Integers:
         return self.sides.groups(self.source)
 
     @property

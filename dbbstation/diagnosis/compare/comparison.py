@@ -32,9 +32,7 @@ from dbbstation.trace.analysis import figures
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.compare.findings import EffectOfCause
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
     from dbbstation.inference.cancelling import Cancelling
@@ -194,9 +192,7 @@ def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
     return tuple(out)
 
 
-def _run(
-    pair: Pair, settled: Settled, rows: slice, order: NDArray[np.int64], found: Floats, sigmas: float
-) -> RunDifference:
+def _run(pair: Pair, settled: Settled, rows: slice, order: Integers, found: Floats, sigmas: float) -> RunDifference:
     theta, count = np.radians(pair.theta_deg), len(pair.theta_deg)
     low, _ = bands(count)
     row = coefficients(pair.difference_mm, theta, low)
@@ -235,7 +231,7 @@ def _run(
     )
 
 
-def _stated(settled: Settled, rows: slice, order: NDArray[np.int64], columns: Floats) -> Floats:
+def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> Floats:
     """Return the variances of stated balls, bars and starts in a run's constant, first cosine and first sine [mm²]."""
     base = settled.channel.base
     by_angle = np.empty((len(columns), len(base.prior)))

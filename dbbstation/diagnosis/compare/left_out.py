@@ -17,8 +17,7 @@ from dbbstation.inference.read_off import Trial
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.model_comparison import Member
@@ -35,7 +34,7 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
     return Trial(None if gains is None else gains.anew, refits_without(settled, parts)), gains
 
 
-def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> KnownGains:
+def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[Flags]) -> KnownGains:
     def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
         return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
 

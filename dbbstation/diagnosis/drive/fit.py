@@ -20,9 +20,7 @@ from dbbstation.inference.verdict import OUT
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.inference.channel import Law
     from dbbstation.inference.hypotheses import Hypothesis
@@ -117,9 +115,7 @@ class DriveFit:
         return [n for n, s in sorted(below.items(), key=lambda item: -item[1]) if s > NEGATIVE_SIGMA]
 
 
-def fit(
-    drive: DriveChannel, settled: Settled, members: Sequence[Member], rows: NDArray[np.bool_] | None = None
-) -> DriveFit:
+def fit(drive: DriveChannel, settled: Settled, members: Sequence[Member], rows: Flags | None = None) -> DriveFit:
     """Fit base and members under priors."""
     channel, bank = drive.channel, settled.bank
     samples = np.hstack([channel.base.samples, *(bank.samples(member.columns) for member in members)])

@@ -18,8 +18,7 @@ from dbbstation.inference.verdict import Gains, is_worse
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.inference.settled import Settled
 
@@ -59,5 +58,5 @@ GAP_PERIODS = 0.5
 """Periods of the cut-off about a part that are left out beside it: the impulse response of the low-pass is a tenth beyond."""
 
 
-def _error(settled: Settled, rows: NDArray[np.bool_], in_time: Collection[str], without: Collection[str]) -> float:
+def _error(settled: Settled, rows: Flags, in_time: Collection[str], without: Collection[str]) -> float:
     return float(np.sum(np.square(left_without(settled, without, in_time)[rows])))

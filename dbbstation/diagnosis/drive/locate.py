@@ -11,9 +11,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.left_over import COUNTS_SIGMA
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.coloured import Coloured
 
@@ -54,7 +52,7 @@ def locate(
     return tuple(found[: BOUNDS.locations])
 
 
-def _stretches(marked: NDArray[np.bool_], direction: Floats) -> list[NDArray[np.int64]]:
+def _stretches(marked: Flags, direction: Floats) -> list[Integers]:
     rows = np.flatnonzero(marked)
     if not len(rows):
         return []

@@ -18,9 +18,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.signal import butter, sosfiltfilt
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 ORDER = 4
 """Of the Butterworth filters; twice that after both passes."""
@@ -62,14 +60,14 @@ def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -
     return next(fine, most)
 
 
-def within(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
+def within(marked: Flags, by: int) -> Flags:
     """Return samples within `by` of marked ones, shape (n,)."""
     count = np.concatenate([[0], np.cumsum(marked)])
     at = np.arange(len(marked))
     return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
 
 
-def weights(unknown: NDArray[np.bool_], rise: int) -> Floats:
+def weights(unknown: Flags, rise: int) -> Floats:
     """Return weights, shape (n,): zero at unknown forces, rising to one."""
     if not unknown.any():
         return np.ones(len(unknown))
@@ -90,9 +88,7 @@ def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_
     return most
 
 
-def edge_noise_m_s2(
-    weight: Floats, kept: NDArray[np.int64], noise_m: float, rate_hz: float, cutoff_hz: float
-) -> Floats:
+def edge_noise_m_s2(weight: Floats, kept: Integers, noise_m: float, rate_hz: float, cutoff_hz: float) -> Floats:
     """Return the excess acceleration noise of compared samples.
 
     Returns:

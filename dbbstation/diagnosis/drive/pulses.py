@@ -19,9 +19,7 @@ from dbbstation.inference.pushes import distinct_sizes, most_of_one_size, pooled
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.recordings import Recordings
 
@@ -65,7 +63,7 @@ def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
     return Edges(len(times), int(np.sum(_at_turns(recordings, times))), share)
 
 
-def _at_turns(recordings: Recordings, times: Floats) -> NDArray[np.bool_]:
+def _at_turns(recordings: Recordings, times: Floats) -> Flags:
     """Return whether times, shape (t,), are at starts, stops or reversals."""
     found = np.zeros(len(times), dtype=bool)
     for rows, one in zip(recordings.blocks, recordings.signals, strict=True):

@@ -35,9 +35,7 @@ from dbbstation.diagnosis.drive.travel import resolution_of, retreat_m, turning_
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.trace.drive_recording import DriveRecording
 
 PER_CUTOFF = 2.5
@@ -105,7 +103,7 @@ class Signals:
     standing_m_s: float
     way: Floats
     weight: Floats
-    kept: NDArray[np.int64]
+    kept: Integers
     notes: tuple[str, ...]
 
     def compared(self, columns: Floats) -> Floats:
@@ -130,7 +128,7 @@ class Signals:
         return np.where(self.speed_m_s * self.way > self.standing_m_s, self.way, 0.0)
 
     @cached_property
-    def reversals(self) -> NDArray[np.int64]:
+    def reversals(self) -> Integers:
         """Return samples of direction changes."""
         moving = np.flatnonzero(self.direction != 0.0)
         turned = np.flatnonzero(np.diff(self.direction[moving]) != 0.0)
@@ -146,7 +144,7 @@ class Signals:
         return np.where(last >= 0, travel, np.inf)
 
     @cached_property
-    def turns(self) -> NDArray[np.bool_]:
+    def turns(self) -> Flags:
         """Return starts, stops and reversals with half a band period around, shape (n,)."""
         acceleration = np.abs(self.acceleration_m_s2)
         changing = (self.direction == 0.0) | (acceleration > ACCELERATING_SHARE * acceleration.max())
@@ -233,7 +231,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     )
 
 
-def _rests(standing: NDArray[np.bool_], force_n: Floats, rate_hz: float, step: int) -> list[str]:
+def _rests(standing: Flags, force_n: Floats, rate_hz: float, step: int) -> list[str]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int64)))
     long = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > RESTS * step]
     if not long:

@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 RETREAT_SIGMA = 5.0
 """Standard deviations of the position by which it must retreat: noise does so once in ten thousand samples of a standing drive."""
@@ -45,7 +43,7 @@ def resolution_of(position: Floats) -> float:
     return size if float(np.median(np.abs(steps / size - np.round(steps / size)))) < WHOLE else 0.0
 
 
-def turning_points(position_m: Floats, retreat: float) -> NDArray[np.int64]:
+def turning_points(position_m: Floats, retreat: float) -> Integers:
     """Return turning samples, rising, shape (t,)."""
     found: list[int] = []
     way = 0
@@ -67,7 +65,7 @@ def turning_points(position_m: Floats, retreat: float) -> NDArray[np.int64]:
     return np.array(found, dtype=np.int64)
 
 
-def ways(position_m: Floats, turns: NDArray[np.int64]) -> Floats:
+def ways(position_m: Floats, turns: Integers) -> Floats:
     """Return direction, +1 or -1, shape (n,); zero without motion."""
     ends = np.concatenate([[0], turns, [len(position_m) - 1]])
     signs = np.sign(np.diff(position_m[ends]))

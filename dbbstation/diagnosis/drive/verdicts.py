@@ -22,8 +22,7 @@ from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import Complement, HeldOutForce
@@ -114,7 +113,7 @@ class Verdicts(CauseJudge):
             found.append(UnexplainedForce(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
-    def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+    def _sigmas(self, member: Member, values: Floats, covariance: Floats) -> float:
         name, after = member.cause.name, self._explained.after
         sigmas = super()._sigmas(member, values, covariance)
         if name not in self._members or name not in self._drive.of_law:

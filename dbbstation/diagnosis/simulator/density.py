@@ -11,9 +11,7 @@ from dbbstation.diagnosis.simulator.noise_left import noise_left
 from dbbstation.inference.uneven import log_student
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.channel import Channel
 
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
 def log_density(
     work: SimulationRuns,
     channel: Channel,
-    rows: NDArray[np.bool_],
+    rows: Flags,
     residual: Floats,
     columns: Floats,
 ) -> float:

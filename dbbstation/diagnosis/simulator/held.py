@@ -22,8 +22,7 @@ from dbbstation.inference.verdict import DensityGains
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
@@ -42,7 +41,7 @@ class PredictedPart(Fold):
             name.
     """
 
-    where: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    where: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     of_classes: Mapping[frozenset[str], tuple[float, float]] = field(default_factory=dict)
 
 
@@ -72,7 +71,7 @@ def gains_of(parts: Sequence[PredictedPart]) -> KnownGains:
     return KnownGains([part.where for part in parts], found, after)
 
 
-def parts(work: SimulationRuns) -> list[tuple[str, NDArray[np.bool_]]]:
+def parts(work: SimulationRuns) -> list[tuple[str, Flags]]:
     """Return parts [`part_numbers` of the runs], all outputs together."""
     runs, outputs = work.model.runs, len(work.model.outputs)
     number = part_numbers([len(run) for run in runs])
@@ -115,7 +114,7 @@ def predicted_parts(
             names: frozenset[str],
             one: SearchOutcome = one,
             known: dict[frozenset[str], tuple[float, float]] = known,
-            rows: NDArray[np.bool_] = rows,
+            rows: Flags = rows,
             others: Channel = others,
             with_all: float = with_all,
         ) -> tuple[float, float]:
@@ -136,6 +135,6 @@ def predicted_parts(
         yield PredictedPart(name, int(rows.sum()), before, middle, after, gains, rows, of_classes)
 
 
-def _without(channel: Channel, out: NDArray[np.bool_], found: SearchOutcome) -> Settled:
+def _without(channel: Channel, out: Flags, found: SearchOutcome) -> Settled:
     """Return the comparison without rows, shape (n,)."""
     return compared_quickly(channel.without(out).thinned(BOUNDS.fold_rows), found.settled.beginning)

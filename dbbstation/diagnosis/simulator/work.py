@@ -20,9 +20,7 @@ from dbbstation.inference.triangle import rms
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.simulator.model import Model, SimulationOutcome, TrialInput
     from dbbstation.diagnosis.simulator.terms import Term
 
@@ -89,7 +87,7 @@ class Answers:
 
     columns: Floats
     curved: Floats
-    seen: NDArray[np.bool_]
+    seen: Flags
 
 
 @dataclass(eq=False)

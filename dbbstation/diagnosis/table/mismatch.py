@@ -30,9 +30,7 @@ from dbbstation.inference.verdict import OUT, Verdict, is_worse
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.table.contract import TableSource
     from dbbstation.diagnosis.table.data import Table
     from dbbstation.inference.cancelling import Cancelling
@@ -236,10 +234,10 @@ def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progres
     residual = settled.channel.residual
     parts = iter(parts_of(settled.channel))
 
-    def as_simulated(rows: NDArray[np.bool_]) -> Floats:
+    def as_simulated(rows: Flags) -> Floats:
         return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
 
-    def choose(channel: Channel, out: NDArray[np.bool_]) -> Settled:
+    def choose(channel: Channel, out: Flags) -> Settled:
         one = choose_without(channel, out, beginning=settled.beginning)
         chosen.append(WithoutPart(next(parts)[1], one))
         return one
@@ -250,9 +248,7 @@ def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progres
 
 
 @with_one_thread
-def choose_without(
-    channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
-) -> Settled:
+def choose_without(channel: Channel, rows: Flags, *, beginning: Beginning = Beginning.EVERYTHING) -> Settled:
     """Repeat the selection without rows, shape (n,), in a smaller search, which can only raise the error."""
     kept = channel.without(rows).thinned(BOUNDS.fold_rows)
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=BOUNDS.work_without)

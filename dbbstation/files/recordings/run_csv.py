@@ -25,9 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
 
 PART = ".part"
 """Ending, after `.csv`, of a run that is being recorded."""
@@ -160,7 +158,7 @@ _BY_THEMSELVES = (columns.TIME, columns.LENGTH, columns.THETA)
 """Columns that a recording has in places of their own."""
 
 
-def _recording(file: str, numbers: Mapping[str, Floats], usable: NDArray[np.bool_] | None) -> Recording:
+def _recording(file: str, numbers: Mapping[str, Floats], usable: Flags | None) -> Recording:
     return Recording(
         name=file,
         t_s=numbers[columns.TIME],

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 SEPARATORS = ",;\t"
 MOST_FAULTS = 20
@@ -53,7 +53,7 @@ class TableFile:
     file: str
     header: int
     names: tuple[str, ...]
-    lines: NDArray[np.int64]
+    lines: Integers
     cells: dict[str, tuple[str, ...]]
     values: dict[str, Floats] = field(default_factory=dict)
     instants: frozenset[str] = frozenset()

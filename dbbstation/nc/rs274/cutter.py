@@ -11,10 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.nc.rs274.arcs import Arc
 
 TANGENT_RAD = 0.05
@@ -64,7 +61,7 @@ class Beside:
     added: int
     start: Floats
     end: Floats
-    plane: NDArray[np.int64]
+    plane: Integers
     arc: Arc | None
 
     @property
@@ -96,7 +93,7 @@ class Beside:
             raise NoRoomError
 
 
-def with_plane(pose: Floats, plane: NDArray[np.int64], place: complex) -> Floats:
+def with_plane(pose: Floats, plane: Integers, place: complex) -> Floats:
     """Return a pose, shape (6,), with another place in a plane."""
     there = pose.copy()
     there[plane] = place.real, place.imag

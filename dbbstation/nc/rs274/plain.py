@@ -11,7 +11,7 @@ from dbbstation.machine.compiled import compiled, inlined
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
 
 LEAST_LINES, MOST_LINES = 4, 20_000
 """Lines that are read at once: fewer are sooner read one by one."""
@@ -39,7 +39,7 @@ class PlainLines(NamedTuple):
         axes: X, Y, Z, A, B, C as written, NaN if not named, shape (n, 6).
     """
 
-    numbers: NDArray[np.int64]
+    numbers: Integers
     motion: Floats
     feed: Floats
     axes: Floats
@@ -68,9 +68,9 @@ def plain_lines(letters: NDArray[np.uint8], at: int) -> PlainLines:
 def _read(
     letters: NDArray[np.uint8],
     at: int,
-    head: NDArray[np.int64],
-    digits: NDArray[np.int64],
-    decimals: NDArray[np.int64],
+    head: Integers,
+    digits: Integers,
+    decimals: Integers,
     names: NDArray[np.uint8],
 ) -> int:
     for row in range(len(head)):
@@ -83,7 +83,7 @@ def _read(
 
 
 @inlined
-def _after_number(letters: NDArray[np.uint8], at: int, head: NDArray[np.int64]) -> int:
+def _after_number(letters: NDArray[np.uint8], at: int, head: Integers) -> int:
     if letters[at] != _N:
         return at
     end, head[0], places = _number(letters, at + 1)
@@ -93,7 +93,7 @@ def _after_number(letters: NDArray[np.uint8], at: int, head: NDArray[np.int64]) 
 
 
 @inlined
-def _after_motion(letters: NDArray[np.uint8], at: int, head: NDArray[np.int64]) -> int:
+def _after_motion(letters: NDArray[np.uint8], at: int, head: Integers) -> int:
     if letters[at] != _G:
         return at
     at += 1 + (letters[at + 1] == _ZERO and _ZERO <= letters[at + 2] <= _ONE)
@@ -107,8 +107,8 @@ def _after_motion(letters: NDArray[np.uint8], at: int, head: NDArray[np.int64]) 
 def _after_axes(
     letters: NDArray[np.uint8],
     at: int,
-    digits: NDArray[np.int64],
-    decimals: NDArray[np.int64],
+    digits: Integers,
+    decimals: Integers,
     names: NDArray[np.uint8],
 ) -> int:
     first = at

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Motion
 
@@ -17,7 +15,7 @@ SHORTEST_S = 1e-6
 """Rows that are closer in time than this are one: their difference is rounding, not movement [s]."""
 
 
-def driven_in_time(motion: Motion, machine: Machine) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def driven_in_time(motion: Motion, machine: Machine) -> tuple[Floats, Floats, Integers]:
     """Return commanded strut lengths at rising times.
 
     Returns:

@@ -13,9 +13,7 @@ from dbbstation.files.recordings.table_csv import MOST_FAULTS, NO_NUMBER
 from dbbstation.files.source_text import shortened
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.foreign_csv import ForeignTable
 
@@ -52,8 +50,8 @@ def says_no_reading(cell: str) -> bool:
 
 
 def samples_of(
-    table: ForeignTable, rows: NDArray[np.int64], mapping: MappingFile, faults: list[Problem]
-) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    table: ForeignTable, rows: Integers, mapping: MappingFile, faults: list[Problem]
+) -> tuple[Integers, tuple[str, ...]]:
     """Return a run's rows with readings, and notes on the others.
 
     Args:
@@ -88,7 +86,7 @@ def samples_of(
 
 
 def held_over_gaps(
-    table: ForeignTable, rows: NDArray[np.int64], name: str, faults: list[Problem]
+    table: ForeignTable, rows: Integers, name: str, faults: list[Problem]
 ) -> tuple[Floats, tuple[str, ...]]:
     """Return a slow column, such as a temperature; a gap repeats the reading before, a first gap the one after."""
     numbers = table.table.values[name][rows]

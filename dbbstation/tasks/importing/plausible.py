@@ -15,9 +15,7 @@ from dbbstation.trace.cut import LARGEST_JUMP_MM
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.table_csv import TableFile
     from dbbstation.plan.circle import Circle
@@ -115,7 +113,7 @@ def unlike_the_feed(t_s: Floats, theta_deg: Floats, unit: str, circle: Circle) -
 def check_units(
     mapping: MappingFile,
     table: TableFile,
-    rows: NDArray[np.int64],
+    rows: Integers,
     values: Mapping[str, Floats],
     circle: Circle,
 ) -> None:

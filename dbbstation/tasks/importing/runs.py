@@ -49,9 +49,7 @@ from dbbstation.trace import columns
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.plan.plan import Plan
@@ -128,7 +126,7 @@ class Reader:
         if self.faults:
             raise InputError(self.faults[:MOST_FAULTS])
 
-    def _groups(self, table: ForeignTable) -> list[tuple[NDArray[np.int64], dict[str, str]]]:
+    def _groups(self, table: ForeignTable) -> list[tuple[Integers, dict[str, str]]]:
         of_runs = {m: name for m in OF_RUNS if (name := self.mapping.column(m)) is not None}
         clock = of_runs.pop(STARTED, None)  # may be another one in each row: the first of a run counts
         cells = [table.table.cells[name] for name in of_runs.values()]
@@ -153,7 +151,7 @@ class Reader:
             for key, each in rows.items()
         ]
 
-    def _split(self, table: ForeignTable) -> list[NDArray[np.int64]]:
+    def _split(self, table: ForeignTable) -> list[Integers]:
         def numbers(means: str) -> Floats | None:
             name = self.mapping.column(means)
             if name is None or name not in table.table.values:
@@ -193,9 +191,7 @@ class Reader:
             return []
         return [every]
 
-    def _run(
-        self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], told: RunName
-    ) -> ImportedRun | None:
+    def _run(self, table: ForeignTable, rows: Integers, said: Mapping[str, str], told: RunName) -> ImportedRun | None:
         file, line = table.table.file, int(table.table.lines[rows[0]])
         before = len(self.faults)
         rows, gaps = samples_of(table, rows, self.mapping, self.faults)
@@ -260,7 +256,7 @@ class Reader:
         )
         return ImportedRun(file, run, circle, (*computed, *travelled.computed))
 
-    def _values(self, table: ForeignTable, rows: NDArray[np.int64]) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    def _values(self, table: ForeignTable, rows: Integers) -> tuple[dict[str, Floats], tuple[str, ...]]:
         found, said = {}, list[str]()
         for name, column in self.mapping.columns.items():
             if column.means not in UNITS or column.unit is None:
@@ -347,7 +343,7 @@ class Reader:
         return RunState(text) if text in _STATES else RunState.ACCEPTED
 
     def _started(
-        self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
+        self, table: ForeignTable, rows: Integers, said: Mapping[str, str], computed: list[str]
     ) -> datetime | None:
         at = self._stated_start(table, rows, said, computed)
         wrong = "" if at is None else impossible_day(at)
@@ -357,7 +353,7 @@ class Reader:
         return at
 
     def _stated_start(
-        self, table: ForeignTable, rows: NDArray[np.int64], said: Mapping[str, str], computed: list[str]
+        self, table: ForeignTable, rows: Integers, said: Mapping[str, str], computed: list[str]
     ) -> datetime | None:
         later = timedelta(seconds=self._later_s(table, rows))
         if table.table.file in self.started:
@@ -375,7 +371,7 @@ class Reader:
         computed += found.assumed
         return found.at if in_column else found.at + later
 
-    def _later_s(self, table: ForeignTable, rows: NDArray[np.int64]) -> float:
+    def _later_s(self, table: ForeignTable, rows: Integers) -> float:
         name = self.mapping.column(TIME)
         if name is None:
             return 0.0

@@ -12,9 +12,7 @@ from dbbstation.trace.cut import LARGEST_GAP_DEG
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.plan.circle import Circle
 
 SMALLEST_RUN_DEG = 90.0
@@ -26,7 +24,7 @@ def longest_pause_s(circles: Sequence[Circle]) -> float:
     return max(LARGEST_GAP_DEG / circle.turning_deg_s for circle in circles)
 
 
-def parts_by_gaps(t_s: Floats | None, lines: NDArray[np.int64], pause_s: float) -> list[NDArray[np.int64]]:
+def parts_by_gaps(t_s: Floats | None, lines: Integers, pause_s: float) -> list[Integers]:
     """Return the rows of each run, separated by pauses, restarted times or empty lines.
 
     Args:
@@ -39,7 +37,7 @@ def parts_by_gaps(t_s: Floats | None, lines: NDArray[np.int64], pause_s: float) 
     return _parts(len(lines), np.flatnonzero(begins) + 1)
 
 
-def parts_by_direction(angle_deg: Floats) -> list[NDArray[np.int64]]:
+def parts_by_direction(angle_deg: Floats) -> list[Integers]:
     """Return the rows of each run, separated by a change of turning direction."""
     travelled = np.unwrap(angle_deg, period=FULL_TURN_DEG)
     ends: list[int] = []
@@ -63,5 +61,5 @@ def parts_by_direction(angle_deg: Floats) -> list[NDArray[np.int64]]:
     return _parts(len(travelled), np.array(ends, dtype=np.int64) + 1)
 
 
-def _parts(n: int, begins: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def _parts(n: int, begins: Integers) -> list[Integers]:
     return [rows for rows in np.split(np.arange(n), begins) if len(rows)]

@@ -11,9 +11,7 @@ from dbbstation.plan.circle import FULL_TURN_DEG, Circle, Direction
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.mapping import AngleSchema
 
 LONGEST_START_S = 3600.0
@@ -50,7 +48,7 @@ class TravelledPath:
 
     t_s: Floats
     theta_deg: Floats | None
-    rows: NDArray[np.int64]
+    rows: Integers
     computed: tuple[str, ...] = ()
 
 

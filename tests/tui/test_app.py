@@ -24,6 +24,7 @@ from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.asking import TypeQuestion
 from dbbstation.tui.findings_panel import FindingsPanel
 from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.large_screen import LargeFigures, LargeScreen
@@ -424,6 +425,16 @@ def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left()
     # Somebody noted it behind the last circle.
     assert played(complete().command(Accept(), AddNote(ambient_temp_c=20.5)), not_asked).sent == [Quit()]
     assert Quit() in played(complete().command(AddNote("a chip")), without).sent
+
+
+def test_a_note_has_its_key_and_can_be_left() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("plus", *"no", "escape")
+        assert not isinstance(app.screen, TypeQuestion)
+        await pilot.press("plus")
+        await pilot.press(*"no_coolant", "enter")
+
+    assert played(announced(), play).sent == [AddNote("no_coolant")]
 
 
 def test_behind_the_last_circle_it_is_written_into_the_session(tmp_path: Path) -> None:

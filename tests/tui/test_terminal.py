@@ -30,11 +30,11 @@ CURSOR_AGAIN = "\x1b[?25h"
 class Terminal:
     """A program on a pseudo-terminal of 24 rows and 80 columns."""
 
-    def __init__(self, *arguments: str) -> None:
+    def __init__(self, *arguments: str, **more: str) -> None:
         self._master, slave = os.openpty()
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
         self.modes = termios.tcgetattr(slave)
-        environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"}
+        environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"} | more
         self.process = subprocess.Popen(
             [sys.executable, "-m", "dbbstation", "station", *arguments],
             stdin=slave,
@@ -109,6 +109,22 @@ def test_quit_leaves_the_terminal_as_it_was(terminal: Terminal, tmp_path: Path) 
     assert terminal.exit_code() == 0
     assert terminal.restored()
     assert f"{tmp_path / 'session'}: 0 of 6 runs accepted" in terminal.shown
+
+
+def test_a_terminal_of_another_encoding_is_drawn_on_in_ascii(tmp_path: Path) -> None:
+    terminal = Terminal("--virtual", "--time-scale", "10", "--out", str(tmp_path / "session"), LC_ALL="C")
+    try:
+        terminal.until("then press Enter")
+        terminal.press("\r")
+        terminal.until("a verdict")
+        terminal.press("q")
+        terminal.until("Temperature of the shop now")
+        terminal.press("\r")
+        assert terminal.exit_code() == 0
+    finally:
+        terminal.close()
+    drawn = terminal.shown.split("\x1b[?1049h", 1)[1].split(MAIN_SCREEN_AGAIN, 1)[0]
+    assert drawn.isascii()
 
 
 @pytest.mark.slow

@@ -197,6 +197,15 @@ def test_moves_at_feed_before_the_first_place_and_an_end_by_a_rapid_are_stated(l
             linuxcnc.toolpath(cut_short, "part.ngc", start=declared)
 
 
+def test_a_comment_within_a_comment_is_part_of_it(linuxcnc):
+    path = read_program(f"{FIRST}(End mill (6 mm) X9)\nG1 X1 F100 (MSG, half (of it))\nM2\n", "part.ngc")
+    assert list(path.text.values()) == ["End mill [6 mm] X9", "MSG, half [of it]"]
+    assert path.poses[:, 0].max() == 1.0
+    for wrong in ("(a (b) X9", "(a) b) X9", "(a (b (c)))"):
+        with pytest.raises(InputError):
+            read_program(f"{FIRST}{wrong}\nM2\n", "part.ngc")
+
+
 def test_behind_g80_holds_the_rapid_from_before_the_cycle():
     cycle = "G98 G81 X1 Y1 Z-1005 R-999 F100\nG80\nZ-985\nM2\n"
     path = read_program(FIRST + cycle, "part.ngc")

@@ -18,7 +18,7 @@ _TOKEN = re.compile(
         (?P<letter>[A-Za-z@^])[ \t]*+(?P<number>{NUMBER.pattern})
       | (?P<word>[A-Za-z@^])(?=[ \t]*+[-+]?[ \t]*+(?:[\[#]|[A-Za-z]{{2,6}}[ \t]*+\[))
       | (?P<setting>\#)
-      | \((?P<comment>[^()]*+)\)
+      | \((?P<comment>(?:[^()]|\([^()]*+\))*+)\)
       | ;(?P<rest>.*+)
       | (?P<end>\Z)
     )""",
@@ -33,7 +33,7 @@ slip of the pen, and would be drawn out into millions of points before any limit
 _NOT_READ = {
     "[": ("an expression ([ ]) without its letter", "write the letter before it"),
     "/": ("a line that a switch of the control skips (/)", "say how the switch stands: --block-delete on, or off"),
-    "(": ("a comment without its end, or inside another", "close it with ) before the line ends"),
+    "(": ("a comment without its end", "close it with ) before the line ends"),
     "%": ("% stands alone on the first and the last line", "remove it"),
 }
 
@@ -127,7 +127,9 @@ def tokens(
             yield _computed(match, reader, place)
             position = reader.position
         else:
-            yield Comment(match[kind or 0], kind == "comment", match.start(kind or 0))
+            # A comment within a comment, which LinuxCNC refuses, is part of it: what ends it at the first ) refuses the rest.
+            said = match[kind or 0].replace("(", "[").replace(")", "]") if kind == "comment" else match[kind or 0]
+            yield Comment(said, kind == "comment", match.start(kind or 0))
 
 
 def _computed(match: re.Match[str], reader: ValueReader, place: Place) -> Word | ParameterSetting:

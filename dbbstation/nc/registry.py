@@ -59,7 +59,9 @@ def dialect_of_file(file: str, text: str) -> Dialect:
     if not having:
         extensions = ", ".join(f"{dialect.extension} ({name})" for name, dialect in known.items())
         raise StationError(
-            f"no NC dialect has files that end with {extension!r}", where=file, remedy=f"known: {extensions}"
+            f"no NC dialect has files that end with {extension!r}",
+            where=file,
+            remedy=f"known: {extensions}; name its language with --written-in",
         )
     fitting = having if len(having) == 1 else [dialect for dialect in having if dialect.is_in(text)]
     if len(fitting) != 1:

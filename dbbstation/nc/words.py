@@ -208,10 +208,15 @@ class WordDialect(Dialect):
             words = self._words(toolpath, changed, rows)
             kinds, feeds = toolpath.kind[rows].tolist(), toolpath.feed[rows].tolist()
             corners, in_machine = toolpath.corners_mm[rows].tolist(), toolpath.in_machine[rows].tolist()
+            ends = _ends_of_plain(toolpath, rows) if plain_feed else []
+            done = 0
             for place, kind in enumerate(kinds):
-                same = kind == RowKind.FEED and feeds[place] == state.feed and not in_machine[place]
-                if plain_feed and same and (corners[place] == state.corner_mm or math.isnan(corners[place])):
-                    yield f"{plain_feed[0]}{words[place]}{plain_feed[-1]}"
+                if place < done:
+                    continue
+                if ends and ends[place] > place:
+                    done = ends[place]
+                    lines = f"{plain_feed[-1]}\n{plain_feed[0]}".join(words[place:done])
+                    yield f"{plain_feed[0]}{lines}{plain_feed[-1]}"
                     continue
                 try:
                     if kind not in _MOVES:
@@ -266,6 +271,17 @@ class WordDialect(Dialect):
             for row, words in zip(alike.tolist(), together.split("\n"), strict=True):
                 texts[row] = words
         return texts
+
+
+def _ends_of_plain(toolpath: Toolpath, rows: slice) -> list[int]:
+    """Return where the stretch of moves ends that each row goes on with, counted in these rows; the row itself if it changes more than axes."""
+    kind, feed, corner = toolpath.kind[rows], toolpath.feed[rows], toolpath.corners_mm[rows]
+    plain = np.zeros(len(kind) + 1, dtype=np.bool_)
+    same = (kind[1:] == RowKind.FEED) & (kind[:-1] == RowKind.FEED) & (feed[1:] == feed[:-1])
+    plain[1:-1] = same & ((corner[1:] == corner[:-1]) | np.isnan(corner[1:])) & ~toolpath.in_machine[rows][1:]
+    stops = np.flatnonzero(~plain)
+    ends: list[int] = stops[np.searchsorted(stops, np.arange(len(kind)))].tolist()
+    return ends
 
 
 class _Modal:

@@ -32,7 +32,7 @@ GUARD = "\n".join(guard_lines({IN_FORCE: (0.0,) * 6}))
 # error is 100 (1 - cos 45°) = 29.289322 mm, and as much may be cut off the corners.
 GOLDEN = f"""\
 ; a small circle
-; 0.1 um, [1?]
+; 0.1 um, [1...]
 {GUARD}
 G21 G90 G94 G17 G40 G49
 G64 P29.28932 Q0

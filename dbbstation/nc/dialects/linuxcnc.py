@@ -36,7 +36,7 @@ class LinuxCNC(WordDialect):
 
     name = "linuxcnc"
     extension = ".ngc"
-    also_read = (".nc", ".tap", ".cnc", ".gcode", ".gc", ".eia")
+    also_read = ("", ".nc", ".tap", ".cnc", ".gcode", ".gc", ".g", ".eia", ".iso", ".din", ".ncf", ".prg", ".txt")
     what = "LinuxCNC (RS274/NGC)"
     look_ahead = LookAhead(share=0.5)
     takes_setup = True

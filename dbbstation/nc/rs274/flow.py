@@ -42,7 +42,8 @@ _KEYWORDS = frozenset(
     "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue".split()  # noqa: SIM905 - words
 )
 _MACRO = re.compile(
-    r"(?im)^[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?(?P<word>WHILE|IF|GOTO|END(?=[ \t]*[0-9]+[ \t]*(?:[;(]|\r?$)))(?P<rest>[^\n]*)$"
+    r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?(?=[WwIiEe]|[Gg][Oo])"
+    r"(?P<word>(?i:WHILE|IF|GOTO|END(?=[ \t]*[0-9]+[ \t]*(?:[;(]|\r?$))))(?P<rest>[^\n]*)$"
 )
 _LOOP = re.compile(r"[ \t]*DO[ \t]*(?P<number>[0-9]+)[ \t]*\Z", re.IGNORECASE)
 _GOTO = re.compile(r"[ \t]*(?:GOTO)?[ \t]*(?P<number>[0-9]+)[ \t]*\Z", re.IGNORECASE)

@@ -197,7 +197,7 @@ def test_moves_at_feed_before_the_first_place_and_an_end_by_a_rapid_are_stated(l
             linuxcnc.toolpath(cut_short, "part.ngc", start=declared)
 
 
-def test_a_comment_within_a_comment_is_part_of_it(linuxcnc):
+def test_a_comment_within_a_comment_is_part_of_it():
     path = read_program(f"{FIRST}(End mill (6 mm) X9)\nG1 X1 F100 (MSG, half (of it))\nM2\n", "part.ngc")
     assert list(path.text.values()) == ["End mill [6 mm] X9", "MSG, half [of it]"]
     assert path.poses[:, 0].max() == 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -74,12 +74,12 @@ def bar(
     of_bar: BarOptions,
     calibrator: CalibratorOptions,
     *,
-    count: Annotated[int, Option("Readings.", least=20, most=1_000_000)] = USUAL_READINGS,
+    count: Annotated[int, Option("Number of readings.", least=20, most=1_000_000)] = USUAL_READINGS,
     resolution_um: Annotated[
         float | None,
         Option("Last digit of the display  [default: as readings show].", least=0.0001, most=100.0),
     ] = None,
-    out: Annotated[Path, Option("File of the bar.", kind="file")],
+    out: Annotated[Path, replace(o.OUT, metavar="BAR.yaml")],
     force: o.Force = False,
     as_json: o.Json = False,
 ) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.instrument_options import PROFILE
+from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE
 from dbbstation.cli.output import echo, echo_line
 from dbbstation.tasks import options as o
 from dbbstation.tasks.chosen import chosen_of
@@ -44,10 +44,7 @@ def check(
     step_deg: o.StepDeg = 0.1,
     clearance_mm: o.ClearanceMm = 20.0,
     bar_stays_on: o.BarStaysOn = False,
-    instrument: Annotated[
-        str | None,
-        Option("State the points per turn of this instrument at the plans' feeds.", metavar="NAME"),
-    ] = None,
+    instrument: Annotated[str | None, replace(INSTRUMENT, setting="")] = None,
     profile: Annotated[str | None, replace(PROFILE, setting="")] = None,
     anchor: Annotated[
         str | None,

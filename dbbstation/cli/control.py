@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -57,7 +57,7 @@ def control() -> None:
 def kinematics(
     of: ModelOptions,
     *,
-    out: Annotated[Path, Option("Component to write: NAME.comp.", kind="file")],
+    out: Annotated[Path, replace(o.OUT, metavar="NAME.comp")],
     leave_out: Annotated[
         Names, Option("Leave these sources uncorrected; may be given more than once.", metavar="SOURCE,...")
     ] = (),
@@ -102,7 +102,7 @@ def kinematics(
 def parameters(
     of: ModelOptions,
     *,
-    out: Annotated[Path, Option("Folder to write to.", kind="folder")],
+    out: Annotated[Path, replace(o.OUT, kind="folder", metavar="FOLDER")],
     volume: Annotated[
         list[float] | None,
         Option(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 @made()
 def demo(
     *,
-    out: Annotated[Path | None, Option("New folder for everything.", kind="folder")] = None,
-    seed: Annotated[int, Option("Seed of the machine's errors.", least=0)] = 3,
+    out: Annotated[Path | None, replace(o.OUT, kind="folder", metavar="FOLDER")] = None,
+    seed: o.Seed = 3,
     quick: Annotated[bool, Option("Three tests instead of fifteen, in both directions.")] = False,
     control: Annotated[Literal["linuxcnc"] | None, Option("Compare four corrections in this control.")] = None,
     as_json: o.Json = False,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.instrument_options import ProtocolOptions, RateHz
+from dbbstation.cli.instrument_options import BAUD, PROGRAMS, ProtocolOptions, RateHz
 from dbbstation.cli.output import echo, json_text, say
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
 from dbbstation.system.virtual_ports import marked_virtual
@@ -28,16 +29,14 @@ _LOOK_S = 0.2
 def emulate(
     chosen: ProtocolOptions,
     *,
-    plan: Annotated[Path, Option("Test plan.")],
-    machine: Annotated[Path, Option("Nominal machine.")],
+    plan: Annotated[Path, o.PLAN],
+    machine: Annotated[Path, o.MACHINE],
     truth: Annotated[Path | None, Option("Model file with the true errors of the virtual machine.")] = None,
     source_files: o.SourcePaths = (),
-    seed: Annotated[int, Option("Seed of everything random.", least=0)] = 0,
-    programs: Annotated[Path | None, Option("Folder of NC programs to run.", kind="folder")] = None,
+    seed: o.Seed = 0,
+    programs: Annotated[Path | None, PROGRAMS] = None,
     rate_hz: RateHz = None,
-    time_scale: Annotated[
-        float, Option("Factor by which machine and line run faster than real time.", least=0.01, most=200.0)
-    ] = 1.0,
+    time_scale: Annotated[float, Option(o.TIME_SCALE, least=0.01, most=200.0)] = 1.0,
     wait: Annotated[
         bool,
         Option(
@@ -46,7 +45,7 @@ def emulate(
     ] = False,
     noise_um: Annotated[float, Option("Standard deviation of the noise of a reading [µm].", least=0.0)] = 0.3,
     bar_um: Annotated[float, Option("Standard deviation of the bar's length error [µm].", least=0.0)] = 0.5,
-    baud: Annotated[int | None, Option("Baud rate that the virtual instrument is set to.", least=1)] = None,
+    baud: Annotated[int | None, replace(BAUD, setting="")] = None,
     as_json: o.Json = False,
 ) -> None:
     r"""Run a virtual hexapod with a ball bar, as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -39,7 +40,7 @@ def fleet(
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     false_alarms: Annotated[float, Option(o.FALSE_ALARMS, least=1e-6, most=0.5)] = 0.01,
-    out: Annotated[Path, Option("Folder of the results; created if missing.", kind="folder")] = Path("fleet"),
+    out: Annotated[Path, replace(o.OUT, kind="folder", metavar="FOLDER")] = Path("fleet"),
     table: Annotated[Path | None, Option("Write the table here too: a .csv or .parquet file.", kind="file")] = None,
     jobs: Annotated[int | None, Option("Processes of this computer  [default: one for each core].", least=1)] = None,
     scheduler: Annotated[

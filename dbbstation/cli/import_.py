@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -41,9 +41,9 @@ def import_(
     noted: SessionOptions,
     *,
     files: Annotated[tuple[Path, ...], Option("recordings.", kind="argument", metavar="FILE.csv...")],
-    out: Annotated[Path, Option("Session folder to make.", kind="folder")],
-    plan: Annotated[Path | None, Option("Test plan whose circles were run.")] = None,
-    machine: Annotated[Path | None, Option("The machine, as its controller believed it.")] = None,
+    out: Annotated[Path, replace(o.OUT, kind="folder", metavar="SESSION")],
+    plan: Annotated[Path | None, o.PLAN] = None,
+    machine: Annotated[Path | None, o.MACHINE] = None,
     run: Annotated[
         tuple[str, ...],
         Option(
@@ -72,7 +72,7 @@ def import_(
         Option("A condition that is unknown; the session notes this. May be given more than once.", whole=True),
     ] = (),
     yes: Annotated[bool, Option("Write without asking.")] = False,
-    dry_run: Annotated[bool, Option("Try the import and show the result without writing it.")] = False,
+    dry_run: o.DryRun = False,
     as_json: o.Json = False,
 ) -> None:
     r"""Take recordings that another program made into a sealed session.
@@ -149,7 +149,6 @@ def _read(
     said: _Told,
     noted: SessionOptions,
 ) -> _Import:
-    from dataclasses import replace
     from datetime import UTC, datetime
 
     from dbbstation.cli.mapping_options import chosen_mapping, read_tables
@@ -209,7 +208,6 @@ def _result(found: _Import, out: Path, *, written: bool) -> ImportResult:
 
 
 def _with_conditions(asker: Asker, told: SessionOptions, not_known: Sequence[str]) -> SessionOptions:
-    from dataclasses import replace
 
     if told.ambient_temp_c is None and "temperature" not in not_known:
         asked = asker.number("temperature of the shop [degC]", _or("--ambient-temp-c", "temperature"))
@@ -336,7 +334,6 @@ def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> lis
 
 
 def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> Reader:
-    from dataclasses import replace
 
     angle = reader.mapping.angle
     if angle is None or angle.span_deg is not None or not asker.terminal:

@@ -24,11 +24,13 @@ PROFILE = Option(
     setting="profile",
     goes_with="instrument",
 )
-ZERO_MM = Option("Distance between the ball centres at zero of a short display [mm].", least=20.0, most=2000.0)
+ZERO_MM = Option(
+    "Distance between the ball centres at which a short display, or a deviation, is zero [mm].", least=20.0, most=2000.0
+)
 PORT = Option("Port name, or a URL such as socket://127.0.0.1:4001 or rfc2217://127.0.0.1:4001.", setting="port")
-Baud = Annotated[
-    int | None, Option("Baud rate, if the instrument is not set to the usual one.", least=1, setting="baud")
-]
+BAUD = Option("Baud rate, if the instrument is not set to the usual one.", least=1, setting="baud")
+Baud = Annotated[int | None, BAUD]
+PROGRAMS = Option("Folder of NC programs, TEST-DIRECTION.", kind="folder")
 RateHz = Annotated[float | None, Option("Sampling rate [1/s], if it is not the usual one.", least=0.1, most=100_000.0)]
 Spy = Annotated[
     Path | None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -75,7 +75,7 @@ def jig() -> None:
 def sheet(
     given: SheetOptions,
     *,
-    before: Annotated[Path, Option("Jig file whose plate and holders stay.")],
+    before: Annotated[Path, Option("Jig file that the new one is made from.")],
     u_unit: Annotated[
         _Unit | None,
         Option(
@@ -98,7 +98,7 @@ def sheet(
         float | None,
         Option("Temperature of the plate while it was measured [degC].", least=-30.0, most=80.0),
     ] = None,
-    out: Annotated[Path, Option("Jig file to write.", kind="file")],
+    out: Annotated[Path, replace(o.OUT, metavar="JIG.yaml")],
     force: o.Force = False,
     as_json: o.Json = False,
 ) -> None:
@@ -169,8 +169,8 @@ def holders(
             most=100.0,
         ),
     ] = 0.0,
-    before: Annotated[Path | None, Option("Jig file whose holders get the result; with --out.")] = None,
-    out: Annotated[Path | None, Option("Jig file to write.", kind="file")] = None,
+    before: Annotated[Path | None, Option("Jig file that the new one is made from.")] = None,
+    out: Annotated[Path | None, replace(o.OUT, metavar="JIG.yaml")] = None,
     force: o.Force = False,
     as_json: o.Json = False,
 ) -> None:

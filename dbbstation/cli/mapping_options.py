@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
+from dbbstation.cli.instrument_options import ZERO_MM
 from dbbstation.cli.output import say
 from dbbstation.cli.shop import shop_settings
 from dbbstation.files.formats.number_language import SEPARATORS, number_language
@@ -100,9 +101,7 @@ class MappingOptions(AsWritten):
         str | None,
         Option("Time zone of dates without one, such as +01:00  [default: this computer's].", metavar="ZONE"),
     ] = None
-    zero_mm: Annotated[
-        float | None, Option("Length of the bar at which the deviation is 0 [mm].", least=20.0, most=2000.0)
-    ] = None
+    zero_mm: Annotated[float | None, ZERO_MM] = None
     file_name: Annotated[
         str | None, Option("Pattern that file names follow, such as '{test}_{direction}'.", metavar="PATTERN")
     ] = None

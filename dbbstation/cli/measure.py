@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,16 +42,14 @@ def measure(
     line: LineOptions,
     noted: RecordingOptions,
     *,
-    plan: Annotated[Path, Option("Test plan.")],
-    machine: Annotated[Path, Option("Nominal machine.")],
-    out: Annotated[Path, Option("Session folder.", kind="folder")],
+    plan: Annotated[Path, o.PLAN],
+    machine: Annotated[Path, o.MACHINE],
+    out: Annotated[Path, replace(o.OUT, kind="folder", metavar="SESSION")],
     auto: Annotated[
         str | None,
         Option("Start each circle at this control address of `instrument emulate`, accept every run.", metavar="URL"),
     ] = None,
-    time_scale: Annotated[
-        float, Option("The factor that was given to `instrument emulate`.", least=0.01, most=200.0)
-    ] = 1.0,
+    time_scale: Annotated[float, Option(o.TIME_SCALE, least=0.01, most=200.0)] = 1.0,
     rate_hz: RateHz = None,
     as_json: o.Json = False,
 ) -> None:

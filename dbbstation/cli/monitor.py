@@ -27,7 +27,7 @@ NO_PARITY = "note: this port does not tell of characters with a wrong parity; co
 def monitor(
     line: LineOptions,
     *,
-    count: Annotated[int | None, Option("Number of readings after which to stop.", least=1)] = None,
+    count: Annotated[int | None, Option("Number of readings.", least=1)] = None,
     spy: Spy = None,
     log: Annotated[Path | None, Option("The same as --spy.", kind="file")] = None,
     force: o.Force = False,

@@ -94,7 +94,7 @@ def accept(
     folder: _Folder,
     run: _Run,
     *,
-    reason: Annotated[str, Option("Reason; required for runs with lost samples or no circle.")] = "",
+    reason: _Reason = "",
     as_json: o.Json = False,
 ) -> None:
     r"""Accept a run that was rejected or not judged, such as a-cw-2.
@@ -156,8 +156,8 @@ def amend(
     folder: _Folder,
     *,
     reason: _Reason,
-    plan: Annotated[Path | None, Option("Plan that takes the place of the session's.")] = None,
-    machine: Annotated[Path | None, Option("Machine that takes the place of the session's.")] = None,
+    plan: Annotated[Path | None, o.PLAN] = None,
+    machine: Annotated[Path | None, o.MACHINE] = None,
     as_json: o.Json = False,
 ) -> None:
     r"""Change what was sealed on purpose, and note why.
@@ -194,7 +194,7 @@ def amend(
 def seal(
     folder: _Folder,
     *,
-    dry_run: Annotated[bool, Option("List the runs that would get a hash, without writing.")] = False,
+    dry_run: o.DryRun = False,
     as_json: o.Json = False,
 ) -> None:
     r"""Seal a session that was recorded elsewhere.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
-from dbbstation.cli.instrument_options import Spy
+from dbbstation.cli.instrument_options import PROGRAMS, Spy
 from dbbstation.cli.shop import from_settings
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -149,7 +149,7 @@ class RecordingOptions(SessionOptions):
             "Test repeated at the end to show drift, if the plan names none: the first one, or the first of each holder."
         ),
     ] = "plan"
-    programs: Annotated[Path | None, Option("Folder of TEST-DIRECTION programs.", kind="folder")] = None
+    programs: Annotated[Path | None, PROGRAMS] = None
     largest_bar_age_h: Annotated[
         float | None,
         Option(

@@ -22,6 +22,7 @@ from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, virtual_port
 from dbbstation.system.hang_up import ended_when_hung_up
 from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered
 from dbbstation.system.virtual_ports import is_virtual
+from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
@@ -46,14 +47,14 @@ def station(
     line: OpenLine,
     noted: RecordingOptions,
     *,
-    plan: Annotated[Path | None, Option("Test plan.")] = None,
-    machine: Annotated[Path | None, Option("Nominal machine.")] = None,
-    out: Annotated[Path | None, Option("Session folder. An existing session is continued.", kind="folder")] = None,
+    plan: Annotated[Path | None, o.PLAN] = None,
+    machine: Annotated[Path | None, o.MACHINE] = None,
+    out: Annotated[Path | None, replace(o.OUT, kind="folder", metavar="SESSION")] = None,
     virtual: Annotated[bool, Option("Use a virtual machine and instrument.")] = False,
     time_scale: Annotated[
         float,
         Option(
-            "Factor by which the virtual machine runs faster than real time, with --virtual.",
+            o.TIME_SCALE,
             least=SLOWEST,
             most=FASTEST,
         ),

@@ -22,7 +22,6 @@ Model = Annotated[_Model, MODEL]
 FORCE, JSON = Option("Replace existing files."), Option("Print the result as JSON.")
 Force = Annotated[bool, FORCE]
 Json = Annotated[bool, replace(JSON, flag="--json")]
-Out = Annotated[File, Option("Write the result here.", kind="file")]
 OUTPUTS = {
     "out": "Write the result here.",
     "table": "Write the table here, as CSV.",
@@ -30,8 +29,14 @@ OUTPUTS = {
     "page": "Write the page here, as HTML.",
 }
 """Of what a command writes: what it is stands in its metavar."""
-Machine = Annotated[File, Option("Machine file.", kind="file", metavar="MACHINE.yaml")]
-Plan = Annotated[File, Option("Test plan.", kind="file", metavar="PLAN.yaml")]
+MACHINE = Option("Nominal machine, as its controller believes it.", metavar="MACHINE.yaml")
+Machine = Annotated[File, replace(MACHINE, kind="file")]
+PLAN = Option("Test plan.", metavar="PLAN.yaml")
+Plan = Annotated[File, replace(PLAN, kind="file")]
+TIME_SCALE = "Factor by which the virtual machine runs faster than real time."
+Seed = Annotated[int, Option("Seed of everything random.", least=0)]
+DryRun = Annotated[bool, Option("Show what would be written, without writing it.")]
+OUT = Option("Write the result here.", kind="file")
 ANEW = Option("Compute results again instead of reading stored ones.")
 Anew = Annotated[bool, ANEW]
 SOURCES = Option("Error sources by name.", metavar="A,B,...")

@@ -167,7 +167,7 @@ FOREIGN = {
     "a cycle without G98 or G99": ("G0 Z-990\nG81 X5 Z-1005 R-998\n", 5, "neither G98 nor G99"),
     "an endless loop": ("O1 while [1 GT 0]\nO1 endwhile\n", 5, "may never end"),
     "a subprogram of another file": ("O<away> call\n", 4, "not in this file"),
-    "a main program that repeats": ("M99\n", 4, "for ever"),
+    "a main program that repeats": ("M99\n", 4, "endlessly"),
     "H without its length": ("G43 H7\n", 4, "the length of tool 7 is not known"),
     "H that is no tool": ("G43 H0\n", 4, "H0 is no tool"),
     "a cut from a reference point": ("G30 Z0\n", 5, "does not state the place of Z"),

@@ -102,3 +102,12 @@ def test_taps_turn_the_spindle_back_at_the_bottom_with_fixed_overrides(linuxcnc,
 
     assert len(spindle(HEAD + TAPS)) > 25
     assert spindle(linuxcnc.write(path)) == spindle(HEAD + TAPS)
+
+
+def test_goto_stays_within_its_program():
+    """Each program numbers its lines anew."""
+    sub = "O2000\nN10 G91 G0 X1\nG90\nM99\n"
+    main = f"O1000\n{HEAD}#1=0\nN10 #1=#1+1\nG0 Y#1\nIF[#1 LT 3]GOTO10\nM98 P2000\nM30\n"
+    path = read_program(f"%\n{main}{sub}%\n", "o1000.nc")
+    assert path.poses[:, 1].tolist() == [0, 1, 2, 3, 3]
+    assert path.poses[:, 0].tolist() == [0, 0, 0, 0, 1]

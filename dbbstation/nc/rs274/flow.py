@@ -45,8 +45,9 @@ _MACRO = re.compile(
     r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?(?=[WwIiEe]|[Gg][Oo])"
     r"(?P<word>(?i:WHILE|IF|GOTO|END(?=[ \t]*[0-9]+[ \t]*(?:[;(]|\r?$))))(?P<rest>[^\n]*)$"
 )
-_LOOP = re.compile(r"[ \t]*DO[ \t]*(?P<number>[0-9]+)[ \t]*\Z", re.IGNORECASE)
-_GOTO = re.compile(r"[ \t]*(?:GOTO)?[ \t]*(?P<number>[0-9]+)[ \t]*\Z", re.IGNORECASE)
+_DO = re.compile(r"\bDO[ \t]*(?P<number>[0-9]+)\Z", re.IGNORECASE)
+_GOTO = re.compile(r"\A[ \t]*(?:GOTO)?[ \t]*(?P<number>[0-9]+)\Z", re.IGNORECASE)
+_END = re.compile(r"\A[ \t]*(?P<number>[0-9]+)\Z")
 _THEN = re.compile(r"[ \t]*THEN(?=[ \t]*#)", re.IGNORECASE)
 _NUMBERED = re.compile(r"(?im)^[ \t]*N[ \t]*([0-9]+)")
 _SKIPPED = re.compile(r"[ \t]*/")
@@ -296,7 +297,7 @@ class Flow:
             return (
                 f"{'':{macro.column + len(macro.rest) - len(rest) + then.end()}}{rest[then.end() :]}" if holds else ""
             )
-        target = (_LOOP if macro.keyword == "WHILE" else _GOTO).match(rest)
+        target = (_DO if macro.keyword == "WHILE" else _GOTO).search(rest)
         if target is None:
             raise place.fault(
                 macro.column + 1, f"{macro.keyword} without what follows it", "write WHILE [#1 LT 5] DO1, or GOTO 10"
@@ -310,26 +311,33 @@ class Flow:
             self._next = self._numbered(number, place)
         return ""
 
+    def _program(self) -> range:
+        """Return the lines of the program or subprogram that runs: from its number, or the begin of its file, to the next."""
+        begins = [1 + before for before, _ in self.files] + [
+            each.line for each in self._o_lines.values() if not each.keyword
+        ]
+        return range(
+            max(line for line in begins if line <= self._next),
+            min((line for line in begins if line > self._next), default=len(self._lines) + 1),
+        )
+
     def _loop_line(self, macro: OLine, number: int, place: Place, keyword: str) -> OLine:
         """Return the next END of a loop, or its WHILE before."""
-        form, back = (
-            (_GOTO, False) if keyword == "END" else (re.compile(rf".*\bDO[ \t]*{number}\Z", re.IGNORECASE), True)
-        )
+        form = _END if keyword == "END" else _DO
         near = [
             one
             for one in self._macros.values()
-            if one.keyword == keyword and (one.line < macro.line) == back and (found := form.match(one.rest))
-            if back or int(found["number"]) == number
+            if one.keyword == keyword and (one.line > macro.line) == (keyword == "END") and one.line in self._program()
+            if (found := form.search(one.rest)) and int(found["number"]) == number
         ]
         if not near:
             raise place.fault(1, f"{macro.keyword} of loop {number} has no {keyword}", "add it")
-        return near[-1] if back else near[0]
+        return near[0 if keyword == "END" else -1]
 
     def _numbered(self, number: int, place: Place) -> int:
         """Return the index of the next line with a number; the search goes on at the begin [Fanuc, GOTO]."""
-        lines = [
-            at for at, line in enumerate(self._lines) if (found := _NUMBERED.match(line)) and int(found[1]) == number
-        ]
+        found = ((line, _NUMBERED.match(self._lines[line - 1])) for line in self._program())
+        lines = [line - 1 for line, match in found if match and int(match[1]) == number]
         if not lines:
             raise place.fault(1, f"GOTO {number}: no line has the number N{number}", "add it")
         return next((at for at in lines if at >= self._next), lines[0])

@@ -27,7 +27,7 @@ from dbbstation.nc.words import number
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
-    from dbbstation.nc.rs274.tokens import BadLine, Word
+    from dbbstation.nc.rs274.tokens import BadLine, Place, Word
     from dbbstation.nc.setup import ControlSetup
 
 
@@ -124,7 +124,7 @@ class Modes:
         self._beside: Beside | None = None
         self._radius_number: Word | None = None
         self._left_contour = False
-        self._unplaced: BadLine | None = None
+        self._unplaced: tuple[Place, BadLine] | None = None
         self._unsure_feed: BadLine | None = None
         self._system_said = False
         self.path.holds = {}
@@ -258,9 +258,7 @@ class Modes:
             column = block.codes[ModalGroup.ONCE].column
             raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
         if word.value > LONG_S:
-            said = (
-                f"line {block.place.line} waits {word.value:g} s: LinuxCNC counts seconds, some controls milliseconds"
-            )
+            said = f"{block.place} waits {word.value:g} s: LinuxCNC counts seconds, some controls milliseconds"
             self.path.notes += (said,)
         return word.value
 

@@ -57,9 +57,7 @@ class Moves(Modes):
             what = f"{named[0]} without a motion code"
             raise block.place.fault(block.first_column, what, "write G0 or G1 before it")
         if self._since_cycle:
-            self.path.notes += (
-                f"line {block.place.line}: {named[0]} behind G80 is taken for a rapid, as before the cycle",
-            )
+            self.path.notes += (f"{block.place}: {named[0]} behind G80 is taken for a rapid, as before the cycle",)
             self._since_cycle = False
         target = self._target(block, in_machine=in_machine)
         if self._cutter is not None:
@@ -236,7 +234,7 @@ class Moves(Modes):
         left = any(AXES.index(letter) in self._away for letter in unknown)
         if left or self._motion != LINEAR or self._per_move or self._cutter is not None:
             raise fault
-        self._unplaced = self._unplaced or fault
+        self._unplaced = self._unplaced or (block.place, fault)
 
     def _by_angle(self, block: ProgramBlock, pose: list[float], offset: tuple[float, ...]) -> list[float]:
         """Return X and Y of polar coordinates about the origin, in machine coordinates [mm] [LinuxCNC, Polar Coordinates]."""

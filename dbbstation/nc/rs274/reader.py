@@ -113,13 +113,12 @@ class _Interpreter(Moves):
         """Check that the program names every axis, and state where it does so late."""
         away = [math.isnan(value) and axis not in self._away for axis, value in enumerate(self._state.pose)]
         unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
+        place, fault = self._unplaced or (block.place, unknown_place(block, unknown, ""))
         if unknown:
-            raise self._unplaced or unknown_place(block, unknown, "")
+            raise fault
         if self._unplaced is not None:
-            problem = self._unplaced.problem
-            self.path.notes += (
-                f"line {problem.line}: {problem.what}: what leads there is corrected for where it names them first",
-            )
+            what = f"{place}: {fault.problem.what}: what leads there is corrected for where it names them first"
+            self.path.notes += (what,)
 
     def _end_stored(self, place: Place) -> None:
         for level in [each for each in self._stored if each not in self.flow.runs]:
@@ -156,7 +155,15 @@ class _Interpreter(Moves):
     def _ran_lines(self, first: int) -> bool:
         """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""
         ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
-        if not ready or self._per_move or self._upright or self.path.unknown or self._cutter or self._unsure_feed:
+        if (
+            not ready
+            or self._per_move
+            or self._upright
+            or self.path.unknown
+            or self._cutter
+            or self._unsure_feed
+            or self._since_cycle
+        ):
             return False
         lines, unit_mm = self.flow.plain_lines(), self._state.unit_mm
         if len(lines.axes) < LEAST_LINES:

@@ -92,6 +92,9 @@ class Place:
     line: int
     within: int = 0
 
+    def __str__(self) -> str:
+        return f"line {self.within} of {self.file}" if self.within else f"line {self.line}"
+
     def fault(self, column: int, what: str, remedy: str) -> BadLine:
         """Return the exception for a fault in this place."""
         return BadLine(Problem(self.file, self.within or self.line, column, what, remedy))

@@ -77,7 +77,7 @@ def test_the_cmm_is_taken_off():
 
 
 def test_one_mounting_shows_no_scatter():
-    with pytest.raises(ValueError, match="two mountings"):
+    with pytest.raises(ValueError, match="one mounting only"):
         repeatability([np.zeros((1, 3))])
     same = repeatability([np.zeros((3, 3))])
     assert (same.together.s_um, same.p_axes_alike) == (0.0, 1.0)

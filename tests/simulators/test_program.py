@@ -99,9 +99,9 @@ def test_the_example_does_what_the_closed_form_does(tmp_path, monkeypatch):
     [
         ("level, out = 1.0, []", 'raise SystemExit("no water")', "code 1: no water"),
         ("level,flow.level", "level,flow.height", "no `flow.level`"),
-        ("{x!r},{x!r}", "{x!r},dry", "no number"),
+        ("{x!r},{x!r}", "{x!r},dry", "not a number"),
         ("{x!r},{x!r}", "{x!r}", "has 1 cells"),
-        ("for x in out", "for x in out[1:]", "of 60 rows"),
+        ("for x in out", "for x in out[1:]", "with 60 rows"),
         ('"outputs.csv", "w"', '"other.csv", "w"', "no `outputs.csv`"),
     ],
 )

@@ -17,7 +17,7 @@ def test_a_quantised_length_that_does_not_move_has_the_uncertainty_of_its_last_d
 
 def test_the_resolution_is_the_smallest_step_that_is_shown():
     assert steady(150.0 + 1e-4 * np.tile([0, 1, 3, 1], 10)).resolution_mm == pytest.approx(1e-4)
-    with pytest.raises(ValueError, match="all readings are alike"):
+    with pytest.raises(ValueError, match="all readings are equal"):
         steady(np.full(200, 150.0))
     with pytest.raises(ValueError, match="at least 20"):
         steady(np.full(19, 150.0), 1e-4)

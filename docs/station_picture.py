@@ -40,9 +40,9 @@ from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.shown import Shown
-from dbbstation.tui.still import Happened, still_svg
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
+from tests.tui.still import Happened, still_svg
 
 if TYPE_CHECKING:
     from dbbstation.service.choice import Choice

@@ -16,7 +16,7 @@ from dbbstation.computing.processes import processes
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.system.signals import starting
-from dbbstation.tasks.diagnosed import diagnose_sessions
+from studies.diagnosed import diagnose_sessions
 from studies.memory import forget_largest_memory, largest_memory_mb
 
 if TYPE_CHECKING:

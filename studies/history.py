@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import stats
 
-from dbbstation.history.run_length import REFERENCE, SINGLE_SHARE, Chart, chart_for, signalled_within
+from dbbstation.history.run_length import REFERENCE, SINGLE_SHARE, STATES, Chart, chart_for, transitions
 from dbbstation.history.standardised import BASELINE
 from dbbstation.history.watch import watch
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
@@ -38,6 +38,20 @@ LATE_STEPS = (3.0, 5.0, 7.0, 10.0, 20.0)
 
 WAIT = 104
 """Sessions after a change in which it is to be found: two years of weekly ones."""
+
+
+def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64]:
+    """Return the probability that the upward chart has signalled by each value, shape (n,)."""
+    state = np.zeros(STATES)
+    state[0] = 1.0
+    within = []
+    moves: dict[float, NDArray[np.float64]] = {}
+    for mean in means:
+        if mean not in moves:
+            moves[mean] = transitions(chart, mean)
+        state = state @ moves[mean]
+        within.append(1.0 - state.sum())
+    return np.array(within)
 
 
 @dataclass(frozen=True)

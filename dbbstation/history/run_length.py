@@ -17,8 +17,6 @@ from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from dbbstation.computing.arrays import Floats
 
 STATES = 201
@@ -69,20 +67,6 @@ def average_run_length(chart: Chart, mean: float = 0.0) -> float:
 def _one_sided(chart: Chart, mean: float) -> float:
     lengths = np.linalg.solve(np.eye(STATES) - transitions(chart, mean), np.ones(STATES))
     return float(lengths[0])
-
-
-def signalled_within(chart: Chart, means: Iterable[float]) -> Floats:
-    """Return the probability that the upward chart has signalled by each value, shape (n,)."""
-    state = np.zeros(STATES)
-    state[0] = 1.0
-    within = []
-    moves: dict[float, Floats] = {}
-    for mean in means:
-        if mean not in moves:
-            moves[mean] = transitions(chart, mean)
-        state = state @ moves[mean]
-        within.append(1.0 - state.sum())
-    return np.array(within)
 
 
 @cache

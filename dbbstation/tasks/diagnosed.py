@@ -11,13 +11,12 @@ from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.errors import ModelError
 from dbbstation.facts.serialise import plain
 from dbbstation.results.of_diagnosis import diagnosis_figures
-from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import loaded
 from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.sources.contract import ErrorSource
@@ -41,23 +40,6 @@ def default_candidates(known: Mapping[str, ErrorSource]) -> list[str]:
     """Return the error sources that are not always fitted."""
     fitted = {source.name for source in default_sources()}
     return [name for name, source in known.items() if name not in fitted and source.candidate]
-
-
-def diagnose_sessions(
-    paths: Sequence[Path],
-    candidates: Sequence[str] | None,
-    exclude: Sequence[str],
-    say: Callable[[str], None],
-) -> Diagnosed:
-    """Read sessions of one machine and find physics beyond a kinematic calibration.
-
-    Raises:
-        InputError: faults of files and traces.
-        ModelError: an unknown source, or one that is no cause.
-        CalibrationError: the kinematic model cannot be fitted.
-    """
-    telling = Telling(say=lambda text: say(f"note: {text}"))
-    return diagnosed_of(paths, candidates, ((), exclude), known_sources(), telling)
 
 
 def diagnosed_of(

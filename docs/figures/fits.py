@@ -18,8 +18,8 @@ from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.report.calibration_figure import calibration_figure
 from dbbstation.report.diagnosis_figure import diagnosis_figure
-from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics

@@ -12,8 +12,8 @@ from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.explained import SettledCircles
 from dbbstation.diagnosis.shapes import samples_of
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BumpedJig, RingingStrut
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics

@@ -20,8 +20,8 @@ from dbbstation.inference.hypotheses import search
 from dbbstation.sources.contract import Effect, Parameter
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.diagnose import diagnose
-from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.disturbances import WALK_STEP_S, WanderingBar
 from tests.plant.mechanisms.kinematics import RandomKinematics

@@ -16,8 +16,8 @@ from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.levels import DifferenceFound, Differs, Followed, FollowsAnswer, Levels
 from dbbstation.inference.verdict import Acts
 from dbbstation.sources.registry import sources_named
-from dbbstation.tasks.diagnosed import diagnose_sessions
 from dbbstation.tasks.load import load_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.outsiders import HoseDrag

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.tasks.diagnosed import diagnose_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BarScale, BumpedJig
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import EIGHT, subset, table_ii_plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.tasks.diagnosed import diagnose_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import WALK_STEP_S, WanderingBar
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.weights import BaseCompliance

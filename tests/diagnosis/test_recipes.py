@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.tasks.diagnosed import diagnose_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.diagnosis import engine_sessions
 from tests.diagnosis.engine_sessions import (
     RATE_HZ,

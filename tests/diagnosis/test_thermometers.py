@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.tasks.diagnosed import diagnose_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.bar import BarDrift
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics

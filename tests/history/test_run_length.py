@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.history.run_length import Chart, average_run_length, chart_for, signalled_within
+from dbbstation.history.run_length import Chart, average_run_length, chart_for
+from studies.history import signalled_within
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from dbbstation.history.run_length import chart_for, signalled_within
+from dbbstation.history.run_length import chart_for
 from dbbstation.history.standardised import BASELINE
 from dbbstation.history.watch import TrendVerdict, watch
+from studies.history import signalled_within
 
 K = 2.0
 ONE = chart_for(1e-5)

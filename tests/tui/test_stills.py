@@ -24,8 +24,8 @@ from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Name, found, undecided
 from dbbstation.station.commands import Accept
 from dbbstation.tui.app import DARK, LIGHT
-from dbbstation.tui.still import still_svg
 from tests.tui.happenings import Happening
+from tests.tui.still import still_svg
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.sources.causes.bar_gain import BarGain
-from dbbstation.tasks.diagnosed import diagnose_sessions
+from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BarScale
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.noise import Noise

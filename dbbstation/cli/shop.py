@@ -11,7 +11,7 @@ from click.core import ParameterSource
 from dbbstation.cli.output import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
 
     from dbbstation.files.formats.settings import Setting, Settings
 
@@ -76,11 +76,6 @@ class ShopOption(click.Option):
     def _converted(self, value: Any) -> Any:  # noqa: ANN401 - text or number
         # Twelve digits: 0.0005 mm are 0.5 µm, not 0.49999999999999994.
         return value if isinstance(value, str) or self._factor == 1.0 else float(f"{value * self._factor:.12g}")
-
-
-def shop_option(*declarations: str, setting: str, **more: Any) -> Callable[[Any], Any]:  # noqa: ANN401
-    """Give a command such an option; arguments as of `ShopOption`."""
-    return click.option(*declarations, cls=ShopOption, setting=setting, **more)
 
 
 def from_settings(name: str) -> bool:

@@ -17,8 +17,7 @@ from dbbstation.nc.toolpath import RowKind, rounded
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Flags
     from dbbstation.nc.toolpath import Toolpath
 
 SIGNIFICANT_DIGITS = 7
@@ -256,7 +255,7 @@ class WordDialect(Dialect):
         }
         return said[kind](text)
 
-    def _words(self, toolpath: Toolpath, changed: NDArray[np.bool_], rows: slice) -> list[str]:
+    def _words(self, toolpath: Toolpath, changed: Flags, rows: slice) -> list[str]:
         poses, changed = toolpath.numbers_written[rows], changed[rows]
         texts = [""] * len(poses)
         which = changed @ (1 << np.arange(6))
@@ -298,7 +297,7 @@ SAME = 1e-9
 """Places that differ by less are one: numbers and offsets have fifteen digits [mm, deg]."""
 
 
-def changed_axes(toolpath: Toolpath) -> NDArray[np.bool_]:
+def changed_axes(toolpath: Toolpath) -> Flags:
     """Return axes that each row must name, shape (n, 6); none in rows that are no moves."""
     moves = np.flatnonzero(toolpath.is_move)
     poses = toolpath.poses[moves]

@@ -216,7 +216,7 @@ POSTS = (
         "grblgru",
         "( Created by GrblGru )\nG21\nG1 F200 Z25\nG4 P2\nG90 F100",
         "( Spindle on )\nM3\nS{s}\nF2000 G90 G1 Z15.000\nX{x} Y{y}",
-        "F2000 Z15.000\nM5\nG0 X0.000 Y0.000",
+        "F2000 Z15.000\nM5\nG1 F2000 X0.000 Y0.000",
         cycles=False,
         planes=False,
         percent=False,

@@ -115,7 +115,7 @@ class Modes:
         self._absolute_centres = False
         self._plane = 0
         self._cycle = ModalCycle()
-        self._turning, self._stopped = "", 0
+        self._turning, self._stopped = "", False
         self._upright = self._moved = False
         self._away: set[int] = set()
         self._in_force, self._spindle_speed = dict(STORED), "S0"
@@ -208,7 +208,7 @@ class Modes:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
         if ModalGroup.SPINDLE in block.codes:
             turning = name("M", block.codes[ModalGroup.SPINDLE].value)
-            self._stopped = len(self.path) if self._turning and turning == "M5" else self._stopped
+            self._stopped |= bool(self._turning) and turning == "M5"
             self._turning = "" if turning == "M5" else turning
         if tool is not None:
             self._state.tool_selected = int(tool.value)
@@ -334,7 +334,7 @@ class Modes:
 
     def _smoothing(self, block: ProgramBlock) -> None:
         """Leave out high-speed modes of other controls (G5 P, G5.1 Q, G187); with axes G5 and G5.1 are curves."""
-        word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQ"]
+        word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQR"]
         if block.words.keys() & set(AXES + CENTRES):
             raise block.place.fault(word.column, f"{name('G', word.value)} with axes is not read", CURVES)
         text = " ".join(f"{each.letter}{each.value:g}" for each in (word, *said) if each is not None)

@@ -98,11 +98,9 @@ class _Interpreter(Moves):
                 self.flow.ended()
                 break
         else:
-            # What stops its spindle or leaves behind the last cut ends without M2, as for GRBL.
-            if not (
-                self.flow.closed
-                or (not self.flow.percent and 0 < self.path.fed < max(self.path.left, self._stopped + 1))
-            ):
+            # What stops its spindle, or leaves behind the last cut, ends without M2, as for GRBL.
+            leaves = 0 < self.path.fed and (self.path.fed < self.path.left or (self._stopped and not self._turning))
+            if not (self.flow.closed or (leaves and not self.flow.percent)):
                 raise BadLine(self.flow.cut_short())
             if not self.flow.closed:
                 self.path.notes += (NO_END,)

@@ -168,21 +168,9 @@ class Toolpath:
 
     def only(self, rows: slice | Integers) -> Toolpath:
         """Return some rows as a toolpath without texts; each move begins at the end of the move before."""
-        return replace(
-            self,
-            kind=self.kind[rows],
-            poses=self.poses[rows],
-            feed_mm_min=self.feed_mm_min[rows],
-            feed_deg_min=self.feed_deg_min[rows],
-            dwell_s=self.dwell_s[rows],
-            line=self.line[rows],
-            corners_mm=self.corners_mm[rows],
-            offset=self.offset[rows],
-            unknown=self.unknown[rows],
-            in_machine=self.in_machine[rows],
-            text=MappingProxyType({}),
-            arc=None if self.arc is None else self.arc[rows],
-        )
+        of_rows = {name: getattr(self, name)[rows] for name in _OF_ROWS}
+        arc = None if self.arc is None else self.arc[rows]
+        return replace(self, **of_rows, text=MappingProxyType({}), arc=arc)
 
     @property
     def is_move(self) -> Flags:
@@ -269,6 +257,16 @@ class Toolpath:
         pieces = np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg))
         return np.maximum(pieces, 1.0).astype(np.int64)
 
+
+_ALIKE: dict[str, type] = {
+    "kind": np.int8,
+    "dwell_s": np.float64,
+    "offset": np.int32,
+    "unknown": np.uint8,
+    "in_machine": np.bool_,
+}
+_OF_ROWS = (*_ALIKE, "poses", "feed_mm_min", "feed_deg_min", "line", "corners_mm")
+"""Arrays of a toolpath with a value for each row; `_ALIKE` are those of which all rows added together have the same."""
 
 _NO_FEED = (np.nan, np.nan)
 _STRAIGHT = (0.0, 0.0, 0.0, 0.0)
@@ -425,20 +423,19 @@ class ToolpathBuilder:
             known = np.flatnonzero(~np.isnan(poses[:, axis]))
             last = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
             poses[:, axis] = poses[known[np.maximum(last, 0)], axis] if len(known) else 0.0
+        alike: dict[str, Any] = {
+            name: each([getattr(rows, name) for rows in self._rows], kind) for name, kind in _ALIKE.items()
+        }
         return Toolpath(
             name=self.name,
-            kind=each([rows.kind for rows in self._rows], np.int8),
+            **alike,
             poses=poses,
             feed_mm_min=each([rows.feed[0] for rows in self._rows], np.float64),
             feed_deg_min=each([rows.feed[1] for rows in self._rows], np.float64),
-            dwell_s=each([rows.dwell_s for rows in self._rows], np.float64),
             line=each([rows.line for rows in self._rows], np.int64)
             + each([rows.step for rows in self._rows], np.int64) * self._within(count),
             corners_mm=self._corners_mm(count),
-            offset=each([rows.offset for rows in self._rows], np.int32),
             offsets=np.array(list(self._offsets)),
-            unknown=each([rows.unknown for rows in self._rows], np.uint8),
-            in_machine=each([rows.in_machine for rows in self._rows], np.bool_),
             text=MappingProxyType(dict(self._text)),
             start=self._start,
             holds=self.holds,

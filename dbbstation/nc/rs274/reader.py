@@ -99,7 +99,7 @@ class _Interpreter(Moves):
                 break
         else:
             # What stops its spindle, or leaves behind the last cut, ends without M2, as for GRBL.
-            leaves = 0 < self.path.fed and (self.path.fed < self.path.left or (self._stopped and not self._turning))
+            leaves = self.path.fed > 0 and (self.path.fed < self.path.left or (self._stopped and not self._turning))
             if not (self.flow.closed or (leaves and not self.flow.percent)):
                 raise BadLine(self.flow.cut_short())
             if not self.flow.closed:

@@ -200,11 +200,25 @@ class _Settling:
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
     best, named = settled.best, [cause for cause in settled.causes if cause.named]
     pairs = [(member, member) for member in settled.members]
+    pairs += [(member, rival) for member in settled.members for rival in _other_laws(settled, member)]
     return pairs + [
         (member, rival)
         for member in settled.members
         for rival in in_place_of(member.cause.name, settled.comparison, named, best)
     ]
+
+
+def _other_laws(settled: SettledCircles, member: Member) -> list[Member]:
+    """Return a member's cause by each other law: on its grid a law cannot stand up to one that is laid out."""
+    every = member.cause.variants
+    laws = dict.fromkeys(variant.law for variant in every if variant.law != member.variant.law)
+    causes = [replace(member.cause, variants=tuple(v for v in every if v.law == law)) for law in laws]
+    return list(settled.comparison.scan(_lawful(settled.best, member.cause.name), causes).best)
+
+
+def _lawful(best: Hypothesis, *but_for: str) -> tuple[Member, ...]:
+    """Return what a joint fit has: effects without a name take what a law lacks at its start, and would keep it there."""
+    return tuple(one for one in best.without(*but_for) if one.cause.named or one.cause.setup)
 
 
 def _listed(
@@ -290,9 +304,10 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
     members = [member for member in best.members if member.cause.named]
     if not members:
         return channel.calibration
+    lawful = replace(best, members=_lawful(best))
     start = {
         m.cause.name: values
-        for m, values in zip(best.members, _estimated(channel, comparison, best), strict=True)
+        for m, values in zip(lawful.members, _estimated(channel, comparison, lawful), strict=True)
         if values is not None
     }
     every = [*default_sources(), *(channel.source_of(m.cause.name, m.variant) for m in members)]
@@ -355,7 +370,7 @@ def _lay_out(
     fit: Calibration,
     target: NDArray[np.float64],
 ) -> None:
-    others = best.without(member.cause.name)
+    others = _lawful(best, member.cause.name)
     name, law = rival.cause.name, rival.variant.law
     sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
     for _ in range(BOUNDS.steps_of_rivals if rival.variant.nonlinear else 1):

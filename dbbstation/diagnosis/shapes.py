@@ -236,7 +236,9 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
     struts = motion.struts(machine)
     found = {"strut-length": struts.length_mm}
     if motion.is_path:
-        found["strut-speed-sign"] = np.sign(np.gradient(struts.length_mm, axis=0))
+        # Over the last step, as play has it: a row beside a turn that has another sign would be an effect of its own.
+        steps = np.diff(struts.length_mm, axis=0)
+        found["strut-speed-sign"] = np.sign(np.concatenate([steps[:1], steps]))
         found["travel since its reversal"] = since_turning(struts.length_mm)
     if machine.masses is not None:
         found["strut-force"] = strut_tensions(struts, platform_weight(motion.frames(machine), machine.masses))

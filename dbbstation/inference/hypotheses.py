@@ -380,22 +380,26 @@ class _Search:
         return found
 
     def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:
-        more, known = 0.0, beside.log_evidence(members)
+        """Return members by their best laws with best slack shares, and the gain of averaging over shares."""
+        more = 0.0
         for k, member in enumerate(members):
             if len(member.variant.slack) == member.variant.tangents:
                 continue
-            tried = [
-                member
-                if share == member.slack_share
-                else replace(member, slack_share=share, slack_scale=member.slack_scale * share / member.slack_share)
-                for share in SLACK_SHARES.tolist()
-            ]
-            evidence = [
-                known if one is member else beside.log_evidence([*members[:k], one, *members[k + 1 :]]) for one in tried
-            ]
-            best = int(np.argmax(evidence))
-            members[k], known = tried[best], evidence[best]
-            more += float(logsumexp(evidence)) - evidence[best] - float(np.log(len(tried)))
+            best, gain = member, -np.inf
+            for one in (member, *_by_other_laws(beside, members, k)):
+                tried = [
+                    one
+                    if share == one.slack_share
+                    else replace(one, slack_share=share, slack_scale=one.slack_scale * share / one.slack_share)
+                    for share in SLACK_SHARES.tolist()
+                ]
+                evidence = [beside.log_evidence([*members[:k], each, *members[k + 1 :]]) for each in tried]
+                averaged = float(logsumexp(evidence)) - float(np.log(len(tried)))
+                if averaged + one.variant.log_weight > gain:
+                    gain = averaged + one.variant.log_weight
+                    best, over_shares = tried[int(np.argmax(evidence))], averaged - max(evidence)
+            members[k] = best
+            more += over_shares
         return members, more
 
     def _with_slack(self, comparison: ModelComparison, members: list[Member]) -> list[Member]:
@@ -441,6 +445,20 @@ class _Beside:
         if self._last is None or self._last[0] is not largest:
             self._last = largest, self.local.beside_of(largest)
         return self._last[1]
+
+
+def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[Member]:
+    """Return a member by each other law that is laid out: a scan compares laws without slack, which one may need more than another."""
+    member = members[k]
+    laws: dict[str, list[Variant]] = {}
+    for variant in member.cause.variants:
+        if len(variant.slack) and variant.law != member.variant.law:
+            laws.setdefault(variant.law, []).append(variant)
+    if not laws:
+        return []
+    comparison, others = beside.others(members, k)
+    causes = [replace(member.cause, name=law, variants=tuple(some)) for law, some in laws.items()]
+    return [replace(one, cause=member.cause) for one in comparison.scan(others, causes).best]
 
 
 def _single(member: Member) -> bool:

@@ -19,13 +19,17 @@ from dbbstation.sources.contract import (
     Texts,
     of_each_strut,
 )
-from dbbstation.sources.laws.turning import TURNED_MM, since_turning
+from dbbstation.sources.laws.turning import TURNED_MM, since_turning_in_time
+from dbbstation.sources.laws.unlike_struts import of_own_lengths
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
+
+DECAY_S = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
+"""Times that a position loop may need [s]."""
 
 DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.0005, 0.8, 12))
 """Decay lengths worth trying: spikes that fade in 0.05 to 0.5 s, on circles of 100 to 150 mm at 500 to 2500 mm/min [mm]."""
@@ -39,9 +43,9 @@ seven sessions, not at all; with 1.2 and 1.1 it was found in all of them."""
 class ReversalSpike(ErrorSource):
     """A reversing strut sticks and is drawn back: -s a (1 - exp(-d / c|a|)) exp(-sqrt(d / l)).
 
-    d is the way since the turning point, s the new sign. The position loop compensates friction with exp(-t / T); with
-    d = A t^2 / 2 that is exp(-sqrt(d / l)), l = A T^2 / 2, which needs no clock. At another feed l changes with the
-    square of the feed.
+    d is the way since the turning point, s the new sign. The position loop compensates friction with exp(-t / T), t the
+    time since then: `_InTime`. With d = A t^2 / 2 that is exp(-sqrt(d / l)), l = A T^2 / 2, which needs no clock. At
+    another feed l changes with the square of the feed, and between turning points with the acceleration A.
 
     The rise limits the lag to the drive's motion: c = 1 is full sticking. With c = `RISE` the sum of travel and error
     grows and can be compensated. At a = 0 the error is proportional to a.
@@ -68,16 +72,26 @@ class ReversalSpike(ErrorSource):
         cure="Adjust the control's friction (quadrant) compensation for that strut; look after lubrication and seals. A "
         "negative amplitude is a friction compensation that is set too large.",
         equation="actual minus driven length = -s a (1 - exp(-d / 1.1|a|)) exp(-sqrt(d / l)), d the travel since the strut "
-        "turned round, s its new direction",
+        "turned round, s its new direction; or exp(-t / T) instead, t the time since then",
         origin="stick motion of a drive at reversal, as in Kakino, Ihara and Shinohara, Accuracy Inspection of NC "
         "Machine Tools by Double Ball Bar Method, 1993; faded as a position loop of first order does in "
         "time, d = A t^2 / 2 behind the turning point",
     )
 
+    _power = 0.5
+    """Of what the spike fades with, relative to its constant."""
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return (_InTime(),)
+
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         heights = of_each_strut("strut_{}_um", "µm", 2.0, "height of the spike of strut {}; positive: it stays behind")
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
         return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
+
+    def _clock(self, motion: Motion) -> Floats | None:  # noqa: ARG002 - of a law without a clock
+        """Return times of rows, shape (n,); None where a spike fades over its way."""
+        return None
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         return Effect(strut_mm=self._along(motion, machine, values)[0])
@@ -87,7 +101,7 @@ class ReversalSpike(ErrorSource):
         return _NOTHING
 
     def advance(self, motion: Motion, machine: Machine, values: Floats, state: Floats) -> tuple[Effect, Floats]:
-        spike, _, _, behind = _straight(motion.struts(machine).length_mm, values, state)
+        spike, _, _, behind = self._straight(motion, machine, values, state)
         return Effect(strut_mm=spike), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
@@ -95,65 +109,112 @@ class ReversalSpike(ErrorSource):
         own = MM_PER_UM * by_height[:, :, None] * np.eye(STRUTS)
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        """Return changes if each strut fades by a constant of its own, and if all are behind at once, as one that is torn off."""
+        since, fading = self._since(motion, machine)
+        height, constant = _sizes(values)
+        at_once = -np.sign(since) * height * np.exp(-((fading / constant) ** self._power))
+        risen = at_once - self._along(motion, machine, values)[0]
+        lengths = of_own_lengths(self, motion, machine, values).strut_mm
+        return Effect(strut_mm=np.concatenate([np.asarray(lengths), risen[:, :, None]], axis=2))
+
     def _along(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats, Floats]:
         self.require(motion)
-        travel = motion.struts(machine).length_mm
         if motion.straight:
-            return _straight(travel, values, _NOTHING)[:3]
-        spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
-        _smooth(since_turning(travel), *_sizes(values), spike, by_height, by_length)
+            return self._straight(motion, machine, values, _NOTHING)[:3]
+        since, fading = self._since(motion, machine)
+        spike, by_height, by_length = (np.empty_like(since) for _ in range(3))
+        _smooth(since, fading, *_sizes(values), self._power, spike, by_height, by_length)
         return spike, by_height, by_length
+
+    def _since(self, motion: Motion, machine: Machine) -> tuple[Floats, Floats]:
+        """Return the signed way since turning of a smooth path [mm], and what spikes fade with, shapes (n, 6)."""
+        travel, clock = motion.struts(machine).length_mm, self._clock(motion)
+        since, late = since_turning_in_time(travel, np.zeros(len(travel)) if clock is None else clock)
+        return since, np.abs(since) if clock is None else late
+
+    def _straight(
+        self, motion: Motion, machine: Machine, values: Floats, state: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        travel, clock = np.ascontiguousarray(motion.struts(machine).length_mm), self._clock(motion)
+        spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
+        behind = state.copy()
+        clock = np.zeros(0) if clock is None else np.ascontiguousarray(clock)
+        _go_on(travel, clock, *_sizes(values), self._power, TURNED_MM, behind, spike, by_height, by_length)
+        return spike, by_height, by_length, behind
+
+
+class _InTime(ReversalSpike):
+    """The same, faded in time: -s a (1 - exp(-d / c|a|)) exp(-t / T), alike at all turning points and feeds."""
+
+    needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
+    _power = 1.0
+
+    @property
+    def law(self) -> str:
+        return "time"
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return ()
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        meaning = "time in which a spike falls to 37 %, all struts alike"
+        return (*super().parameters(machine)[:STRUTS], Parameter("decay_s", "s", 0.2, meaning, DECAY_S))
+
+    def _clock(self, motion: Motion) -> Floats | None:
+        return motion.time_s
 
 
 def _sizes(values: Floats) -> tuple[Floats, float]:
     return MM_PER_UM * values[:STRUTS], float(values[STRUTS])
 
 
-def _straight(travel: Floats, values: Floats, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
-    behind = state.copy()
-    _go_on(np.ascontiguousarray(travel), *_sizes(values), TURNED_MM, behind, spike, by_height, by_length)
-    return spike, by_height, by_length, behind
-
-
 FULLY = 750.0
 """Multiple of its own length after which an exponential is zero in double precision."""
 
-WAY, TURN, TURNED, OUTERMOST, LOW, HIGH, BACK = range(7)
+WAY, TURN, TURNED, OUTERMOST, LOW, HIGH, BACK, THEN, OUT_THEN = range(9)
 """What is remembered of a strut: which way it goes (0 before that is known), where it last turned, whether it ever did, its
-outermost place since then, its range before the way is known, and whether it has come back from its outermost place."""
+outermost place since then, its range before the way is known, whether it has come back from its outermost place, and when it was
+where it turned, and there."""
 
-LEFT, LEFT_SINCE = 7, 10
+LEFT, LEFT_SINCE = 9, 12
 """Error at the turning point, and at the outermost place where it comes back; behind each its derivatives by height and
 decay length."""
 
-_NOTHING = np.zeros((STRUTS, 13))
+_NOTHING = np.zeros((STRUTS, 15))
 _NOTHING[:, OUTERMOST] = np.nan
 _NOTHING.flags.writeable = False
 
 
 @inlined
-def _spike(way: float, sign: float, height: float, length: float) -> tuple[float, float, float]:
-    """Return the spike [mm] a way behind the turning point, and derivatives by height and decay length [1].
+def _spike(
+    way: float, fading: float, sign: float, height: float, length: float, power: float
+) -> tuple[float, float, float]:
+    """Return the spike [mm] behind the turning point, and derivatives by height [1] and by its constant.
 
-    A strut that has not turned has sign 0. Decay length zero gives a spike without width.
+    A strut that has not turned has sign 0. A constant of zero gives a spike without width.
+
+    Args:
+        fading: what it fades with: the way, or the time since the turning point.
     """
     if length <= 0.0:
         return 0.0, 0.0, 0.0
     ratio = way / (RISE * abs(height)) if height != 0.0 else np.inf
     lacking = np.exp(-ratio)
-    root = np.sqrt(way / length)
-    decay = np.exp(-root)
+    faded = (fading / length) ** power
+    decay = np.exp(-faded)
     steeper = min(ratio, FULLY) * lacking if lacking > 0.0 else 0.0
     rise = -sign * height * (1.0 - lacking)
-    return rise * decay, -sign * (1.0 - lacking - steeper) * decay, rise * root / (2.0 * length) * decay
+    return rise * decay, -sign * (1.0 - lacking - steeper) * decay, rise * power * faded / length * decay
 
 
 @compiled
 def _smooth(
     since: Floats,
+    fading: Floats,
     height: Floats,
     length: float,
+    power: float,
     spike: Floats,
     by_height: Floats,
     by_length: Floats,
@@ -162,14 +223,17 @@ def _smooth(
     count, columns = since.shape
     for k in range(count):
         for i in range(columns):
-            found = _spike(abs(since[k, i]), np.sign(since[k, i]), height[i], length)
+            sign = np.sign(since[k, i])
+            found = _spike(abs(since[k, i]), fading[k, i], sign, height[i], length, power)
             spike[k, i], by_height[k, i], by_length[k, i] = found
 
 
 @inlined
-def _behind(way: float, sign: float, height: float, length: float, left: Floats) -> tuple[float, float, float]:
+def _behind(
+    way: float, fading: float, sign: float, height: float, length: float, power: float, left: Floats
+) -> tuple[float, float, float]:
     """Return the spike and the previous one's rest, shape (3,), fading over c|a|."""
-    spike, by_height, by_length = _spike(way, sign, height, length)
+    spike, by_height, by_length = _spike(way, fading, sign, height, length, power)
     if left[0] == 0.0 or height == 0.0:
         return spike, by_height, by_length
     ratio = way / (RISE * abs(height))
@@ -181,19 +245,24 @@ def _behind(way: float, sign: float, height: float, length: float, left: Floats)
 @compiled
 def _go_on(  # noqa: C901 - what is remembered decides in one pass
     travel: Floats,
+    clock: Floats,
     height: Floats,
     length: float,
+    power: float,
     turned: float,
     memory: Floats,
     spike: Floats,
     by_height: Floats,
     by_length: Floats,
 ) -> None:
+    """Go on along a straight path; without a clock, shape (0,), spikes fade over their way."""
     count, columns = travel.shape
+    timed = len(clock) > 0
     for i in range(columns):
         m = memory[i]
         for k in range(count):
             x, found = travel[k, i], (0.0, 0.0, 0.0)
+            now = clock[k] if timed else 0.0
             if np.isnan(m[OUTERMOST]):
                 m[OUTERMOST] = m[LOW] = m[HIGH] = x
             if m[WAY] == 0.0:
@@ -202,22 +271,27 @@ def _go_on(  # noqa: C901 - what is remembered decides in one pass
                     m[WAY] = -1.0
                 elif x - m[LOW] > turned:
                     m[WAY] = 1.0
-                m[OUTERMOST] = x
+                m[OUTERMOST], m[OUT_THEN] = x, now
             elif m[WAY] * (x - m[OUTERMOST]) >= 0.0:
-                m[OUTERMOST], m[BACK] = x, 0.0
+                m[OUTERMOST], m[OUT_THEN], m[BACK] = x, now, 0.0
                 if m[TURNED] != 0.0:
-                    found = _behind(m[WAY] * (x - m[TURN]), m[WAY], height[i], length, m[LEFT : LEFT + 3])
+                    way = m[WAY] * (x - m[TURN])
+                    fading = now - m[THEN] if timed else way
+                    found = _behind(way, fading, m[WAY], height[i], length, power, m[LEFT : LEFT + 3])
             else:
                 if m[BACK] == 0.0:
                     m[BACK] = 1.0
                     if m[TURNED] != 0.0:
                         way = m[WAY] * (m[OUTERMOST] - m[TURN])
-                        found = _behind(way, m[WAY], height[i], length, m[LEFT : LEFT + 3])
+                        fading = m[OUT_THEN] - m[THEN] if timed else way
+                        found = _behind(way, fading, m[WAY], height[i], length, power, m[LEFT : LEFT + 3])
                     m[LEFT_SINCE], m[LEFT_SINCE + 1], m[LEFT_SINCE + 2] = found
                 way = m[WAY] * (m[OUTERMOST] - x)
-                found = _behind(way, -m[WAY], height[i], length, m[LEFT_SINCE : LEFT_SINCE + 3])
+                fading = now - m[OUT_THEN] if timed else way
+                found = _behind(way, fading, -m[WAY], height[i], length, power, m[LEFT_SINCE : LEFT_SINCE + 3])
                 if way > turned:
                     m[WAY], m[TURN], m[TURNED], m[BACK] = -m[WAY], m[OUTERMOST], 1.0, 0.0
+                    m[THEN] = m[OUT_THEN]
                     m[LEFT : LEFT + 3] = m[LEFT_SINCE : LEFT_SINCE + 3]
-                    m[OUTERMOST] = x
+                    m[OUTERMOST], m[OUT_THEN] = x, now
             spike[k, i], by_height[k, i], by_length[k, i] = found

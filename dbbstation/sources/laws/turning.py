@@ -21,9 +21,14 @@ def since_turning(travel: Floats) -> Floats:
     The turning point is the vertex of the parabola through the outermost row and its neighbours, over the way of all
     columns. At corners and straight returns it is the outermost row.
     """
-    since = np.zeros_like(travel)
-    _since(np.ascontiguousarray(travel), TURNED_MM, since)
-    return since
+    return since_turning_in_time(travel, np.zeros(len(travel)))[0]
+
+
+def since_turning_in_time(travel: Floats, time: Floats) -> tuple[Floats, Floats]:
+    """Return the same, and the time since then, at times of shape (n,); both zero before the first turn."""
+    since, late = np.zeros_like(travel), np.zeros_like(travel)
+    _since(np.ascontiguousarray(travel), np.ascontiguousarray(time), TURNED_MM, since, late)
+    return since, late
 
 
 @inlined
@@ -49,27 +54,35 @@ def _parabola(travel: Floats, i: int, k: int, side: float) -> tuple[float, float
 
 
 @inlined
-def _vertex(travel: Floats, i: int, k: int, side: float) -> tuple[float, bool]:
-    """Return the turning point on the high (1.0) or low (-1.0) side, and whether row k is behind it.
+def _vertex(travel: Floats, i: int, k: int, side: float) -> tuple[float, float]:
+    """Return the turning point on the high (1.0) or low (-1.0) side, and how many rows it lies behind row k.
 
     The neighbouring parabola midway is a lower limit; otherwise it could jump between nearly equal rows and make a
     compensation oscillate.
     """
     slope, bend, before, after = _parabola(travel, i, k, side)
     if bend <= 0.0:
-        return travel[k, i], True
+        return travel[k, i], 0.0
     top = side * travel[k, i] + slope * slope / (4.0 * bend)
     beside, step = (k + 1, after) if slope > 0.0 else (k - 1, before)
     middle = side * (travel[k, i] + travel[beside, i]) / 2.0
     top = max(top, middle + _parabola(travel, i, beside, side)[1] * step * step / 4.0)
-    return side * top, slope <= 0.0
+    # A slope that neighbouring rows have is that of a vertex between them, however the parabola is rounded.
+    return side * top, min(max(slope / (2.0 * bend * (after if slope > 0.0 else before)), -1.0), 1.0)
 
 
 @compiled
-def _since(travel: Floats, turned: float, since: Floats) -> None:
+def _since(
+    travel: Floats,
+    time: Floats,
+    turned: float,
+    since: Floats,
+    late: Floats,
+) -> None:
     count, columns = travel.shape
     for i in range(columns):
         turn, way, has_turned = 0.0, 0.0, False  # where the column last turned, and which way it goes
+        then = 0.0
         low = high = 0  # outermost rows since then
         for k in range(count):
             x = travel[k, i]
@@ -83,11 +96,13 @@ def _since(travel: Floats, turned: float, since: Floats) -> None:
             if new != 0.0:
                 start = high if new < 0.0 else low
                 if way != 0.0:  # the first movement is one that was already under way
-                    turn, is_behind = _vertex(travel, i, start, -new)
+                    turn, ahead = _vertex(travel, i, start, -new)
                     has_turned = True
+                    beside = start + 1 if ahead > 0.0 else max(start - 1, 0)
+                    then = time[start] + abs(ahead) * (time[beside] - time[start])
                     # An outermost row that is still before the turning point belongs to the movement before.
-                    for j in range(start if is_behind else start + 1, k):
-                        since[j, i] = travel[j, i] - turn
+                    for j in range(start + 1 if ahead > 0.0 else start, k):
+                        since[j, i], late[j, i] = travel[j, i] - turn, time[j] - then
                 way, low, high = new, k, k
             if has_turned:
-                since[k, i] = x - turn
+                since[k, i], late[k, i] = x - turn, time[k] - then

@@ -81,7 +81,7 @@ def test_readings_of_a_strut_are_least_squares_of_its_residual_alone(both, curve
             for x in (-step, step)
         ]
         length.append(strut[motion.kept])
-        sign.append(np.sign(np.gradient(strut))[motion.kept])
+        sign.append(np.sign(np.diff(strut, prepend=2 * strut[0] - strut[1]))[motion.kept])
         gain.append((ends[1].length_mm - ends[0].length_mm) / (2 * step))
         model.append(play.effect(motion).strut_mm[motion.kept, 2])
         left.append(residual)

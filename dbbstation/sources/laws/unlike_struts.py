@@ -24,6 +24,7 @@ def of_own_lengths(source: ErrorSource, motion: Motion, machine: Machine, values
     Args:
         values: of each strut, then the length that they share, shape (7,).
     """
+
     def of_times(times: float) -> Floats:
         other = values.copy()
         other[STRUTS] *= times

@@ -20,6 +20,7 @@ from dbbstation.sources.laws.turning import since_turning
 from tests.sources.runs import DEG_PER_S, circle, concealed_share, jig_runs, random_run, run
 
 SPIKE = ReversalSpike()
+(IN_TIME,) = SPIKE.other_laws()
 PLACE, TILT = (100, 100, -1150), (-10, 10)
 
 
@@ -105,12 +106,45 @@ def test_it_fades_exponentially_in_time_behind_a_turning_point(reference):
         assert np.allclose(found, expected, rtol=3e-3, atol=0)
 
 
-def test_derivatives_are_those_of_finite_differences(reference):
+def test_in_time_it_fades_alike_behind_every_turning_point(reference):
+    """exp(-t / T), t since the angles at which the formula of a strut's length is stationary."""
+    motion, fading_s = run(PLACE, TILT, step_deg=0.25), 0.3
+    spikes = IN_TIME.effect(motion, reference, np.array([*[1e-6] * 6, fading_s])).strut_mm  # too low to have a rise
+    for strut in range(6):
+        for turning_deg in turning_points_deg(reference, PLACE, TILT, strut):
+            since_s = motion.time_s - turning_deg / DEG_PER_S
+            behind = (since_s > 0.01) & (since_s < 1.0)
+            assert behind.sum() > 20
+            found = np.abs(spikes[behind, strut])
+            assert np.allclose(found, 1e-9 * np.exp(-since_s[behind] / fading_s), rtol=3e-3, atol=0)
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_in_time_a_feed_that_is_half_as_high_changes_how_far_it_reaches(reference, straight):
+    motion = replace(run(PLACE, TILT, step_deg=0.5), straight=straight)
+    values = np.array([*[3.0] * 6, 0.3])
+    slow = replace(motion, time_s=2.0 * motion.time_s)
+    half = np.array([*[3.0] * 6, 0.15])
+    assert np.allclose(
+        IN_TIME.effect(slow, reference, values).strut_mm, IN_TIME.effect(motion, reference, half).strut_mm, atol=1e-12
+    )
+
+
+def test_in_time_straight_rows_and_a_smooth_path_agree(reference):
+    smooth, values = run(PLACE, TILT, step_deg=0.02), np.array([3.0, -2.0, 1.0, 4.0, 0.5, 2.0, 0.2])
+    straight = replace(smooth, straight=True)
+    found = [IN_TIME.effect(motion, reference, values).strut_mm for motion in (smooth, straight)]
+    assert np.abs(found[0]).max() > 1.5e-3
+    assert np.allclose(*found, atol=2e-5)
+
+
+@pytest.mark.parametrize("source", [SPIKE, IN_TIME], ids=["way", "time"])
+def test_derivatives_are_those_of_finite_differences(reference, source):
     motion, values, h = run(PLACE, TILT), np.array([3.0, -2.0, 1.0, 4.0, 0.5, 2.0, 0.02]), 1e-6
-    exact = SPIKE.derivative(motion, reference, values).strut_mm
+    exact = source.derivative(motion, reference, values).strut_mm
     assert np.abs(exact[:, :, 6]).max() > 1e-3
     for p, unit in enumerate(h * np.eye(7)):
-        up, down = (SPIKE.effect(motion, reference, values + side * unit).strut_mm for side in (1, -1))
+        up, down = (source.effect(motion, reference, values + side * unit).strut_mm for side in (1, -1))
         assert np.allclose(exact[:, :, p], (up - down) / (2 * h), rtol=1e-6, atol=1e-9)
 
 
@@ -235,9 +269,10 @@ def test_a_decay_of_nothing_is_nothing(reference, rng):
     assert not spike_um(reference, random_run(rng), 3.0, 0.0).any()
 
 
-def test_it_is_compensated(reference):
+@pytest.mark.parametrize("source", [SPIKE, IN_TIME], ids=["way", "time"])
+def test_it_is_compensated(reference, source):
     values = np.array([2.0, -1.0, 3.0, 2.0, 1.0, 2.5, 0.1])
-    model = MachineModel(reference, (Fitted(SPIKE, values),))
+    model = MachineModel(reference, (Fitted(source, values),))
     wanted = replace(run(PLACE, TILT, step_deg=0.5), kept=slice(None))
     commanded = compensated(model, wanted)
     assert np.abs(commanded - wanted.poses)[:, :3].max() > 1e-3

@@ -17,6 +17,7 @@ from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.bank import spacing_of
 from dbbstation.inference.blocks import Block, compress, with_random
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Parameter
-
-NAMED_ODDS = float(np.log(0.05 / 0.95))
-"""Log prior odds of a named cause: one machine in twenty has any one of them so that it matters."""
 
 SETUP_ODDS = float(np.log(0.01 / 0.99))
 """Log prior odds that a ball, a row of the CMM sheet or a bar is far off: one session in a hundred, each."""

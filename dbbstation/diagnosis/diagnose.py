@@ -29,6 +29,7 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN, Alternatives
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling
+from dbbstation.inference.settle import BETTER
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
 
@@ -189,13 +190,9 @@ def rough_formulas(settled: SettledCircles) -> list[str]:
     found = []
     for member in settled.members:
         firm = [replace(m, slack_scale=0.0) if m is member else m for m in settled.best.members]
-        if len(member.variant.slack) and evidence - settled.comparison.log_evidence(firm) > CLEAR:
+        if len(member.variant.slack) and evidence - settled.comparison.log_evidence(firm) > BETTER:
             found.append(member.cause.name)
     return found
-
-
-CLEAR = 3.0
-"""Log Bayes factor from which on one thing is clearly more probable than another: odds of 20 to 1."""
 
 
 def usable_sources(

@@ -289,15 +289,11 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
     top = posterior.best.log_posterior
     for hypothesis in posterior.hypotheses:
-        if hypothesis.log_posterior < top - AS_PROBABLE:
+        if hypothesis.log_posterior < top - CLOSE:  # the exact fits of both would say the same of it
             break
         if frozenset((m.cause.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
             return hypothesis
     return posterior.best
-
-
-AS_PROBABLE = 1.0
-"""Log odds within which one hypothesis is as probable as another: the exact fits of both would say the same of it."""
 
 
 def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis) -> Calibration | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from dbbstation.errors import MachineError
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Circle, Direction
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
-SAMPLES = 180
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
 WAITS_S = (0.0, 3600.0)
@@ -212,13 +212,13 @@ def _motion(proposal: Proposal, direction: Direction, ends_s: float) -> Motion:
     first_s = ends_s + proposal.wait_s + SPACING_S
     before: Setup = proposal.observation.setup
     moving_s = (*before.moving_s, (first_s, first_s + SPACING_S * len(Direction)))
-    phi = np.linspace(-45.0, 360.0, SAMPLES + SAMPLES // 8, endpoint=False)
+    phi = np.linspace(-45.0, 360.0, BOUNDS.proposed_samples + BOUNDS.proposed_samples // 8, endpoint=False)
     circle = replace(proposal.circle, direction=direction)
     begun = first_s + SPACING_S * tuple(Direction).index(direction)
     return Motion(
         poses=circle.poses(circle.theta_deg(phi)),
         is_path=True,
-        kept=slice(SAMPLES // 8, None),
+        kept=slice(BOUNDS.proposed_samples // 8, None),
         time_s=begun + phi / circle.turning_deg_s,
         setup=replace(before, mounting="proposed", moving_s=moving_s),
     )

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Cause
     from dbbstation.inference.projection import BesideBase
 
-UM = 1e3
-
 
 class CircleBank(Bank):
     """Columns of circles in white noise, already laid out."""
@@ -116,7 +114,7 @@ def _law(explained: Explained, cause: Cause) -> Law:
 
 def circle_levels(explained: Explained, outcome: Settled, gains: KnownGains | None) -> Levels:
     """Return the three levels of circles [µm]."""
-    found = levels_by_tests(outcome, _left(explained), gains).times(UM)
+    found = levels_by_tests(outcome, _left(explained), gains).times(1e3)
     unmodelled = explained.settled.unmodelled.follows
     # Of what moves no strut, all amplitudes together are no place.
     nowhere = {name for name, follows in unmodelled.items() if not follows.moves_struts}
@@ -143,5 +141,5 @@ def _left(explained: Explained) -> LeftOver:
     found = remainder_of(settled.after, settled.noise)
     rms_um, where = where_left(settled.after.observations, found)
     is_noise = not is_missing_physics(settled.left) and found.probability >= SIGNIFICANT
-    test = ResidualTest("these tests", found.probability, rms_um / UM, where)
+    test = ResidualTest("these tests", found.probability, rms_um / 1e3, where)
     return LeftOver(is_noise, found.probability, (test,))

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import names_of_tests
 from dbbstation.diagnosis.drawn import GainOfTest, Trace
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.average import by_angle
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.findings import Diagnosis
-
-TRACE_SECTORS = 360
-"""Points of a trace: means of a degree."""
 
 
 def gains_by_test(diagnosis: Diagnosis) -> tuple[GainOfTest, ...]:
@@ -51,5 +49,5 @@ def _trace(diagnosis: Diagnosis, k: int) -> Trace:
     raw = diagnosis.before.observations[k].raw
     measured = 1e3 * (raw.length_mm - raw.circle.bar_mm)
     predicted = [measured - 1e3 * fit.residual_mm[k] for fit in (diagnosis.before, diagnosis.after)]
-    theta, curves = by_angle(raw, [measured, *predicted], TRACE_SECTORS)
+    theta, curves = by_angle(raw, [measured, *predicted], BOUNDS.trace_points)
     return Trace(raw.circle.direction, theta, *curves)

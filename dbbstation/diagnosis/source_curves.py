@@ -11,6 +11,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.discrepancy import BY_DIRECTION
 from dbbstation.diagnosis.drawn import Branch, SourceCurves
 from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.laws.by_temperature import FollowsTemperature
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Motion
 
-BINS = 14
-"""Pieces of a variable's range over which readings are averaged."""
 
 WAVE_PIECE_MM = 1.0
 """The same of strut length where waves of it are looked at, down to periods of 4 mm [mm]."""
@@ -182,7 +181,7 @@ def _branch(
     fine: bool,
 ) -> Branch:
     over, gain = samples.variable[:, column], samples.gain[:, column]
-    pieces = int(np.ceil(np.ptp(over) / WAVE_PIECE_MM)) if fine else BINS
+    pieces = int(np.ceil(np.ptp(over) / WAVE_PIECE_MM)) if fine else BOUNDS.curve_pieces
     edges = np.linspace(over.min(), over.max(), pieces + 1)
     piece = np.clip(np.searchsorted(edges, over[rows], side="right") - 1, 0, pieces - 1)
     _, piece, count = np.unique(piece, return_inverse=True, return_counts=True)

@@ -13,6 +13,7 @@ from dbbstation.diagnosis.shape_look import TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Follows, Samples, Shape, ranges, samples_of, shapes, wander
 from dbbstation.inference.blocks import with_random
 from dbbstation.inference.model_comparison import Cause, Variant
+from dbbstation.inference.patterns import FAMILY_ODDS
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
@@ -22,10 +23,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.inference.model_comparison import Member
-
-FAMILY_ODDS = float(np.log(0.1 / 0.9))
-"""Log prior odds that something without a name is at work: one machine in ten. All kinds of curves share them, and so do the
-struts, and the frequencies or places that a kind was picked from."""
 
 
 @dataclass(eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import MachineError
 from dbbstation.facts.value import finite
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length
 from dbbstation.sources.contract import Motion
@@ -23,9 +24,6 @@ REACH = 0.6
 """Share of the travel about its middle that is looked at; the corners beyond are hardly used."""
 
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0))
-
-STEPS = 5
-"""Places along each axis."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +83,8 @@ def workspace(machine: Machine) -> Floats:
     """Return poses over the inner travel that the machine can reach, shape (n, 6) [mm, deg]."""
     travel = machine.travel
     middle = sum(travel.z_mm) / 2.0
-    across = np.linspace(-REACH, REACH, STEPS) * travel.xy_radius_mm
-    up = middle + np.linspace(-REACH, REACH, STEPS) * (travel.z_mm[1] - travel.z_mm[0]) / 2.0
+    across = np.linspace(-REACH, REACH, BOUNDS.workspace_steps) * travel.xy_radius_mm
+    up = middle + np.linspace(-REACH, REACH, BOUNDS.workspace_steps) * (travel.z_mm[1] - travel.z_mm[0]) / 2.0
     x, y, z, tilt = np.meshgrid(across, across, up, np.arange(len(TILTS_DEG)), indexing="ij")
     tilts = np.array(TILTS_DEG)[tilt.ravel()]
     poses = np.column_stack([x.ravel(), y.ravel(), z.ravel(), tilts, np.zeros(len(tilts))])

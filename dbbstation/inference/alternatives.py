@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.triangle import RANK
 from dbbstation.inference.verdict import SURE
 
@@ -23,9 +24,6 @@ EVEN = 0.5
 EQUIVALENT = 0.999
 """Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
 other, unless it is so large that even this decides: what is left of one beside the other is 4.5 % of it."""
-
-NEGLIGIBLE = 30.0
-"""Log odds against the best set of causes from which on a set counts for nothing, however many there are of them."""
 
 
 class Alternatives:

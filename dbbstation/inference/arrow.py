@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.triangle import triangle_of
 
 if TYPE_CHECKING:
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Block, Columns
-
-SMALL = 1e6
-"""Multiplications, rows times columns squared, below which looking for groups takes longer than it saves: less than a millisecond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +191,7 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
     """
     total, count = len(random), sum(len(block.target) for block in blocks)
     together = [(list(range(len(blocks))), np.zeros(0, dtype=np.int64))]
-    if len(blocks) < 2 or not random.any() or count * np.count_nonzero(random) ** 2 < SMALL:  # noqa: PLR2004 - a pair
+    if len(blocks) < 2 or not random.any() or count * np.count_nonzero(random) ** 2 < BOUNDS.group_work:  # noqa: PLR2004 - a pair
         return together
     which = np.repeat(np.arange(len(blocks)), [len(block.columns) for block in blocks])
     touched = np.concatenate([block.columns for block in blocks])

@@ -487,15 +487,13 @@ def alike(one: Coloured, other: Coloured) -> bool:
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
     if any(abs(a - b) >= SETTLED * max(a, b) for a, b in pairs):
         return False
-    frequency = np.linspace(0.0, 0.5, ALIKE_AT)
+    frequency = np.linspace(0.0, 0.5, BOUNDS.spectra_at)
     return float(np.abs(one.log_power(frequency) - other.log_power(frequency)).mean()) < 2.0 * SETTLED
 
 
 HARDLY_TAKEN = 0.95
 """Share of the noise that columns leave of each frequency from which on nothing is put back."""
 
-ALIKE_AT = 65
-"""Frequencies at which spectra are compared."""
 
 TIE = 1e-3
 """Log odds by which a variable is less probable than the one before it in the table: of two that say the same, the first is named."""

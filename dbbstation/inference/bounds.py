@@ -227,6 +227,77 @@ class Bounds:
     measurements: int = 4
     """Suggestions, at the most."""
 
+    rows_apart: float = 0.1
+    """Share of all rows up to which some are whitened by themselves: of 3,500 rows with 6 rows before each in a prediction 200 take 20 µs, where all
+    take 26 µs; 400 take 30 µs. Of 6,000 rows with 40 before each 400 take 104 µs, all 168 µs, and 800 take 201 µs. It decides about time alone."""
+
+    columns_at_first: int = 512
+    """Columns for which room is made at first, where nobody says how many there will be."""
+
+    columns_apart: float = 0.5
+    """Share of all columns up to which some are worked out by themselves."""
+
+    mirrored_at_once: int = 256
+    """Columns that are mirrored at once: half a megabyte on the diagonal."""
+
+    group_work: float = 1e6
+    """Multiplications, rows times columns squared, below which looking for groups takes longer than it saves: less than a millisecond."""
+
+    samples_at_once: int = 2048
+    """Samples whose waves are made at once: half a megabyte."""
+
+    spectrum_rounds: int = 6
+    """Times that floor and height of a spectrum are fitted to the weights that they give themselves."""
+
+    spectra_at: int = 65
+    """Frequencies at which spectra are compared."""
+
+    pulses: int = 120
+    """Stretches of a turn that a pulse is looked for in: three degrees each."""
+
+    waves_of_drive: int = 4000
+    """Waves over the position that are looked for, at the most."""
+
+    friction_points: int = 81
+    """Places of the friction curve that is drawn."""
+
+    notes_of_stuck: int = 3
+    """Stretches of a stuck force that are told one by one, at the most."""
+
+    trace_points: int = 360
+    """Points of a trace: means of a degree."""
+
+    proposed_samples: int = 180
+    """Samples of a test that is only thought of: every two degrees."""
+
+    workspace_steps: int = 5
+    """Places along each axis."""
+
+    common_angles: int = 180
+    """Common angles per turn at the most: every two degrees, so that 30 undulations per turn are well seen."""
+
+    samples_of_angle: int = 8
+    """Samples in a sector at which a cause is asked for, at the most, and averaged: readings are averages too, and what happens at a
+    reversal is over in less than a sector."""
+
+    line_of_values: int = 160
+    """Characters of values that a line holds; there is more with `--json`."""
+
+    samples_per_turn: int = 720
+    """Samples per turn that a diagnosis works on, at the most: every half degree."""
+
+    curve_pieces: int = 14
+    """Pieces of a variable's range over which readings are averaged."""
+
+    samples_per_sector: int = 2
+    """Samples per sector of a turn, at the least: sectors with fewer are made wider."""
+
+    power_stretches: int = 16
+    """Stretches of all samples that the scatter of the power is read from."""
+
+    arcs_told: int = 36
+    """Arcs of a turn of which a mean difference is told: ten degrees each."""
+
 
 BOUNDS = Bounds()
 """Of a table, and of what all clients have in common."""

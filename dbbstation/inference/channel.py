@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 NAMED_ODDS = float(np.log(0.05 / 0.95))
-"""Log prior odds of a law: one object in twenty has any one of them so that it matters."""
+"""Log prior odds of a law, or a named cause: one object in twenty has any one of them so that it matters."""
 
 Discrepancy: TypeAlias = "Callable[[Floats, tuple[float, ...], Floats], Floats]"
 """What a formula may be off by, from its effect, nonlinear parameters and amplitudes."""

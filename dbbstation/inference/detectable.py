@@ -31,8 +31,6 @@ effects injected at the size with the margin the whole answer was "yes" to 17; t
 ENTIRELY = 1e-9
 """Share of the squares that the base must leave: what leaves less is concealed by it wholly."""
 
-SEED = 0
-
 
 def detectable(settled: Settled) -> tuple[Detectable, ...]:
     """Return detectable sizes over variables and user's causes, the least detectable first, before absorption by the base."""
@@ -110,7 +108,7 @@ def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: f
     Args:
         products: information beside base and others, shape (p, p).
     """
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(0)
     directions = rng.standard_normal((BOUNDS.detectable_draws, len(plausible)))
     size = np.sqrt(np.mean(np.square(directions @ samples.T), axis=1))
     information, axes = np.linalg.eigh(plausible[:, None] * products * plausible)

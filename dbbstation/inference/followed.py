@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
-from dbbstation.inference.alternatives import NEGLIGIBLE
 from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.levels import RUN, TIME
 from dbbstation.inference.model_comparison import FLEXIBLE
 from dbbstation.inference.patterns import Family

@@ -122,6 +122,7 @@ class Wave(Form):
 
 
 _MOST_PERIODS = 100.0
+"""Periods that are printed point by point, at the most; of more, one stands for all."""
 
 
 @dataclass(frozen=True, eq=False)

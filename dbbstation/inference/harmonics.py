@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import fdtrc
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
@@ -111,12 +113,8 @@ def _sums(values: Sequence[Floats], phase_rad: Floats, highest: int) -> list[NDA
 
 
 def _stretches(samples: int) -> Iterator[slice]:
-    for start in range(0, samples, STRETCH):
-        yield slice(start, start + STRETCH)
-
-
-STRETCH = 2048
-"""Samples whose waves are made at once: half a megabyte."""
+    for start in range(0, samples, BOUNDS.samples_at_once):
+        yield slice(start, start + BOUNDS.samples_at_once)
 
 
 def amplitudes(values: Floats, phase_rad: Floats, highest: int) -> NDArray[np.complex128]:
@@ -358,7 +356,7 @@ def _on_a_floor(power: Floats) -> Floats:
 def _fitted(mean: Floats, shapes: Floats) -> Floats:
     """Return non-negative maximum-likelihood floor and height, shape (processes, 2)."""
     power = np.full((len(shapes), len(mean)), mean.mean())
-    for _ in range(_ROUNDS):
+    for _ in range(BOUNDS.spectrum_rounds):
         found = _not_negative(shapes / power[:, None, :], mean / power)
         power = np.maximum(np.einsum("cs,csh->ch", found, shapes), _SMALLEST_SHARE * mean.mean())
     return found
@@ -390,8 +388,8 @@ def _not_negative(rows: Floats, values: Floats) -> Floats:
 _SINGULAR = 1e-12
 """Share of the product of squares below which the determinant of two columns has no digit left."""
 
-_ROUNDS = 6
 _SMALLEST_SHARE = 1e-6
+"""Least power of a harmonic, of the mean, while it is fitted: none is divided by zero. A recording of digits has more."""
 
 
 def _likelihood(mean: Floats, power: Floats, freedom: float) -> float:

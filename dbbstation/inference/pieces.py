@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -15,11 +17,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.coloured import Coloured
-
-
-MANY_ROWS = 0.1
-"""Share of all rows up to which some are whitened by themselves: of 3,500 rows with 6 rows before each in a prediction 200 take 20 µs, where all
-take 26 µs; 400 take 30 µs. Of 6,000 rows with 40 before each 400 take 104 µs, all 168 µs, and 800 take 201 µs. It decides about time alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +68,7 @@ class Left:
             return rows
         if there.start >= there.stop:
             return rows[:0]
-        if len(rows) > MANY_ROWS * len(self.rest):
+        if len(rows) > BOUNDS.rows_apart * len(self.rest):
             whole = np.zeros((len(self.rest), rows.shape[1]))
             whole[here] = rows
             return self.whitened(whole)[there]

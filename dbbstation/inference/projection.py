@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 from scipy.linalg.blas import dsyrk
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import ModelComparison, cholesky
 from dbbstation.inference.square_root import free_directions
 
@@ -24,16 +25,11 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.blocks import Columns
 
-MARGIN = 512
-"""Columns for which room is made at first, where nobody says how many there will be."""
 
 LEAST_SHARE = 1e-12
 """Share of a direction of the base in the rows that are kept below which these do not show it: thousands of times rounding, 2e-16, so that
 a share that counts is known to a thousandth. Directions that one run alone shows, a mounting's, have none. In diagnoses of two sessions all
 shares were below 1e-14 or above 4e-4; from 1e-14 to 1e-8 the answers are the same to a millionth."""
-
-FEW = 0.5
-"""Share of all columns up to which some are worked out by themselves."""
 
 
 class CauseColumns:
@@ -53,7 +49,7 @@ class CauseColumns:
         self,
         base: Floats,
         whitened: Callable[[Floats], Floats] | None = None,
-        room: int = MARGIN,
+        room: int = BOUNDS.columns_at_first,
     ) -> None:
         self.base = base
         self.axes, self.on_axes = _orthonormal(base)
@@ -91,7 +87,7 @@ class CauseColumns:
 
     def of(self, columns: NDArray[np.int64]) -> Floats:
         """Return some columns, shape (n, q)."""
-        if not self._waiting or len(columns) > FEW * self.count:
+        if not self._waiting or len(columns) > BOUNDS.columns_apart * self.count:
             return self.samples[:, columns]
         found = np.empty((len(self._buffer), len(columns)), order="F")
         ready = columns < self._ready
@@ -230,17 +226,13 @@ def _less(products: Floats, columns: Floats) -> Floats:
     if not columns.size:
         return products
     found = np.asarray(dsyrk(-1.0, columns, beta=1.0, c=products.T, trans=1, overwrite_c=1), dtype=np.float64)
-    for first in range(0, len(found), STRIP):
+    for first in range(0, len(found), BOUNDS.mirrored_at_once):
         # Above the diagonal are the products; below it are those that came in.
-        strip, behind = slice(first, first + STRIP), slice(first + STRIP, None)
+        strip, behind = slice(first, first + BOUNDS.mirrored_at_once), slice(first + BOUNDS.mirrored_at_once, None)
         upper = np.triu(found[strip, strip])
         found[strip, strip] = upper + np.triu(upper, 1).T
         found[behind, strip] = found[strip, behind].T
     return found.T
-
-
-STRIP = 256
-"""Columns that are mirrored at once: half a megabyte on the diagonal."""
 
 
 def _orthonormal(base: Floats) -> tuple[Floats, Floats]:
@@ -294,7 +286,7 @@ class BesideBase:
         used = np.flatnonzero(sd > 0.0)
         size = sd[used] / self._noise
         # Nearly all columns are multiplied where they are: to pick them would copy all that the memory is full of.
-        every = len(used) > FEW * causes.count
+        every = len(used) > BOUNDS.columns_apart * causes.count
         columns = causes.samples if every else causes.of(used)
         own = used if every else np.arange(len(used))
         along = causes.along[:, used] if every else axes.T @ columns

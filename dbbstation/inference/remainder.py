@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import f as f_distribution
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, centred_coefficients
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class Remainder:
 
     Attributes:
         run: worst over low harmonics.
-        pulse: run with the worst stretch, one of `PULSES` per turn.
+        pulse: run with the worst stretch, one of `BOUNDS.pulses` per turn.
     """
 
     harmonic: Largest
@@ -55,10 +56,6 @@ class Remainder:
     def probability(self) -> float:
         """Return the probability by noise of any feature."""
         return min(1.0, 3.0 * min(one.probability for one in (self.harmonic, self.run, self.pulse)))
-
-
-PULSES = 120
-"""Stretches of a turn that a pulse is looked for in: three degrees each."""
 
 
 def remainder(
@@ -92,8 +89,8 @@ def remainder(
     return Remainder(
         Largest(min(1.0, chance * (low + 1)), harmonic, _rms(beyond[harmonic] / len(residuals) / samples)),
         Largest(min(1.0, by_run * len(residuals)), worst, _rms(float(beyond_run[worst]) / samples)),
-        Largest(min(1.0, tried * PULSES * len(residuals)), run, abs(float(means[at]))),
-        (at + 0.5) * 2.0 * np.pi / PULSES,
+        Largest(min(1.0, tried * BOUNDS.pulses * len(residuals)), run, abs(float(means[at]))),
+        (at + 0.5) * 2.0 * np.pi / BOUNDS.pulses,
     )
 
 
@@ -104,9 +101,9 @@ def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int,
 
 
 def _stretches(residual: Floats, phase_rad: Floats) -> tuple[Floats, NDArray[np.int64], int]:
-    place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * PULSES).astype(np.int64) % PULSES
-    counts = np.bincount(place, minlength=PULSES)
-    means = np.bincount(place, residual, minlength=PULSES) / np.maximum(counts, 1)
+    place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * BOUNDS.pulses).astype(np.int64) % BOUNDS.pulses
+    counts = np.bincount(place, minlength=BOUNDS.pulses)
+    means = np.bincount(place, residual, minlength=BOUNDS.pulses) / np.maximum(counts, 1)
     return means, counts, int(np.argmax(means**2 * counts))
 
 

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from dbbstation.inference.projection import BesideBase
 
 BETTER = 3.0
-"""Log probability that another look must add, noise included, to be followed by one more: odds of twenty."""
+"""Log probability by which one thing is clearly more probable than another: odds of twenty. Another look must add so much, noise included, to
+be followed by one more, and so must what a formula may be off by, to be told."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.foreseen import SAMPLES, ForeseenTests
+from dbbstation.diagnosis.foreseen import ForeseenTests
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Fitted, Motion, Need
@@ -34,7 +35,9 @@ def channel(tmp_path_factory):
 def by_finite_differences(channel, proposal, direction, source, plausible):
     """Readings by each amplitude, from those of machines that have a little of it, the ball's shift taken out, shape (n, p)."""
     circle = replace(proposal.circle, direction=direction)
-    turn = np.linspace(-45.0, 360.0, SAMPLES + SAMPLES // 8, endpoint=False)[SAMPLES // 8 :]
+    turn = np.linspace(-45.0, 360.0, BOUNDS.proposed_samples + BOUNDS.proposed_samples // 8, endpoint=False)[
+        BOUNDS.proposed_samples // 8 :
+    ]
     setup = replace(proposal.observation.setup, mounting="proposed")
     motion = Motion(circle.poses(circle.theta_deg(turn)), is_path=True, setup=setup)
     ball = MachineModel(channel.machine).bar(motion).sensitivity.direction
@@ -65,7 +68,9 @@ def test_rows_have_the_products_of_all_samples_whatever_was_asked_before(channel
             np.hstack([by_finite_differences(channel, proposal, direction, s, v.plausible) for s, v in order]) * size
         )
         products = size[:, None] * (rows[:, base:].T @ rows[:, base:]) * size
-        assert products == pytest.approx(dense.T @ dense * samples / SAMPLES, rel=1e-5, abs=1e-6 * products.max())
+        assert products == pytest.approx(
+            dense.T @ dense * samples / BOUNDS.proposed_samples, rel=1e-5, abs=1e-6 * products.max()
+        )
 
 
 def test_what_needs_time_is_proposed_later_and_at_other_feeds_too(channel):

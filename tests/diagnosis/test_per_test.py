@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.per_test import TRACE_SECTORS, gains_by_test
+from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.facts.serialise import plain
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.results.of_diagnosis import diagnosis_figures
 from tests.diagnosis.joint_fits import joint_fit
 
@@ -42,7 +43,7 @@ def test_traces_are_the_recording_and_both_models_by_angle(found):
     one = next(one for one in gains_by_test(found) if one.name == "b")
     assert [str(trace.direction) for trace in one.traces] == ["ccw", "cw"]
     for trace, k in zip(one.traces, [k for k, o in enumerate(found.before.observations) if o.test == "b"], strict=True):
-        assert len(trace.theta_deg) == TRACE_SECTORS
+        assert len(trace.theta_deg) == BOUNDS.trace_points
         assert np.all(np.diff(trace.theta_deg) > 0.0)
         # 360 samples: a sector holds one, so that nothing is averaged and only the order may change.
         raw = found.before.observations[k].raw

@@ -7,7 +7,8 @@ import pytest
 
 from dbbstation.diagnosis.findings import Unexplained
 from dbbstation.diagnosis.shapes import READING, SIGNED, Follows
-from dbbstation.diagnosis.source_curves import BINS, SEEN, found_sources, source_curves
+from dbbstation.diagnosis.source_curves import SEEN, found_sources, source_curves
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
@@ -51,7 +52,7 @@ def test_play_has_two_branches_half_of_it_each_side(curves):
         assert [branch.sense for branch in branches] == ["lengthening", "shortening"]
         for branch, side in zip(branches, (-1.0, 1.0), strict=True):
             # The equation: -w/2 while growing; only the few micrometres after a reversal lie between.
-            assert branch.model_um == pytest.approx(np.full(BINS, side * PLAY_UM / 2), abs=0.3)
+            assert branch.model_um == pytest.approx(np.full(BOUNDS.curve_pieces, side * PLAY_UM / 2), abs=0.3)
             off = (branch.after_um - branch.model_um) / branch.sigma_um
             assert np.sqrt(np.mean(off**2)) < 2.0
 
@@ -86,10 +87,10 @@ def test_readings_of_a_strut_are_least_squares_of_its_residual_alone(both, curve
         model.append(play.effect(motion).strut_mm[motion.kept, 2])
         left.append(residual)
     length, sign, gain, model, left = map(np.concatenate, (length, sign, gain, model, left))
-    edges = np.linspace(length.min(), length.max(), BINS + 1)
+    edges = np.linspace(length.min(), length.max(), BOUNDS.curve_pieces + 1)
     branch = curves["backlash"].struts[2][0]
-    for k in range(BINS):
-        rows = (sign > 0) & (length >= edges[k]) & ((length < edges[k + 1]) | (k == BINS - 1))
+    for k in range(BOUNDS.curve_pieces):
+        rows = (sign > 0) & (length >= edges[k]) & ((length < edges[k + 1]) | (k == BOUNDS.curve_pieces - 1))
         (alone,), *_ = np.linalg.lstsq(gain[rows, None], left[rows], rcond=None)
         assert branch.variable[k] == pytest.approx(length[rows].mean())
         assert branch.model_um[k] == pytest.approx(1e3 * model[rows].mean(), abs=1e-6)
@@ -132,7 +133,7 @@ def test_what_has_no_name_is_drawn_by_what_organises_it(reference, follows, over
     assert np.all(branch.sigma_um[left_open] > SEEN * np.median(branch.sigma_um))
     assert not left_open.all()
     assert one.fine or not left_open.any()
-    assert len(branch.variable) > BINS if one.fine else len(branch.variable) == BINS
+    assert len(branch.variable) > BOUNDS.curve_pieces if one.fine else len(branch.variable) == BOUNDS.curve_pieces
 
 
 def test_nothing_found_nothing_drawn(reference):

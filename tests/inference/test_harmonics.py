@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.inference import harmonics
-from dbbstation.inference.harmonics import STRETCH, WORST_CONDITION, amplitudes, basis, coefficients, smooth, smooth_of
+from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.harmonics import WORST_CONDITION, amplitudes, basis, coefficients, smooth, smooth_of
 
 
 def written_out(phase, highest):
@@ -61,7 +62,7 @@ def test_low_pass_of_a_part_of_the_period_is_least_squares_too(share, highest, i
     assert smooth_of([], phase[kept], highest) == []
 
 
-@pytest.mark.parametrize("count", [50, STRETCH, 2 * STRETCH + 1])
+@pytest.mark.parametrize("count", [50, BOUNDS.samples_at_once, 2 * BOUNDS.samples_at_once + 1])
 @pytest.mark.parametrize("share", [1.0, 0.4])
 def test_amplitudes_are_those_that_values_were_made_of(count, share):
     phase = np.linspace(0.0, 2.0 * np.pi * share, count, endpoint=False)

@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import null_space
 
 from dbbstation.inference.blocks import Columns
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import Member
-from dbbstation.inference.projection import MARGIN, BesideBase, CauseColumns
+from dbbstation.inference.projection import BesideBase, CauseColumns
 from tests.inference.dense import cause, variant
 
 NOISE = 0.2
@@ -136,14 +137,14 @@ def test_what_base_and_causes_leave_is_what_a_ridge_fit_leaves(samples, rng, dir
 def test_columns_that_come_later_count_as_those_that_were_there(samples, rng):
     """Also beyond the room that is made at first, and where a comparison was made in between."""
     base, _, target = samples
-    causes = rng.normal(size=(SAMPLES, MARGIN + 60))
+    causes = rng.normal(size=(SAMPLES, BOUNDS.columns_at_first + 60))
     columns = CauseColumns(base)
     first = columns.add(causes[:, :3])
     beside = BesideBase(columns, KNOWN, np.zeros((0, len(FITTED))), NOISE)
     early, _ = products(beside.comparison(target), 3)
-    later = [columns.add(causes[:, a:b]) for a, b in ((3, 40), (40, 40), (40, MARGIN + 60))]
-    assert np.array_equal(np.concatenate([first, *later]), np.arange(MARGIN + 60))
-    found = products(beside.comparison(target), MARGIN + 60)
+    later = [columns.add(causes[:, a:b]) for a, b in ((3, 40), (40, 40), (40, BOUNDS.columns_at_first + 60))]
+    assert np.array_equal(np.concatenate([first, *later]), np.arange(BOUNDS.columns_at_first + 60))
+    found = products(beside.comparison(target), BOUNDS.columns_at_first + 60)
     at_once = compared(base, causes, target, KNOWN, np.zeros((0, len(FITTED))))
     assert found[0] == pytest.approx(at_once[0], abs=1e-7)
     assert found[1] == pytest.approx(at_once[1], abs=1e-7)

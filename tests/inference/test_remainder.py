@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import LOW, Spectrum
-from dbbstation.inference.remainder import PULSES, remainder
+from dbbstation.inference.remainder import remainder
 
 RUNS, SAMPLES, LEVEL = 10, 720, 0.4
 PHASE = np.linspace(0.0, 2 * np.pi, SAMPLES, endpoint=False)
@@ -57,7 +58,7 @@ def test_a_pulse_is_found_where_it_is(rng):
     found = of(runs)
     assert found.pulse.probability < 1e-6
     assert found.pulse.place == 4
-    assert np.degrees(found.pulse_phase_rad) == pytest.approx(121.5, abs=360.0 / PULSES)
+    assert np.degrees(found.pulse_phase_rad) == pytest.approx(121.5, abs=360.0 / BOUNDS.pulses)
     assert found.pulse.rms == pytest.approx(height, abs=4 * LEVEL / np.sqrt(narrow.sum()))
 
 

@@ -19,6 +19,7 @@ from dbbstation.diagnosis.compare.pairs import match
 from dbbstation.diagnosis.compare.set_up import with_set_up
 from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
@@ -44,9 +45,6 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
-
-SECTORS = 36
-"""Means of ten degrees."""
 
 CENTRED_SIGMA = 4.0
 """Standard uncertainties by noise within which a centre lies, in every run, where it was removed; or within `CENTRED_MM`."""
@@ -241,9 +239,9 @@ def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> 
 
 def _by_angle_um(theta_deg: Floats, smooth_mm: Floats) -> tuple[float, ...]:
     """Return means over ten degrees from +X, 36 of them [µm]."""
-    sector = (theta_deg * (SECTORS / 360.0)).astype(np.int64)
-    count = np.bincount(sector, minlength=SECTORS)
-    return tuple((1e3 * np.bincount(sector, smooth_mm, minlength=SECTORS) / np.maximum(count, 1)).tolist())
+    sector = (theta_deg * (BOUNDS.arcs_told / 360.0)).astype(np.int64)
+    count = np.bincount(sector, minlength=BOUNDS.arcs_told)
+    return tuple((1e3 * np.bincount(sector, smooth_mm, minlength=BOUNDS.arcs_told) / np.maximum(count, 1)).tolist())
 
 
 def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:

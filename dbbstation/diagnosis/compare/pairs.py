@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import TraceError
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, basis
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace.average import means
@@ -23,11 +24,6 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.trace.circle import RawCircle
 
-SECTORS = 180
-"""Common angles per turn at the most: every two degrees, so that 30 undulations per turn are well seen."""
-
-PER_SECTOR = 2
-"""Samples per sector that the shortest run must have."""
 
 SAME_PLACE_MM = 0.5
 """Centres of one circle may lie so far apart: CMM sheets of one plate, or the sheet and the drawing of it."""
@@ -143,7 +139,7 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
 
 def common_sectors(raws: Sequence[RawCircle]) -> int:
     """Return the number of sectors that the sparsest run fills."""
-    return min(SECTORS, min(len(raw) for raw in raws) // PER_SECTOR)
+    return min(BOUNDS.common_angles, min(len(raw) for raw in raws) // BOUNDS.samples_per_sector)
 
 
 @dataclass(frozen=True, eq=False)

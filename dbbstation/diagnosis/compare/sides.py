@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.compare.pairs import Sectors
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.average import averaged
 
@@ -24,11 +25,6 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
-
-
-FINER = 8
-"""Samples in a sector at which a cause is asked for, at the most, and averaged: readings are averages too, and what happens at a
-reversal is over in less than a sector."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,5 +113,5 @@ class Sides:
 
 
 def _thinned(run: Observation, pair: Pair) -> Observation:
-    raw, most = run.raw, FINER * len(pair.theta_deg)
+    raw, most = run.raw, BOUNDS.samples_of_angle * len(pair.theta_deg)
     return replace(run, raw=averaged(raw, most) if len(raw) > most else raw, commanded=None)

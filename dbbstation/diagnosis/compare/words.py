@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.comparison import Comparison
     from dbbstation.inference.left_over import LeftOver
@@ -51,13 +53,10 @@ def organised_text(found: Comparison) -> str:
         effect = found.effects[finding.name]
         sizes = "; ".join(f"{name} {value.in_words}" for name, value in finding.values.items())
         parts.append(
-            f"{label_of(finding)}, {100 * effect.share:.0f} %" + (f" ({sizes})" if 0 < len(sizes) < LONG else "")
+            f"{label_of(finding)}, {100 * effect.share:.0f} %"
+            + (f" ({sizes})" if 0 < len(sizes) < BOUNDS.line_of_values else "")
         )
     return " + ".join(parts)
-
-
-LONG = 160
-"""Characters of values that a line holds; there is more with `--json`."""
 
 
 def residual_text(left: LeftOver) -> str:

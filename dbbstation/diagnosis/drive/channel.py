@@ -51,7 +51,6 @@ NEAR_STANDSTILL = 0.28
 """Share of the greatest speed below which friction may be anything that follows the speed, the greatest Stribeck speed that is tried:
 a curve of low speed has its rivals there, and above it Coulomb and viscous friction are what they are."""
 
-MOST_WAVES = 4000
 STRONGEST = 6
 """Waves that the comparison looks at."""
 
@@ -288,7 +287,7 @@ def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Sc
     """
     scale = recordings.scale
     speed = float(np.median(np.abs(recordings.at(lambda s: s.speed_m_s))))
-    highest = min(recordings.scale.cutoff_hz / speed * scale.travel_m, MOST_WAVES * WAVE_STEP)
+    highest = min(recordings.scale.cutoff_hz / speed * scale.travel_m, BOUNDS.waves_of_drive * WAVE_STEP)
     periods = np.arange(PERIODS_IN_TRAVEL, highest, WAVE_STEP)
     if len(periods) < 1.0 / WAVE_STEP:
         return scale, np.inf

@@ -12,6 +12,7 @@ from scipy.special import log_ndtr
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.folds import FOLDS
 from dbbstation.inference.impossible import NEGATIVE_SIGMA
 from dbbstation.inference.named_values import values_of_law
 from dbbstation.inference.triangle import RANK, triangle_of
@@ -184,13 +185,13 @@ def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise
     Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
     1.5].
     """
-    stretch = np.arange(len(rows)) * STRETCHES // len(rows)
-    each = [triangle_of(rows[stretch == k]) for k in range(STRETCHES)]
-    others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(STRETCHES))
+    stretch = np.arange(len(rows)) * FOLDS // len(rows)
+    each = [triangle_of(rows[stretch == k]) for k in range(FOLDS)]
+    others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(FOLDS))
     every = np.array([_solved(one, sd, noise)[0] for one in others])
-    moves = (STRETCHES - 1.0) / STRETCHES * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
+    moves = (FOLDS - 1.0) / FOLDS * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
     # Where a stretch alone shows a pulse, leaving it out says nothing.
-    everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(STRETCHES)]).all(axis=0)
+    everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(FOLDS)]).all(axis=0)
     variance = np.maximum(np.diag(fitted.covariance), 1e-300)
     wider = np.sqrt(np.where(everywhere, np.maximum(moves / variance, 1.0), 1.0))
     # A value may lie anywhere between those of the two bands, and as far on the other side.
@@ -221,10 +222,6 @@ def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:
     noise = settled.noise.effective / float(np.sqrt(2.0))
     values, covariance = _solved(halved, _prior_sd(fitted.drive, fitted.members), noise)
     return replace(fitted, values=values, covariance=covariance)
-
-
-STRETCHES = 10
-"""Stretches that are left out in turn."""
 
 
 def log_possible(fitted: DriveFit) -> float:

@@ -29,6 +29,7 @@ from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.facts.value import Value
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling_of
 from dbbstation.inference.detectable import detectable_causes
 from dbbstation.inference.hypotheses import Hypothesis
@@ -52,12 +53,12 @@ if TYPE_CHECKING:
 HELD_BACK = 0.25
 """Share of the recordings, their end, that prediction is judged by."""
 
-CURVE_POINTS = 81
 
 OFFSETS = frozenset({"load_n", "coulomb_asymmetry_n"})
 """Parameters that shift the force of both directions alike."""
 
 GRAVITY_M_S2 = 9.81
+"""Of weights that a constant load may be; a drive knows no hexapod, whose weights have the same."""
 
 
 @with_one_thread
@@ -313,7 +314,7 @@ def _curve(explained: ExplainedDrive) -> FrictionCurve:
     recordings, scale = drive.recordings, drive.scale
     speeds = recordings.at(lambda s: s.speed_m_s)
     low, high = float(speeds.min()), float(speeds.max())
-    speed = np.linspace(low, high, CURVE_POINTS)
+    speed = np.linspace(low, high, BOUNDS.friction_points)
     nearest = NEAR_ZERO * scale.speed_m_s
     speed = np.unique(np.concatenate([speed[np.abs(speed) > nearest], [-nearest, nearest]]))
     speed = speed[(speed >= low) & (speed <= high)]

@@ -13,6 +13,7 @@ from dbbstation.diagnosis.drive.contract import Scale
 from dbbstation.diagnosis.drive.moving import impulse_response
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.bounds import BOUNDS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -31,9 +32,6 @@ delay of one channel does to a drive that has hardly any friction."""
 EACH_WAY = 0.05
 """Share of the samples that must be travelled in each direction for what differs by direction to be said: with fewer it is said of a
 stop, an overshoot, or what filters make of these."""
-
-POWER_STRETCHES = 16
-"""Stretches of all samples that the scatter of the power is read from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +168,7 @@ def _refuse_wrong_sign(one: Recordings) -> None:
     conservative = np.column_stack([np.ones(len(force)), one.motion[:, 0], one.at(lambda s: s.position_m)])
     conservative /= np.maximum(np.linalg.norm(conservative, axis=0), 1e-300)
     left = force - conservative @ np.linalg.lstsq(conservative, force, rcond=None)[0]
-    powers = [float(np.mean(part)) for part in np.array_split(left * speed, POWER_STRETCHES)]
+    powers = [float(np.mean(part)) for part in np.array_split(left * speed, BOUNDS.power_stretches)]
     mean, sigma = float(np.mean(powers)), float(np.std(powers)) / np.sqrt(len(powers))
     agreement = float(left @ speed) / max(float(np.linalg.norm(left) * np.linalg.norm(speed)), 1e-300)
     if mean < -DISSIPATES_SIGMA * sigma and agreement < -AGAINST:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.bounds import BOUNDS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,11 +48,11 @@ def stuck_samples(
     dead = (lengths >= DEAD_SHARE * len(force_n)) & ~saturated & while_moving
     notes = []
     for rows, what in ((saturated, "saturated: it stands at its extreme"), (dead, "dead: it does not change")):
-        for at in np.flatnonzero(rows)[:_MOST_NOTES]:
+        for at in np.flatnonzero(rows)[: BOUNDS.notes_of_stuck]:
             first, last = t_s[starts[at]], t_s[stops[at] - 1]
             notes.append(f"the force is {what}, {values[at]:g} N, from {first:.3f} to {last:.3f} s; this is not used")
-        if np.count_nonzero(rows) > _MOST_NOTES:
-            notes.append(f"and {np.count_nonzero(rows) - _MOST_NOTES} more such stretches")
+        if np.count_nonzero(rows) > BOUNDS.notes_of_stuck:
+            notes.append(f"and {np.count_nonzero(rows) - BOUNDS.notes_of_stuck} more such stretches")
     stuck = np.repeat(saturated | dead, lengths)
     share = float(np.mean(stuck[moving])) if moving.any() else 0.0
     if share > MOST_STUCK:
@@ -65,5 +66,3 @@ def stuck_samples(
 
 MOVES = 0.5
 """Share of a row of equal samples in which the drive must move for the row to be a fault of the channel."""
-
-_MOST_NOTES = 3

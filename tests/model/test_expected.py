@@ -8,6 +8,7 @@ import pytest
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.expected import SECTORS, expected_circle
+from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Circle, Direction
@@ -58,3 +59,26 @@ def test_struts_reverse_where_their_lengths_are_longest_and_shortest(reference) 
     true = [fine_deg[k] for strut in grows.T for k in np.flatnonzero(strut != np.roll(strut, 1))]
     assert len(stated) == len(true) >= 12
     assert np.sort(stated) == pytest.approx(np.sort(true), abs=0.26)
+
+
+def test_a_shifted_machine_has_a_first_harmonic_counted_from_the_start(reference) -> None:
+    """By plane geometry the bar reads dx cos(theta) + dy sin(theta); over sqrt(2) cos and sqrt(2) sin of the angle from the start."""
+    dx_um, dy_um, start = 80.0, -50.0, np.radians(40.0)
+    moved = np.tile([1e-3 * dx_um, 1e-3 * dy_um, 0.0], 6)
+    model = MachineModel(reference, (Fitted(KNOWN["base-joints"], moved),))
+    along = dx_um * np.cos(start) + dy_um * np.sin(start)
+    across = dy_um * np.cos(start) - dx_um * np.sin(start)
+    expected = np.array([0.0, along, 0.0, 0.0, across, 0.0, 0.0]) / np.sqrt(2.0)
+    assert expected_circle(observed(0.0, Direction.CCW), model, []).form_um == pytest.approx(expected, abs=0.05)
+
+
+@pytest.mark.parametrize("elevation_deg", [0.0, 50.0])
+def test_an_uncertain_common_shift_is_that_of_the_centre(reference, elevation_deg: float) -> None:
+    """Base joints known but for one common shift along X of 3 µm: the centre's X is as uncertain, nothing else is."""
+    source = KNOWN["base-joints"]
+    together = np.tile([0.003, 0.0, 0.0], 6)
+    rows = tuple((source.name, "", parameter.name) for parameter in source.parameters(reference))
+    model = MachineModel(reference, (Fitted(source, np.zeros(18)),))
+    known = IdentifiedModel(model, rows, np.outer(together, together))
+    expected = expected_circle(observed(elevation_deg, Direction.CCW), known, [])
+    assert expected.covariance_mm2 == pytest.approx(np.diag([0.003**2, 0.0, 0.0]), abs=1e-9)

@@ -1,6 +1,6 @@
 """Make the pictures of the station's screens that README and `docs/screen.md` show.
 
-    python docs/station_picture.py [docs/images]
+    python -m docs.station_picture [docs/images]
 
 A simulated machine with small kinematic errors and play in one strut runs the ten-minute check; the pictures stand
 still in the middle of the second circle, whose direction shows the play against the first.

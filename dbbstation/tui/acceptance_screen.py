@@ -14,9 +14,9 @@ from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import HEADING, in_force_line, test_line, way_back_lines, worst_lines
-from dbbstation.tui.asking import ChooseQuestion
 from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
+from dbbstation.tui.questions import ChooseQuestion
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:

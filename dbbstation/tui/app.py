@@ -24,7 +24,6 @@ from dbbstation.station.commands import AddNote, Command, Judge, Quit
 from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
 from dbbstation.tui import texts
-from dbbstation.tui.asking import TypeQuestion
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.controls import show_controls
 from dbbstation.tui.explained import ExplainedScreen
@@ -36,12 +35,11 @@ from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.plain_terminal import plain_driver
-from dbbstation.tui.question import GiveUpQuestion
+from dbbstation.tui.questions import GiveUpQuestion, TemperatureQuestion, TypeQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.shown import Shown
 from dbbstation.tui.start_screen import StartScreen
-from dbbstation.tui.temperature_question import TemperatureQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -12,7 +12,7 @@ from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.service.bar_stated import doubt_of
 from dbbstation.service.front import NoNumberError
 from dbbstation.tui import texts
-from dbbstation.tui.asking import TypeQuestion
+from dbbstation.tui.questions import TypeQuestion
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:

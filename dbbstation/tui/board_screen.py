@@ -10,8 +10,7 @@ from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, 
 from dbbstation.station.states import RECORDING, VERDICT
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.panel import Panel
-from dbbstation.tui.question import GiveUpQuestion
-from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Callable

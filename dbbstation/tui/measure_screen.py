@@ -15,14 +15,13 @@ from dbbstation.station.states import VERDICT, State
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.findings_panel import FindingsPanel
 from dbbstation.tui.jig_map import JigMap
-from dbbstation.tui.message_lines import MessageLines
+from dbbstation.tui.messages_screen import MessageLines
 from dbbstation.tui.now_line import NowLine
 from dbbstation.tui.panel import Panel, lines
 from dbbstation.tui.progress_line import ProgressLine
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.run_list import RunList
-from dbbstation.tui.set_up_panel import SetUpPanel
-from dbbstation.tui.steps_panel import StepsPanel
+from dbbstation.tui.set_up_panel import SetUpPanel, StepsPanel
 from dbbstation.tui.title_line import TitleLine
 from dbbstation.tui.trace_view import TraceView
 

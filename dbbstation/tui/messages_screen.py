@@ -1,4 +1,4 @@
-"""All messages in full, the newest first."""
+"""The last messages in lines, newest below, and all in full, newest first."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from textual.widgets import Static
 
 from dbbstation.service.messages import Weight
 from dbbstation.tui import texts
-from dbbstation.tui.message_lines import STYLES
+from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,29 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
+    from dbbstation.service.board import Board
     from dbbstation.service.messages import Message
+
+STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold $text-error"}
+
+
+class MessageLines(Panel):
+    """As many messages as fit, one line each."""
+
+    def text(self, board: Board) -> Content:
+        height = max(self.size.height, 1)
+        if not board.messages:
+            where = f"recording into {board.session}" if board.session else ""
+            return Content.styled(where, "dim")
+        return lines(*(_line(message, self.size.width) for message in list(board.messages)[-height:]))
+
+
+def _line(message: Message, width: int) -> Content:
+    text = message.text if message.weight is Weight.NOTE else f"{message.weight.value}: {message.text}"
+    text = text.replace("\n", " ")
+    if len(text) > width > 1:
+        text = f"{text[: width - 1]}…"
+    return Content.styled(text, STYLES[message.weight])
 
 
 class MessagesScreen(ModalScreen[None]):

@@ -12,9 +12,9 @@ from dbbstation.service.choice import SetUpPart
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
-from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
 from dbbstation.tui.bar_screen import BarScreen
 from dbbstation.tui.prepare_screen import PrepareScreen
+from dbbstation.tui.questions import ChooseQuestion, TypeQuestion
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:

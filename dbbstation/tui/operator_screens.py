@@ -13,7 +13,6 @@ from dbbstation.quality.conformity import Conformity
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station.states import State
 from dbbstation.tui import texts
-from dbbstation.tui.asking import TypeQuestion
 from dbbstation.tui.block_letters import block_rows, largest
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.explained import ExplainedScreen
@@ -22,11 +21,10 @@ from dbbstation.tui.large_screen import LargeFigures
 from dbbstation.tui.now_line import OperatorNowLine
 from dbbstation.tui.panel import lines
 from dbbstation.tui.progress_line import ProgressLine
-from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.questions import TypeQuestion, YesQuestion
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.row_screen import RowScreen
-from dbbstation.tui.set_up_panel import SetUpPanel
-from dbbstation.tui.steps_panel import StepsPanel
+from dbbstation.tui.set_up_panel import SetUpPanel, StepsPanel
 from dbbstation.tui.title_line import TitleLine, banner
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from dbbstation.station.commands import GoTo, Judge
 from dbbstation.station.states import State
 from dbbstation.tui.board_screen import BoardScreen
 from dbbstation.tui.overview_panels import ChosenRun, ChosenTest, LeftLine, PlateMap, TestList
-from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.questions import ReasonQuestion
 from dbbstation.tui.title_line import TitleLine
 
 if TYPE_CHECKING:

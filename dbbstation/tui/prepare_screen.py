@@ -12,12 +12,11 @@ from dbbstation.service.held_line import AGAIN_S
 from dbbstation.service.seated import seat
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
-from dbbstation.tui.asking import ChooseQuestion
 from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
+from dbbstation.tui.questions import ChooseQuestion, TemperatureQuestion
 from dbbstation.tui.reading_panel import seat_words
 from dbbstation.tui.row_screen import RowScreen
-from dbbstation.tui.temperature_question import TemperatureQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

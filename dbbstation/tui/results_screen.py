@@ -28,7 +28,7 @@ from dbbstation.tui.acceptance_lines import worst_lines
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
-from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.questions import YesQuestion
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:

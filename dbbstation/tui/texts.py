@@ -113,7 +113,6 @@ START_UNJUDGED = ", {count} to judge"
 START_WHAT = "{folder}\nplan {plan}, machine {machine}"
 START_BY = "by {instrument} at {port}"
 START_NO_LINE = "no instrument yet: I chooses one"
-QUIT_OPENS = "The virtual machine is being switched on; a moment."
 
 PARTS: Mapping[SetUpPart, str] = {
     SetUpPart.MACHINE: "machine",

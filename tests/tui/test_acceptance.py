@@ -17,8 +17,8 @@ from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
-from dbbstation.tui.asking import ChooseQuestion
 from dbbstation.tui.help_screen import HelpScreen
+from dbbstation.tui.questions import ChooseQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from tests.service.test_front import Scripted
 from tests.tui.test_session_stills import acceptance, formers, front

@@ -24,7 +24,6 @@ from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
-from dbbstation.tui.asking import TypeQuestion
 from dbbstation.tui.findings_panel import FindingsPanel
 from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.large_screen import LargeFigures, LargeScreen
@@ -32,10 +31,8 @@ from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
-from dbbstation.tui.question import GiveUpQuestion
-from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion, TemperatureQuestion, TypeQuestion, YesQuestion
 from dbbstation.tui.results_screen import ResultsScreen
-from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.trace_view import _LAST, TraceView
 from tests.tui.happenings import Happening, make_plan
 
@@ -425,6 +422,19 @@ def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left()
     # Somebody noted it behind the last circle.
     assert played(complete().command(Accept(), AddNote(ambient_temp_c=20.5)), not_asked).sent == [Quit()]
     assert Quit() in played(complete().command(AddNote("a chip")), without).sent
+
+
+def test_a_question_that_is_about_no_circle_stays_while_the_station_speaks() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        app.push_screen(YesQuestion("End it and go back?"))
+        await pilot.pause()
+        app.look()
+        await pilot.pause()
+        assert isinstance(app.screen, YesQuestion)
+        await pilot.press("escape")
+        assert not isinstance(app.screen, YesQuestion)
+
+    assert played(announced(), play).sent == []
 
 
 def test_a_note_has_its_key_and_can_be_left() -> None:

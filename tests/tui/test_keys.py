@@ -15,7 +15,7 @@ from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.new_screen import NewScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.prepare_screen import PrepareScreen
-from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.questions import ReasonQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.start_screen import StartScreen
 

@@ -43,7 +43,7 @@ from dbbstation.station.opening import changed_since, clock_watch
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
-from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.questions import YesQuestion
 from dbbstation.tui.sentences import now as sentence_now
 from dbbstation.tui.sentences import now_for_operator
 from tests.cli.conftest import call

@@ -30,10 +30,8 @@ from dbbstation.tui.app import StationApp
 from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.overview_screen import OverviewScreen
-from dbbstation.tui.question import GiveUpQuestion
-from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion, TemperatureQuestion
 from dbbstation.tui.shown import Shown
-from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:

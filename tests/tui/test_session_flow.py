@@ -28,15 +28,13 @@ from dbbstation.service.work import WorkProgress
 from dbbstation.station.programs import RunProgram
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
-from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
 from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.new_screen import ROWS, NewScreen
 from dbbstation.tui.prepare_screen import PrepareScreen
-from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.questions import ChooseQuestion, TemperatureQuestion, TypeQuestion, YesQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.start_screen import StartScreen
-from dbbstation.tui.temperature_question import TemperatureQuestion
 from tests.tui.test_screen import accept, one_circle, press
 from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 

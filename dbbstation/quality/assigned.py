@@ -65,27 +65,28 @@ _Changes = tuple[tuple[int, int], ...]
 """Runs, ascending, with a label other than the planned one."""
 
 
+def effects_of(circles: Sequence[Planned], reference: FormerSitting | None = None) -> PlanEffects:
+    """Return what a plan's circles can show, about what the last session read of them."""
+    moved = circles if reference is None else reference.moved(circles)
+    return PlanEffects(moved, owns=1 if reference is None else 2)
+
+
 class Assigned:
     """Runs of a session and the circles that they may show.
 
     Args:
+        effects: of the plan's circles, about the same reference.
         before: what the same plan's first runs showed. What was improbable by far stays so, and is not asked again.
     """
 
     def __init__(
         self,
-        circles: Sequence[Planned],
+        effects: PlanEffects,
         runs: Sequence[Seen],
         reference: FormerSitting | None = None,
         before: Assigned | None = None,
     ) -> None:
-        self.reference = reference
-        if before is None:
-            circles = circles if reference is None else reference.moved(circles)
-            self.effects = PlanEffects(circles, owns=1 if reference is None else 2)
-        else:
-            self.effects = before.effects
-        self.circles = self.effects.circles
+        self.reference, self.effects, self.circles = reference, effects, effects.circles
         self.runs = [one for one in runs if one.analysis is not None]
         self.read = [self.effects.run(one) for one in self.runs]
         self._planned = [one.planned for one in self.read]

@@ -11,7 +11,7 @@ from dbbstation.errors import InputError, TraceError
 from dbbstation.files.recordings.entries import RunEntry, RunState
 from dbbstation.files.recordings.judged import circles_of_plan, planned_circles, run_of
 from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.quality.assigned import Assigned, FormerSitting
+from dbbstation.quality.assigned import Assigned, FormerSitting, effects_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Others, coefficients_um, seen
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
     from dbbstation.quality.knowledge import Planned, Seen
+    from dbbstation.quality.plan_effects import PlanEffects
     from dbbstation.station.events import Event
     from dbbstation.trace.recording import Recording
 
@@ -143,8 +144,12 @@ class RunJudge:
         known = {(one.test, one.circle.direction) for one in self._circles}
         if any((one.run.test, one.run.circle.direction) not in known for one in runs):
             return None
-        self._before = Assigned(self._circles, runs, self._reference, self._before)
+        self._before = Assigned(self._effects, runs, self._reference, self._before)
         return self._before
+
+    @cached_property
+    def _effects(self) -> PlanEffects:
+        return effects_of(self._circles, self._reference)
 
     @cached_property
     def _circles(self) -> tuple[Planned, ...]:

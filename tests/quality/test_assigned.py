@@ -17,7 +17,7 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.assigned import SIZES, Assigned, FormerSitting
+from dbbstation.quality.assigned import SIZES, Assigned, FormerSitting, effects_of
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER
@@ -71,7 +71,7 @@ def shown(sitting: object, instead: dict[tuple[str, Direction], tuple[str, Direc
         sign = runs[asked].run.circle.direction.sign * other.run.circle.direction.sign
         signs = np.array([1, 1, 1, 1, sign, sign, sign])
         made.append(replace(runs[asked], coefficients_um=signs * other.coefficients_um))
-    return Assigned(circles, made)
+    return Assigned(effects_of(circles), made)
 
 
 def suspected(assigned: Assigned) -> dict[str, str]:
@@ -100,19 +100,20 @@ def test_the_first_circle_alone_decides_nothing_and_a_session_before_decides_it(
     assert alone.since(alone.runs[0]) is None
     read = {(test, str(way)): read_um(one) for (test, way), one in runs.items()}
     before = FormerSitting("monday", date(2026, 5, 12), read)
-    known = Assigned(circles, alone.runs, before)
+    known = Assigned(effects_of(circles, before), alone.runs, before)
     assert known.finding(known.runs[0], undecided(Name.TEST, "")).verdict is FindingVerdict.GOOD
     since = known.since(known.runs[0])
     assert since.verdict is FindingVerdict.GOOD
     # The machine was put together anew since: said, and no circle is suspected for it.
     other = {(test, str(way)): read_um(one) for (test, way), one in measured(circles, 6).items()}
-    changed = Assigned(circles, list(runs.values()), FormerSitting("monday", date(2026, 5, 12), other))
+    former = FormerSitting("monday", date(2026, 5, 12), other)
+    changed = Assigned(effects_of(circles, former), list(runs.values()), former)
     assert suspected(changed) == {}
     since = changed.since(changed.runs[0])
     assert since.verdict is FindingVerdict.CANNOT_TELL
     assert "changed since 12 May" in since.text
     # The program of another test is known at once.
-    wrong = Assigned(circles, shown(sitting, {PLANNED[0]: ("high", CCW)}, 1).runs, before)
+    wrong = Assigned(effects_of(circles, before), shown(sitting, {PLANNED[0]: ("high", CCW)}, 1).runs, before)
     assert suspected(wrong) == {"low ccw 1": "it is the circle of high ccw"}
 
 
@@ -151,8 +152,8 @@ def test_runs_judged_one_after_the_other_are_judged_as_all_at_once(sitting, inst
     circles, whole, before = sitting[0], shown(sitting, instead), None
     asked = []
     for count in range(1, 7):
-        alone = Assigned(circles, whole.runs[:count])
-        before = Assigned(circles, whole.runs[:count], before=before)
+        alone = Assigned(effects_of(circles), whole.runs[:count])
+        before = Assigned(effects_of(circles), whole.runs[:count], before=before)
         assert suspected(before) == suspected(alone)
         for name in (Name.TEST, Name.DIRECTION):
             one, blank = whole.runs[count - 1], undecided(name, "")
@@ -160,7 +161,9 @@ def test_runs_judged_one_after_the_other_are_judged_as_all_at_once(sitting, inst
         asked.append(len(before._looked_up) - len(alone._looked_up))
     # Runs of which one was taken away have no past.
     fewer = whole.runs[1:]
-    assert suspected(Assigned(circles, fewer, before=before)) == suspected(Assigned(circles, fewer))
+    assert suspected(Assigned(effects_of(circles), fewer, before=before)) == suspected(
+        Assigned(effects_of(circles), fewer)
+    )
     assert min(asked) < 0
 
 

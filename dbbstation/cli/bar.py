@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.declared import made
+from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.instrument_options import LineOptions
 from dbbstation.cli.output import echo
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
@@ -81,8 +81,7 @@ def bar(
     ] = None,
     out: Annotated[Path, replace(o.OUT, metavar="BAR.yaml")],
     force: o.Force = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
 
     Put the bar on the calibrator, a block of known length such as of Zerodur, and wait until it has the temperature of the
@@ -96,7 +95,6 @@ def bar(
     """
     from datetime import UTC, datetime
 
-    from dbbstation.cli.output import print_json
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.bar import write_bar
     from dbbstation.service.bar_reading import DRIFT
@@ -107,18 +105,22 @@ def bar(
     file = _file(found, asdict(of_bar), calibrator.data, line.instrument, datetime.now(UTC))
     write_bar(out, file, force=force)
     long_um, u_um = 1e3 * (found.mean_mm - file.length_mm), 1e3 * file.uncertainty_mm
-    if as_json:
-        told = {"readings": found.count, "mean_mm": found.mean_mm, "scatter_um": 1e3 * found.scatter_mm}
-        told |= {"reads_long_um": long_um, "standard_uncertainty_um": u_um, "drift_um": 1e3 * found.drift_mm}
-        print_json({"bar": str(out), **told})
-        return
-    echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
-    echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
-    if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
-        echo(f"note: the reading drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: let the bar cool down", err=True)
-    if fault := file.to_bar(None).certificate_fault(datetime.now(UTC).date()):
-        echo(f"note: `measure` refuses this bar: {fault}", err=True)
-    echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
+    told = {"readings": found.count, "mean_mm": found.mean_mm, "scatter_um": 1e3 * found.scatter_mm}
+    told |= {"reads_long_um": long_um, "standard_uncertainty_um": u_um, "drift_um": 1e3 * found.drift_mm}
+
+    def words() -> None:
+        echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
+        echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
+        if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
+            echo(
+                f"note: the reading drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: let the bar cool down",
+                err=True,
+            )
+        if fault := file.to_bar(None).certificate_fault(datetime.now(UTC).date()):
+            echo(f"note: `measure` refuses this bar: {fault}", err=True)
+        echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
+
+    return Answer({"bar": str(out), **told}, words)
 
 
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import click
 
-from dbbstation.cli.declared import made
+from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.output import echo, say
 from dbbstation.tasks import options as o
 from dbbstation.tasks.control_state import numbers_of
@@ -69,8 +69,7 @@ def kinematics(
         ),
     ] = (),
     force: o.Force = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Write a LinuxCNC kinematics component that takes the real machine to the commanded pose.
 
     The component contains every source that depends on pose, strut length or thermometers. A source that depends on the way so far, such as
@@ -81,21 +80,21 @@ def kinematics(
       dbbstation control kinematics --model model.yaml --out dbbkins.comp
       dbbstation control kinematics --model model.yaml --out dbbkins.comp --leave-out backlash --thermometers machine
     """
-    from dbbstation.cli.output import print_result
     from dbbstation.tasks.control import kinematics as task
 
     result = of.written(task, out, left_out=leave_out, thermometers=thermometers, force=force)
-    if as_json:
-        print_result(result)
-        return
-    echo(f"{result.file} corrects {', '.join(result.parts) or 'nothing'}")
-    if result.left_out:
-        echo(f"not corrected: {', '.join(result.left_out)}")
-    _print("Install", result.install)
-    _print("INI file", result.ini)
-    _print("HAL file", result.hal)
-    _print("Machine file to use from then on", [result.machine_file])
-    _print("The way back", result.way_back)
+
+    def words() -> None:
+        echo(f"{result.file} corrects {', '.join(result.parts) or 'nothing'}")
+        if result.left_out:
+            echo(f"not corrected: {', '.join(result.left_out)}")
+        _print("Install", result.install)
+        _print("INI file", result.ini)
+        _print("HAL file", result.hal)
+        _print("Machine file to use from then on", [result.machine_file])
+        _print("The way back", result.way_back)
+
+    return Answer(result, words)
 
 
 @made(group=control)
@@ -116,8 +115,7 @@ def parameters(
         Path | None, Option("INI file in use: tables and backlash that it has are named.", kind="file")
     ] = None,
     force: o.Force = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
 
     A less exact alternative to `control kinematics`: refitted values imitate what genhexkins lacks. They do not describe the machine. The table states the remaining errors of the tool in the volume.
@@ -127,28 +125,31 @@ def parameters(
       dbbstation control parameters --model model.yaml --out genhexkins
       dbbstation control parameters --model model.yaml --out genhexkins --volume -80,80,-80,80,-1050,-950 --tilt-deg 10
     """
-    from dbbstation.cli.output import print_result, print_table
+    from dbbstation.cli.output import print_table
     from dbbstation.tasks.control import parameters as task
 
     result = of.written(task, out, volume_mm=volume, tilt_deg=tilt_deg, ini=ini, force=force)
-    if as_json:
-        print_result(result)
-        return
-    echo(f"{result.folder}: {', '.join(result.files)}")
-    spans = ", ".join(f"{axis} {a:g} to {b:g}" for axis, a, b in zip("XYZAB", result.low, result.high, strict=False))
-    echo(f"\nremaining errors in the volume {spans} [µm, deg]:")
-    rows = [
-        [one.way, _um(one.rms_um), _um(one.largest_um), f"{one.tilt_rms_deg:.5f}", f"{one.tilt_largest_deg:.5f}"]
-        for one in result.left
-    ]
-    print_table(["control", "rms", "largest", "tilt rms", "tilt largest"], rows)
-    echo("\neach source alone, without and with parameters and tables [µm rms]:")
-    print_table(
-        ["source", "alone", "left", "held by"],
-        [[one.name, _um(one.rms_um), _um(one.left_rms_um), one.held_by] for one in result.sources],
-    )
-    _print("INI file", result.ini)
-    _print("The way back", result.way_back)
+
+    def words() -> None:
+        echo(f"{result.folder}: {', '.join(result.files)}")
+        spans = ", ".join(
+            f"{axis} {a:g} to {b:g}" for axis, a, b in zip("XYZAB", result.low, result.high, strict=False)
+        )
+        echo(f"\nremaining errors in the volume {spans} [µm, deg]:")
+        rows = [
+            [one.way, _um(one.rms_um), _um(one.largest_um), f"{one.tilt_rms_deg:.5f}", f"{one.tilt_largest_deg:.5f}"]
+            for one in result.left
+        ]
+        print_table(["control", "rms", "largest", "tilt rms", "tilt largest"], rows)
+        echo("\neach source alone, without and with parameters and tables [µm rms]:")
+        print_table(
+            ["source", "alone", "left", "held by"],
+            [[one.name, _um(one.rms_um), _um(one.left_rms_um), one.held_by] for one in result.sources],
+        )
+        _print("INI file", result.ini)
+        _print("The way back", result.way_back)
+
+    return Answer(result, words)
 
 
 def _um(value: float | None) -> str:

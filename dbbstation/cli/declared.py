@@ -22,7 +22,7 @@ from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option, TaskParameter, annotations_of, options_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from click import Context, Parameter
 
@@ -156,10 +156,32 @@ def command(
     return click.Command(task.name, params=options, callback=run, help=task.help)
 
 
+@dataclass(frozen=True)
+class Answer:
+    """What a command answers: data for `--json`, else lines, or a function that prints."""
+
+    data: Any
+    words: Sequence[str] | Callable[[], None]
+
+    def tell(self, *, as_json: bool) -> None:
+        """Print it."""
+        from dbbstation.cli.output import echo, print_json, print_result
+
+        if as_json:
+            (print_json if isinstance(self.data, dict) else print_result)(self.data)
+        elif callable(self.words):
+            self.words()
+        else:
+            for line in self.words:
+                echo(line)
+
+
 def made(
     name: str = "", group: click.Group | None = None, kind: type[click.Command] = click.Command
 ) -> Callable[[Callable[..., Any]], click.Command]:
     """Make a command of a function; its options are parameters with an `Option`, and fields of a dataclass with such.
+
+    One that returns an `Answer` has `--json`, too.
 
     Args:
         name: empty: the function's.
@@ -173,10 +195,16 @@ def made(
         parts = {name: options_of(kind) for name, kind in kinds.items()}
         every = options_of(function) | {name: one for part in parts.values() for name, one in part.items()}
 
+        answers = function.__annotations__["return"] == Answer.__name__
+        if answers:
+            every["as_json"] = TaskParameter("as_json", bool, default=False, option=replace(o.JSON, flag="--json"))
+
         @functools.wraps(function)
         def run(**given: Any) -> Any:  # noqa: ANN401 - each option has a type of its own
+            as_json = answers and given.pop("as_json")
             groups = {name: kinds[name](**{one: given.pop(one) for one in part}) for name, part in parts.items()}
-            return function(**given, **groups)
+            found = function(**given, **groups)
+            return found.tell(as_json=as_json) if answers else found
 
         options = sorted(map(_checked, every.values()), key=lambda one: isinstance(one, click.Option))
         text = inspect.cleandoc(function.__doc__ or "").replace(r"\b", "\b")

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.declared import made
+from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.instrument_options import PROFILE
-from dbbstation.cli.output import echo
-from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
@@ -22,8 +20,7 @@ def instruments(
     name: Annotated[str | None, Option("instrument.", kind="argument-text")] = None,
     *,
     profile: Annotated[str | None, replace(PROFILE, setting="")] = None,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""List the instruments that are known, or show one: NAME, or a protocol file.
 
     \b
@@ -33,33 +30,26 @@ def instruments(
       dbbstation instrument list keyence-dl-rs1a --profile gt-70a
       dbbstation instrument list ./my-gauge.yaml
     """
-    from dbbstation.cli.output import print_result
     from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
     from dbbstation.results.instruments import InstrumentsResult, instrument_result
 
     if name is not None:
         protocol = load_instrument(name, profile)
         names = [one.profile for one in load_variants(name) if one.profile]
-        if as_json:
-            print_result(instrument_result(protocol, names, whole=True))
-        else:
-            echo("\n".join(_details(protocol, names)))
-        return
+        return Answer(instrument_result(protocol, names, whole=True), _details(protocol, names))
     if profile is not None:
         raise click.UsageError("--profile is one of an instrument: name the instrument too")
     known = [load_variants(one) for one in known_instruments()]
-    if as_json:
-        shown = (instrument_result(one[0], (each.profile for each in one if each.profile)) for one in known)
-        print_result(InstrumentsResult(tuple(shown)))
-        return
+    shown = (instrument_result(one[0], (each.profile for each in one if each.profile)) for one in known)
+    lines: list[str] = []
     for variants in known:
         one, called = variants[0], ", ".join(each.profile for each in variants if each.profile)
         open_ones = sum(not each.verified for each in one.references)
-        echo(f"{one.name}" + (f" ({called})" if called else ""))
-        echo(f"    {one.title}")
-        echo(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
+        lines += [f"{one.name}" + (f" ({called})" if called else ""), f"    {one.title}"]
+        lines.append(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
         if open_ones:
-            echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
+            lines.append(f"    {open_ones} of {len(one.references)} statements about it are not verified")
+    return Answer(InstrumentsResult(tuple(shown)), lines)
 
 
 EXAMPLE_MM = 150.00031

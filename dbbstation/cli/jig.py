@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
-from dbbstation.cli.declared import made
+from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.mapping_options import AsWritten
 from dbbstation.cli.output import echo, echo_line
 from dbbstation.tasks import options as o
@@ -100,8 +100,7 @@ def sheet(
     ] = None,
     out: Annotated[Path, replace(o.OUT, metavar="JIG.yaml")],
     force: o.Force = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
 
     Coordinates are in the jig's frame. Plate and holders come from --before. Uncertainties of three axes become one, their root mean
@@ -112,7 +111,7 @@ def sheet(
       dbbstation jig sheet cmm.csv --before plate.yaml --columns x=X --columns "u=U (k=2)" --coverage 2 --out new.yaml
       dbbstation jig sheet plate.dmo --before plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """
-    from dbbstation.cli.output import print_result, print_table
+    from dbbstation.cli.output import print_table
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.jig import jig_text, read_jig
     from dbbstation.files.provenance import refuse_existing_table, write_table
@@ -132,13 +131,10 @@ def sheet(
     write_table(out, jig_text(new), provenance(), force=force)
     balls = {name: _change_um(old, name, ball.centre_mm) for name, ball in new.balls.items()}
     lost = [name for name in old.balls if name not in new.balls]
-    if as_json:
-        told = {
-            name: MeasuredBall(tuple(new.balls[name].centre_mm), None if change is None else tuple(change))
-            for name, change in balls.items()
-        }
-        print_result(SheetResult(str(out), told, tuple(lost)))
-        return
+    told = {
+        name: MeasuredBall(tuple(new.balls[name].centre_mm), None if change is None else tuple(change))
+        for name, change in balls.items()
+    }
     rows = [
         [
             name,
@@ -148,12 +144,16 @@ def sheet(
         ]
         for name, change in balls.items()
     ]
-    print_table(["ball", "x [mm]", "y [mm]", "z [mm]", "u [µm]", "dx [µm]", "dy [µm]", "dz [µm]"], rows)
-    if lost:
-        echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
-    if cmm_temp_c is None:
-        echo("the file lacks the plate's temperature on the CMM: give --cmm-temp-c")
-    echo_line(f"{len(balls)} balls written to {out}")
+
+    def words() -> None:
+        print_table(["ball", "x [mm]", "y [mm]", "z [mm]", "u [µm]", "dx [µm]", "dy [µm]", "dz [µm]"], rows)
+        if lost:
+            echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
+        if cmm_temp_c is None:
+            echo("the file lacks the plate's temperature on the CMM: give --cmm-temp-c")
+        echo_line(f"{len(balls)} balls written to {out}")
+
+    return Answer(SheetResult(str(out), told, tuple(lost)), words)
 
 
 @made(group=jig)
@@ -172,8 +172,7 @@ def holders(
     before: Annotated[Path | None, Option("Jig file that the new one is made from.")] = None,
     out: Annotated[Path | None, replace(o.OUT, metavar="JIG.yaml")] = None,
     force: o.Force = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Compute how well holders reproduce the ball's position, from repeated mountings [CAL III-B].
 
     One row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual. The scatter is about the mean of each place. The standard deviation per axis, with its chi-square interval, is what a jig file calls `repeatability_um`.
@@ -183,7 +182,6 @@ def holders(
       dbbstation jig holders mountings.csv
       dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --before plate.yaml --out plate-2026.yaml
     """
-    from dbbstation.cli.output import print_result
     from dbbstation.errors import InputError
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.plan.repeatability import repeatability
@@ -204,12 +202,13 @@ def holders(
         raise InputError.of(given.sheet, str(error), "put each ball up at least twice, ten times is usual") from error
     if before is not None and out is not None:
         _write_holders(found, before, out, given.sheet, force=force)
-    if as_json:
-        print_result(HoldersResult(found, None if out is None else str(out)))
-        return
-    _print_holders(found)
-    if out is not None:
-        echo_line(f"holders written to {out}")
+
+    def words() -> None:
+        _print_holders(found)
+        if out is not None:
+            echo_line(f"holders written to {out}")
+
+    return Answer(HoldersResult(found, None if out is None else str(out)), words)
 
 
 def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.declared import made
+from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.output import echo
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -39,7 +39,7 @@ def session() -> None:
 
 
 @made("list", session)
-def list_runs(folder: _Folder, *, as_json: o.Json = False) -> None:
+def list_runs(folder: _Folder) -> Answer:
     r"""List every run: when it was started, its mounting, its state, its samples (received, lost, rejected), and why it was rejected.
 
     \b
@@ -47,31 +47,28 @@ def list_runs(folder: _Folder, *, as_json: o.Json = False) -> None:
       dbbstation session list 2026-11-20-hexapod-7
       dbbstation session list 2026-11-20-hexapod-7 --json
     """
-    from dbbstation.cli.output import print_result, print_table
+    from dbbstation.cli.output import print_table
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.sessions import ListedRun, ListedSession
     from dbbstation.text.counting import repeats_in_order
 
     read = read_session(folder)
     missing, runs = _missing(read), repeats_in_order(read.runs)
-    if as_json:
-        listed = tuple(
-            ListedRun(
-                run=_name(run),
-                test=run.test,
-                direction=run.direction.value,
-                repeat=run.repeat,
-                mounting=run.mounting,
-                started=None if run.started is None else run.started.isoformat(),
-                state=run.state.value,
-                reason=run.reason or None,
-                counts=run.counts,
-                file=run.path.relative_to(read.folder).as_posix(),
-            )
-            for run in runs
+    listed = tuple(
+        ListedRun(
+            run=_name(run),
+            test=run.test,
+            direction=run.direction.value,
+            repeat=run.repeat,
+            mounting=run.mounting,
+            started=None if run.started is None else run.started.isoformat(),
+            state=run.state.value,
+            reason=run.reason or None,
+            counts=run.counts,
+            file=run.path.relative_to(read.folder).as_posix(),
         )
-        print_result(ListedSession(read.name, read.virtual, listed, tuple(missing)))
-        return
+        for run in runs
+    )
     rows = [
         [
             _name(run),
@@ -83,10 +80,14 @@ def list_runs(folder: _Folder, *, as_json: o.Json = False) -> None:
         ]
         for run in runs
     ]
-    print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
-    for circle, count in _repeated(read):
-        echo(f"{circle} has {count} accepted runs: all of them count")
-    echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
+
+    def words() -> None:
+        print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
+        for circle, count in _repeated(read):
+            echo(f"{circle} has {count} accepted runs: all of them count")
+        echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
+
+    return Answer(ListedSession(read.name, read.virtual, listed, tuple(missing)), words)
 
 
 @made(group=session)
@@ -95,8 +96,7 @@ def accept(
     run: _Run,
     *,
     reason: _Reason = "",
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Accept a run that was rejected or not judged, such as a-cw-2.
 
     A run that lost more samples than the plan allows, or whose recording shows no circle, is accepted with a reason only. On a
@@ -107,11 +107,11 @@ def accept(
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2 --reason "lost samples lie before the turn"
     """
-    _tell(run, _judged(folder, run, accepted=True, reason=reason.strip()), as_json=as_json)
+    return _told(run, _judged(folder, run, accepted=True, reason=reason.strip()))
 
 
 @made(group=session)
-def reject(folder: _Folder, run: _Run, *, reason: _Reason, as_json: o.Json = False) -> None:
+def reject(folder: _Folder, run: _Run, *, reason: _Reason) -> Answer:
     r"""Reject a run, such as a-cw-2, and note why. Its recording is kept; no command uses it any more.
 
     \b
@@ -120,11 +120,11 @@ def reject(folder: _Folder, run: _Run, *, reason: _Reason, as_json: o.Json = Fal
     """
     if not reason.strip():
         raise click.UsageError("give the reason with --reason, for later readers of the session")
-    _tell(run, _judged(folder, run, accepted=False, reason=reason.strip()), as_json=as_json)
+    return _told(run, _judged(folder, run, accepted=False, reason=reason.strip()))
 
 
 @made("take-in", session)
-def take_in(folder: _Folder, *, as_json: o.Json = False) -> None:
+def take_in(folder: _Folder) -> Answer:
     r"""List sealed runs that lie in the session's folder and are in no list.
 
     `dbbstation check` names them. They may come from a second program that wrote into the folder, or from a session file
@@ -135,20 +135,14 @@ def take_in(folder: _Folder, *, as_json: o.Json = False) -> None:
       dbbstation session take-in 2026-11-20-hexapod-7
       dbbstation session accept 2026-11-20-hexapod-7 a-cw-2
     """
-    from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session import unlisted_sealed
     from dbbstation.files.recordings.session_writer import SessionWriter
 
     with SessionWriter.open(folder, PATIENCE_S) as writer:
         taken = [_name(writer.take_in(path)) for path in unlisted_sealed(writer.session)]
-    if as_json:
-        print_json({"session": str(folder), "taken_in": taken})
-        return
-    for name in taken:
-        echo(f"{name}: complete, accept or reject it")
-    if not taken:
-        echo("the session lists every sealed run already")
+    words = [f"{name}: complete, accept or reject it" for name in taken]
+    return Answer({"session": str(folder), "taken_in": taken}, words or ["the session lists every sealed run already"])
 
 
 @made(group=session)
@@ -158,8 +152,7 @@ def amend(
     reason: _Reason,
     plan: Annotated[Path | None, o.PLAN] = None,
     machine: Annotated[Path | None, o.MACHINE] = None,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Change what was sealed on purpose, and note why.
 
     Plan and machine of a session are sealed when it is made: a change without a note is refused by every command. This accepts the session as it is, with another plan or machine if given. The file as it was stays in the folder
@@ -172,22 +165,17 @@ def amend(
     """
     from datetime import UTC, datetime
 
-    from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.amending import amend as noted
 
     if not reason.strip():
         raise click.UsageError("give the reason with --reason, for later readers of the session")
     found = noted(folder, reason.strip(), made=datetime.now(UTC).replace(microsecond=0), plan=plan, machine=machine)
-    if as_json:
-        changed = [
-            {"what": one.what, "former_sha256": one.former_sha256, "sha256": one.sha256, "former": one.former or None}
-            for one in found
-        ]
-        print_json({"session": str(folder), "reason": reason.strip(), "changed": changed})
-        return
-    for one in found:
-        kept = f", as it was: {one.former}" if one.former else ""
-        echo(f"{one.what}: amended{kept}")
+    changed = [
+        {"what": one.what, "former_sha256": one.former_sha256, "sha256": one.sha256, "former": one.former or None}
+        for one in found
+    ]
+    words = [f"{one.what}: amended" + (f", as it was: {one.former}" if one.former else "") for one in found]
+    return Answer({"session": str(folder), "reason": reason.strip(), "changed": changed}, words)
 
 
 @made(group=session)
@@ -195,8 +183,7 @@ def seal(
     folder: _Folder,
     *,
     dry_run: o.DryRun = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Seal a session that was recorded elsewhere.
 
     A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. Everything else in the file stays as it is. Copies of machine, plan and jig go into the folder
@@ -207,27 +194,23 @@ def seal(
       dbbstation session seal recorded-elsewhere --dry-run
       dbbstation session seal recorded-elsewhere
     """
-    from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.sealing import seal_session, sealing
 
     found = sealing(folder)
     if found.anything and not dry_run:
         found = seal_session(folder)
-    if as_json:
-        told = {"without_hash": found.files, "linked": found.linked, "files": dict(found.seal.files)}
-        print_json({"session": str(found.path), "sealed": [] if dry_run else found.files, **told})
-        return
+    told = {"without_hash": found.files, "linked": found.linked, "files": dict(found.seal.files)}
     done = "would be sealed" if dry_run else "sealed"
-    for file in found.files:
-        echo(f"{file}: {done}")
-    if not found.anything:
-        echo("every run and file is sealed already")
-    else:
-        echo(f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}")
+    whole = f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}"
+    words = [f"{file}: {done}" for file in found.files]
+    return Answer(
+        {"session": str(found.path), "sealed": [] if dry_run else found.files, **told},
+        [*words, whole if found.anything else "every run and file is sealed already"],
+    )
 
 
 @made(group=session)
-def log(folder: _Folder, *, as_json: o.Json = False) -> None:
+def log(folder: _Folder) -> Answer:
     r"""List what happened in a session: runs, verdicts with their reasons, notes, amendments, each with its time and link.
 
     The last line is the anchor of the session. Noted elsewhere, it tells later whether anything was changed that stood there:
@@ -238,7 +221,7 @@ def log(folder: _Folder, *, as_json: o.Json = False) -> None:
       dbbstation session log 2026-11-20-hexapod-7
       dbbstation session log 2026-11-20-hexapod-7 --json
     """
-    from dbbstation.cli.output import print_result, print_table
+    from dbbstation.cli.output import print_table
     from dbbstation.files.recordings.event_log import keys_told, read_event_log, runs_told
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.sessions import ListedEvent, SessionEvents
@@ -247,21 +230,22 @@ def log(folder: _Folder, *, as_json: o.Json = False) -> None:
     found = read_event_log(read.folder, [])
     events = () if found is None else found.events
     told = [runs_told(event) or ", ".join(keys_told(event)) for event in events]
-    if as_json:
-        listed = tuple(
-            ListedEvent(number, None if one.at is None else one.at.isoformat(), one.what, about, one.link)
-            for number, (one, about) in enumerate(zip(events, told, strict=True), start=1)
-        )
-        print_result(SessionEvents(read.name, listed, events[-1].link if events else None))
-        return
-    if events:
-        rows = [[k, _at(one.at), one.what, told[k - 1]] for k, one in enumerate(events, start=1)]
-        print_table(["event", "at", "what", "about"], rows)
-    echo(f"anchor {events[-1].link}" if events else "no event log; `dbbstation session seal` begins one")
+    listed = tuple(
+        ListedEvent(number, None if one.at is None else one.at.isoformat(), one.what, about, one.link)
+        for number, (one, about) in enumerate(zip(events, told, strict=True), start=1)
+    )
+
+    def words() -> None:
+        if events:
+            rows = [[k, _at(one.at), one.what, told[k - 1]] for k, one in enumerate(events, start=1)]
+            print_table(["event", "at", "what", "about"], rows)
+        echo(f"anchor {events[-1].link}" if events else "no event log; `dbbstation session seal` begins one")
+
+    return Answer(SessionEvents(read.name, listed, events[-1].link if events else None), words)
 
 
 @made(group=session)
-def rebuild(folder: _Folder, *, as_json: o.Json = False) -> None:
+def rebuild(folder: _Folder) -> Answer:
     r"""Write the session file anew, as the event log has it.
 
     Use it for a session file that was damaged, lost or edited by mistake. The present file is kept in the folder `sealed`.
@@ -271,15 +255,12 @@ def rebuild(folder: _Folder, *, as_json: o.Json = False) -> None:
     Examples:
       dbbstation session rebuild 2026-11-20-hexapod-7
     """
-    from dbbstation.cli.output import print_json
     from dbbstation.files.recordings.rebuilding import rebuild as written
 
     former, events = written(folder)
-    if as_json:
-        print_json({"session": str(folder), "events": events, "former": former or None})
-        return
     kept = f"; as it was: {former}" if former else ""
-    echo(f"session file written from {events} events{kept}")
+    told = {"session": str(folder), "events": events, "former": former or None}
+    return Answer(told, [f"session file written from {events} events{kept}"])
 
 
 def _at(moment: datetime | None) -> str:
@@ -290,13 +271,10 @@ def _name(run: RunEntry) -> str:
     return f"{run.test}-{run.direction}-{run.repeat}"
 
 
-def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
-    from dbbstation.cli.output import print_json
-
-    if as_json:
-        print_json({"run": name, "state": run.state.value, "reason": run.reason or None})
-    else:
-        echo(f"{name}: {run.state.value}" + (f" ({run.reason})" if run.reason else ""))
+def _told(name: str, run: RunEntry) -> Answer:
+    state, reason = run.state.value, run.reason
+    words = [f"{name}: {state}" + (f" ({reason})" if reason else "")]
+    return Answer({"run": name, "state": state, "reason": reason or None}, words)
 
 
 def _repeated(read: SessionFolder) -> list[tuple[str, int]]:

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import click
 
-from dbbstation.cli.declared import made
-from dbbstation.cli.output import echo, echo_line
+from dbbstation.cli.declared import Answer, made
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
+from dbbstation.text.printable import on_one_line
 
 _FIXTURES = (
     "bars",
@@ -85,8 +85,7 @@ def shipped(
     *,
     out: Annotated[Path | None, Option("Copy NAME into this folder.", kind="folder")] = None,
     force: o.Force = False,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""List plans, machines, jigs, a small session and examples that come with the program, or copy some of them.
 
     NAME is one of them, or a kind such as `plans`. `examples` has the files that help texts name.
@@ -98,7 +97,6 @@ def shipped(
       dbbstation settings shipped examples --out try
     """
     from dbbstation.catalogue import nearest
-    from dbbstation.cli.output import print_json
     from dbbstation.errors import StationError
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.gateway import content_of
@@ -108,11 +106,7 @@ def shipped(
         raise click.UsageError("give NAME, which is copied, and --out, the folder for the copy")
     if name is None or out is None:
         names = [*(key for key in files if not key.startswith(f"{_SESSION}/")), _SESSION, "examples"]
-        if as_json:
-            print_json({"shipped": names})
-        else:
-            echo("\n".join(names))
-        return
+        return Answer({"shipped": names}, names)
     wanted = name.rstrip("/")
     chosen = (
         _examples(files)
@@ -127,10 +121,7 @@ def shipped(
         kinds = ["examples", *dict.fromkeys(key.partition("/")[0] for key in files)]
         raise StationError(f"no shipped file is called {name!r}", remedy=nearest(name, kinds))
     write_folder(out, {key: content_of(path) for key, path in chosen.items()}, force=force)
-    if as_json:
-        print_json({"shipped": sorted(chosen)})
-    else:
-        echo_line(f"{len(chosen)} files written to {out}")
+    return Answer({"shipped": sorted(chosen)}, [on_one_line(f"{len(chosen)} files written to {out}")])
 
 
 def shipped_files() -> dict[str, Path]:

@@ -6,8 +6,7 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.cli.declared import made
-from dbbstation.cli.output import echo
+from dbbstation.cli.declared import Answer, made
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -28,8 +27,7 @@ def sources(
         ),
     ] = None,
     source_files: o.SourcePaths = (),
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""List the causes of error that are known, or show one: NAME.
 
     Each has a description, its symptoms in recordings, a way to confirm and to cure it, its equation with source, its needs, and how exactly real machines follow its formula.
@@ -41,7 +39,7 @@ def sources(
       dbbstation sources gravity --machine machine.yaml
       dbbstation sources scale-bow --source-files scale_bow.py --json
     """
-    from dbbstation.cli.output import print_result, print_table
+    from dbbstation.cli.output import print_table
     from dbbstation.errors import ModelError
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_sources import every_source
@@ -60,18 +58,12 @@ def sources(
             except ModelError as error:
                 raise ModelError(error.what, where=str(machine), remedy=error.remedy) from error
         found = source_description(source, given)
-        if as_json:
-            print_result(found)
-        else:
-            echo("\n".join(_details(found)))
-        return
-    if as_json:
-        print_result(SourcesResult(tuple(source_description(source) for source in known.values())))
-        return
+        return Answer(found, _details(found))
     rows = [
         [source.name, source.belongs_to.value, role_of(source), _first(source.texts.what)] for source in known.values()
     ]
-    print_table(["cause", "belongs to", "role", "what it is"], rows)
+    every = SourcesResult(tuple(source_description(source) for source in known.values()))
+    return Answer(every, lambda: print_table(["cause", "belongs to", "role", "what it is"], rows))
 
 
 def _details(told: SourceDescription) -> list[str]:

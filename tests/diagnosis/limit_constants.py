@@ -17,6 +17,7 @@ from unittest import mock
 from dbbstation.diagnosis import explain, shape_look, shapes
 from dbbstation.diagnosis.diagnose import usable_sources, without_doubtful
 from dbbstation.diagnosis.thinned import sectors_for, thinned
+from dbbstation.sources.causes import servo_lag
 from dbbstation.sources.laws import unlike_struts
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
@@ -29,6 +30,7 @@ MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),
     "STICKING_HALVES": (shapes, "STICKING_HALVES", (4, 6), 23),
     "UNLIKE": (unlike_struts, "UNLIKE", (1.5, 3.0), 32),
+    "BY_DIRECTION": (servo_lag, "BY_DIRECTION", (0.15, 0.6), 52),
 }
 """By constant: its module and name, other values, and the session on which it decides most."""
 
@@ -71,7 +73,7 @@ def main() -> None:
             sys.stderr.write(f"{key}: {columns[key]}\n")
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
-        "data": "Four sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5 and 2.",
+        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5, 2 and 0.3.",
         "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,

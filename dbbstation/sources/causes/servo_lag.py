@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 S_PER_MS = 1e-3
 
+BY_DIRECTION = 0.3
+"""Share by which a lag may be more one way and less the other, one standard deviation: weight and friction load a drive by direction."""
+
 
 class ServoLag(ErrorSource):
     """A strut follows its command as a position loop of gain 1/tau: tau_i dy_i/dt = x_i - y_i.
@@ -77,6 +80,11 @@ class ServoLag(ErrorSource):
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_constant = self._lag(motion, machine, values)[1]
         return Effect(strut_mm=S_PER_MS * by_constant[:, :, None] * np.eye(STRUTS))
+
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        """Return changes if each strut lags otherwise while it shortens than while it lengthens, as under a load."""
+        lag, _ = self._lag(motion, machine, values)
+        return Effect(strut_mm=BY_DIRECTION * np.abs(lag)[:, :, None] * np.eye(STRUTS))
 
     def _lag(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats]:
         self.require(motion)

@@ -161,6 +161,17 @@ def test_an_exact_machine_shows_no_skew(reference):
     assert np.allclose(skewed, 150.0, rtol=0, atol=1e-6)
 
 
+def test_a_lag_by_direction_is_more_one_way_and_as_much_less_the_other(reference):
+    """To first order in tau the error is -tau (1 + 0.3 s) dx/dt, s the sign of dx/dt."""
+    motion, tau_ms = run((100, 100, -1150), (-10, 10), step_deg=0.25), np.array([2.0, -1.0, 0.5, 3.0, 0.0, 1.0])
+    speed = np.gradient(travel(reference, motion), motion.time_s, axis=0)
+    changes = LAG.left_open(motion, reference, tau_ms).strut_mm
+    own = np.diagonal(changes, axis1=1, axis2=2)
+    assert np.array_equal(changes, own[:, :, None] * np.eye(6))
+    assert np.allclose(own, 0.3e-3 * np.abs(tau_ms) * np.abs(speed), atol=3e-5)
+    assert own.max() > 5e-3
+
+
 def test_no_kinematic_parameter_can_take_a_lag(reference):
     share = concealed_share(reference, jig_runs(4.0), lambda m: LAG.derivative(m, reference, np.zeros(6)))
     assert (share < 0.002).all()

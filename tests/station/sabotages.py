@@ -244,7 +244,8 @@ class Shop:
         ):
             self.cut_at_s = None
             self.wire._to_drop += round(LOST_S * self.protocol.fastest_hz(None))  # its thread is here, and has the lock
-        if t_s > self.clock._until_s - 1.0 and self._workplace.station.state in RECORDING:
+        at_work = self._workplace is not None and self._workplace.station.state in RECORDING
+        if at_work and t_s > self.clock._until_s - 1.0:
             self.clock.run_until(t_s + 1.0)  # the bar stands, and time goes on as at a machine
         return self.cell.length_mm_at(t_s)
 

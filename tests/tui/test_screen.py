@@ -6,6 +6,7 @@ import asyncio
 import time
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
+from unittest import mock
 
 import pytest
 from textual.events import Key
@@ -33,6 +34,7 @@ from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion, TemperatureQuestion
 from dbbstation.tui.shown import Shown
 from dbbstation.tui.trace_view import TraceView
+from tests.virtual.faulty import FaultyInstrument
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator
@@ -110,7 +112,10 @@ class Bench:
 @contextmanager
 def switched_on(plan: InlinePlan, folder: Path) -> Iterator[Bench]:
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
-    with virtual_place(machine, plan.to_domain(), ENCODER, time_scale=TIME_SCALE) as place:
+    with (
+        mock.patch("dbbstation.service.virtual_place.VirtualInstrument", FaultyInstrument),
+        virtual_place(machine, plan.to_domain(), ENCODER, time_scale=TIME_SCALE) as place,
+    ):
         yield Bench(place, Job(machine, plan, folder, clock=place.clock, time_scale=TIME_SCALE))
 
 

@@ -378,7 +378,7 @@ def figures(rows: list[dict[str, object]]) -> dict[str, list[object]]:
         "effect: wrong class": rate("effect", lambda r: bool(r["wrong"])),
         "effect: right law": rate("effect", lambda r: bool(r["right_law"])),
         "effect: wrong law": rate("effect", lambda r: bool(r["wrong_law"])),
-        "effect: right law is ruled out": rate("effect", lambda r: bool(r["false_ruled_out"])),
+        "effect: right law is ruled out, none named": rate("effect", lambda r: bool(r["false_ruled_out"] and not r["right_law"])),
         "effect: correction leaves less than a third": rate("effect", lambda r: r["left"] is not None and float(str(r["left"])) < 1 / 3),
     }  # fmt: skip
     for group in ("memory", "concealed"):

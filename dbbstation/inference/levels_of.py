@@ -57,7 +57,9 @@ def levels_of(
     """
     probabilities = VariableProbabilities(settled)
     every = classes_of(settled, probabilities)
-    if parts is not None and not any(_in_time(one) and parts.of(one.wanted).predicts for one in every):
+    # Parts may have in time what the best set has as part of a law, such as the drift of an integral.
+    ways = [one.wanted for one in every if _in_time(one)] or [{TIME, RUN}]
+    if parts is not None and not any(parts.of(wanted).predicts for wanted in ways):
         # What happened, and goes on in no other rows, would fill these with what a curve over time has between its rows.
         parts = parts.but_for({TIME, RUN})
     found = [_followed(settled, one, probabilities, parts, held_out) for one in every]

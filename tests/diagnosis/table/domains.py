@@ -395,6 +395,7 @@ def main() -> None:
     options.add_argument("--what", default="effect,twin")
     options.add_argument("--kinds", default=",".join(SCENES))
     options.add_argument("--out", type=Path, required=True)
+    options.add_argument("--before", type=Path, help="results of the same tables of an earlier version")
     chosen = options.parse_args()
     stored = json.loads(chosen.out.read_text(encoding="utf-8")) if chosen.out.exists() else {"tables": []}
     rows: list[dict[str, object]] = stored["tables"]
@@ -405,6 +406,14 @@ def main() -> None:
                 if (name, seed, what) not in known:
                     rows.append(answer(name, seed, what))
                     chosen.out.write_text(json.dumps(_stored(rows), indent=1) + "\n", encoding="utf-8")
+    if chosen.before is not None:
+        keys = {(r["kind"], r["seed"], r["what"]) for r in rows}
+        earlier = json.loads(chosen.before.read_text(encoding="utf-8"))
+        same = figures([r for r in earlier["tables"] if (r["kind"], r["seed"], r["what"]) in keys])
+        stored = _stored(rows)
+        stored["columns"] = ["tables", "of", "95 % interval", f"at {earlier['commit']}"]
+        stored["figures"] = {name: [*row, f"{same[name][0]} of {same[name][1]}"] for name, row in figures(rows).items()}
+        chosen.out.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(figures(rows), indent=1))  # noqa: T201
 
 

@@ -281,7 +281,9 @@ class ChosenWithoutParts:
 
     def errors_with(self, wanted: Collection[str]) -> list[float]:
         """Return each part's rms error with effects of these variables alone; none given: with everything."""
-        left = [left_with(part.settled, wanted)[part.rows] for part in self.parts]
+        # What goes on in time in parts may be the drift of a law that follows a variable.
+        also = {TIME, RUN} if wanted and self.of({TIME, RUN}).predicts else set[str]()
+        left = [left_with(part.settled, {*wanted, *also})[part.rows] for part in self.parts]
         return [float(np.sqrt(np.mean(np.square(rows)))) for rows in left]
 
 

@@ -11,6 +11,7 @@ from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
 from dbbstation.inference.model_comparison import amplitude_size
+from dbbstation.inference.variables import Kind
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,7 +26,14 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
     """Return amplitudes and nonlinear parameters, slack included in uncertainty."""
     law = settled.bank.laws.get(member.cause.name)
     if law is not None:
-        return values_of_law(law, member, values, covariance, law.form_uncertainty)
+        found = values_of_law(law, member, values, covariance, law.form_uncertainty)
+        if any(
+            v.kind is Kind.TIME
+            for name in settled.best.names & set(settled.bank.patterns)
+            for v in settled.bank.patterns[name].variables
+        ):
+            found.pop("zero", None)  # a drift beside it has a part of it
+        return found
     sigma, width = np.sqrt(np.maximum(np.diag(covariance), 0.0)), len(member.variant.columns)
     pattern = settled.bank.patterns[member.cause.name]
     unit = settled.channel.unit

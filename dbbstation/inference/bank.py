@@ -469,7 +469,7 @@ def _forms(
             label=label,
             whole=columns,
             log_weight=log_weight + weight,
-            positive=tuple(law.positive[k] for k in part) if law.positive else (),
+            positive=law.positive[: len(part)],
         )
         for part, weight, label in law.choices
     ]

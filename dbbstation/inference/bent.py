@@ -148,7 +148,7 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
     width = ("half width" if family is Family.DEAD_ZONE else "turns over within", variable.unit)
     grid = tuple(share * largest for share in WIDTHS[family])
     law = _with_width(f"{family} of {variable.name}", family, variable, columns, grid, own, width, size, members)
-    return replace(law, positive=(True,) * len(own)) if grows else law
+    return replace(law, positive=(True,)) if grows else law
 
 
 def _knee(side: str, variable: Variable, size: float, unit: str, members: int) -> Law:

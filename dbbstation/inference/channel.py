@@ -76,7 +76,7 @@ class Law:
         discrepancy: columns of departure, shape (n, q), from effect, shape (n,), nonlinear parameters and amplitudes, shape (p,),
             with `form_uncertainty` as standard deviation; default: the effect times smooth functions of `follows`.
         at: columns about amplitudes, shape (p,), exact there; None if the effect is proportional.
-        choices: alternative forms: columns, log probability, label.
+        choices: alternative forms: columns, log probability, label; `positive` then counts the columns of each.
         zero_from: middle of the variable that the first amplitude acts on and from which the second, over the first, moves
             the zero; None: no such zero.
         reach: largest effect of each amplitude, one standard deviation, in the residual's unit; None: `plausible` holds

@@ -19,7 +19,7 @@ NEGATIVE_SIGMA = 3.0
 
 def impossible(law: Law, values: Floats, variances: Floats) -> str:
     """Return why amplitudes are impossible, or an empty text."""
-    for k, positive in enumerate(law.positive[: len(values)]):
+    for k, positive in enumerate(law.positive):
         value = float(values[k])
         sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
         if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k])):

@@ -330,7 +330,8 @@ class CauseJudge:
         own = values_of_law(law, shown, values, covariance, law.form_uncertainty)
         every = self._of_laws | {name: value.value for name, value in own.items()}
         # What is negative by less than its uncertainty allows may be zero.
-        every |= {name: max(every[name], 0.0) for name, sign in zip(law.parameters, law.positive, strict=False) if sign}
+        signed = [name for name, sign in zip(law.parameters, law.positive, strict=False) if sign and name in own]
+        every |= {name: max(every[name], 0.0) for name in signed}
         return impossible(law, values, np.diag(covariance)) or impossible_beside(law, own, every)
 
     @cached_property

@@ -233,7 +233,6 @@ SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
 
 
 def _probable(source: SourceFinding) -> str:
-    """Return a probability, limited by how complete the catalogue is."""
     if source.probability is None:
         return ""
     surest = 0.999

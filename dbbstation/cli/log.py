@@ -153,7 +153,6 @@ def _to_file() -> logging.Handler | None:
 
 
 def _free(path: Path) -> bool:
-    """Return whether a log may be here: a regular file with one name, outside sessions."""
     if session_around(path) is not None:
         return False
     try:

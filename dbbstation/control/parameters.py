@@ -211,13 +211,11 @@ def _by_length(fitted: Fitted, machine: Machine, length_mm: Floats) -> Floats | 
 
 
 def _in_table(fitted: Fitted, machine: Machine, points: Floats) -> bool:
-    """Return whether a table corrects a source: it follows strut length, in waves long enough."""
     fine = fitted.source.shortest_period_mm(machine, fitted.values) < PER_WAVE * float(points[1] - points[0])
     return not fine and _by_length(fitted, machine, np.full((2, STRUTS), points[0])) is not None
 
 
 def _with_tables(values: Values, in_table: Sequence[Fitted], machine: Machine) -> Values:
-    """Return values with tables for sources of strut length, exact to second order."""
     table = np.zeros((STRUTS, POINTS))
     for _ in range(2):
         at = (values.points_mm + (machine.reference_length_error_mm - values.longer_mm)[:, None] + table).T
@@ -240,7 +238,6 @@ def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[Floats, 
 
 
 def _fit(machine: Machine, start: Values, frames: Frames, wanted: Floats, *, platform: bool) -> Values:
-    """Return the values with the least squares of position and lever times tilt, by Gauss-Newton."""
     values, used = start, slice(None if platform else STRUTS + JOINTS)
     for _ in range(ROUNDS):
         by_values, tool = _effects(machine, values, frames)

@@ -117,7 +117,6 @@ def _summed(runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_
 
 
 def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
-    """Return the relative uncertainty of the points: structure left by the curve over its explanation."""
     unmodelled, comparison = settled.unmodelled, settled.comparison
     names = {m.cause.name for m in together}
     others = settled.best.without(*names)

@@ -101,5 +101,4 @@ class FleetFolder:
 
 
 def _begun(path: Path) -> bool:
-    """Return whether a path was left by a fleet that ended before marking the folder."""
     return path.name == LOCK_FILE or is_leftover(path)

@@ -152,8 +152,6 @@ def _bend(family: Family, variable: Variable, grows: float, size: float, unit: s
 
 
 def _knee(side: str, variable: Variable, size: float, unit: str, members: int) -> Law:
-    """Return a straight line with another slope on one side of a place."""
-
     def columns(point: tuple[float, ...]) -> Floats:
         beyond = variable.values - point[0]
         return (np.maximum(beyond, 0.0) if side == "upper" else np.minimum(beyond, 0.0))[:, None]
@@ -181,7 +179,6 @@ def _with_width(
     size: float,
     members: int,
 ) -> Law:
-    """Return a law with one of some amplitudes, each with name, unit and label, and one width or place with its unit."""
     weight = -float(np.log(len(amplitudes)))
     choices = tuple(((k,), weight, label) for k, (_, _, label) in enumerate(amplitudes))
     return Law(
@@ -248,7 +245,6 @@ def _integral(
 
 
 def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, unit: str, members: int) -> Law:
-    """Return friction or play whose force is proportional to another variable, at once or over a distance."""
     turned = [one.directions(blocks), *(play(one.values, blocks, share * one.extent) for share in TRANSITS[:-1])]
     labels = ("at once", *(f"over {share * one.extent:.3g} {one.unit}".strip() for share in TRANSITS[:-1]))
     samples = np.column_stack(turned) * by.values[:, None]

@@ -92,7 +92,6 @@ def _detectable(
     follows: str,
     confirm: str | None = None,
 ) -> Detectable:
-    """Return the size from which a form is seen, given the share of its squares that the base leaves."""
     size = None
     if shown >= ENTIRELY:
         products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)

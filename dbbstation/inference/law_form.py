@@ -128,7 +128,6 @@ def _candidates(
 
 
 def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> bool:
-    """Return whether a law has no amplitude that it cannot have."""
     if not any(member.variant.positive):
         return True
     found, width = settled.comparison.estimates([member, *others]), len(member.variant.columns)

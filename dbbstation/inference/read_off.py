@@ -254,7 +254,6 @@ class CauseJudge:
         return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._equal(name)})
 
     def _acts(self, name: str) -> Acts:
-        """Return whether other rows can show it: not time, offsets or curves of single runs."""
         pattern, law = self._settled.bank.patterns.get(name), self._settled.bank.laws.get(name)
         if pattern is None:
             return Acts.ONCE if law is not None and law.acts_once else Acts.ALWAYS
@@ -336,7 +335,6 @@ class CauseJudge:
 
     @cached_property
     def _of_laws(self) -> dict[str, float]:
-        """Return values of all laws of the best set by name."""
         laws = self._settled.bank.laws
         told = [values_of_law(laws[n], m, *self._values[n], 0.0).items() for n, m in self._members.items() if n in laws]
         return {name: value.value for values in told for name, value in values}

@@ -389,7 +389,6 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
 
 
 def _impossible(settled: Settled) -> dict[str, str]:
-    """Return laws whose values cannot be: significantly negative, many times the difference, or not beside the others."""
     members, laws = settled.best.members, settled.bank.laws
     if not members:
         return {}

@@ -250,7 +250,6 @@ def looked_at(
 
 
 def _halved(curve: CommandCurve, cells: Pieces, shares: Floats, at: Floats, halves: Flags) -> Floats:
-    """Return what `looked_at` does, from the same of cells of which some are halves now."""
     if curve.has_history:
         return looked_at(curve, cells, shares)
     behind, places = curve.behind, along(curve.toolpath, Pieces(cells.begin[halves], cells.end[halves]), shares)
@@ -279,7 +278,6 @@ def _cells(
     tolerance_mm: float,
     whole: Flags,
 ) -> tuple[Pieces, Floats, Floats]:
-    """Return cells, the curve at their begin and at shares of each, and these shares."""
     toolpath = curve.toolpath
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     cutting = np.maximum(toolpath.tip_mm / FIRST_CELL_MM, toolpath.turn_deg / FIRST_CELL_DEG)

@@ -63,7 +63,6 @@ def faults_of(dialect: Dialect) -> list[str]:
 
 
 def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:
-    """Return whether the check of offsets changes the result, or is lost although the dialect has one."""
     guarded = replace(moves, holds={IN_FORCE: (0.0,) * 6})
     faults = _differences(moves, _read(dialect, guarded), "a check of offsets")
     checks = isinstance(dialect, WordDialect) and type(dialect).guard is not WordDialect.guard

@@ -168,7 +168,6 @@ def _known(runs: Sequence[Seen]) -> list[tuple[Seen]]:
 
 
 def _pairs(runs: Sequence[Seen]) -> list[tuple[Seen, Seen]]:
-    """Return each run with the first of its test and mounting in the other direction."""
     first: dict[tuple[str, str, float], int] = {}
     for k, one in enumerate(runs):
         if one.run.expected is not None:

@@ -210,7 +210,6 @@ def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
 
 
 def _plain(options: FleetOptions) -> dict[str, object]:
-    """Return options that determine results: settings by their tolerances, and their place as shown in a report."""
     data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
     settings = options.settings
     return {**data, "tolerances": [asdict(one) for one in settings.tolerances], "from": settings.tolerances_from}
@@ -260,7 +259,6 @@ def _failed(one: _Named, problem: str) -> _Outcome:
 
 
 def _without_number(named: Sequence[_Named]) -> tuple[str, ...]:
-    """Return notes on sessions without serial number, which count as one machine or several."""
     of_name: dict[str, list[_Named]] = {}
     for one in named:
         if one.session is not None and not one.session.serial_number:

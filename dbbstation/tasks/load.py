@@ -199,7 +199,6 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
 
 
 def _under(machine: Machine | None, observation: Observation) -> Observation:
-    """Return a run under a correcting control as one of a nominal control with equal strut lengths."""
     if machine is None:
         return observation
     poses = np.vstack([observation.motion().poses, observation.standing_pose])
@@ -263,7 +262,6 @@ def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[floa
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
-    """Number sessions with equal folder names, to keep their mountings apart."""
     names = [session.name for session in sessions]
     return [
         replace(session, name=f"{session.name} ({names[: k + 1].count(session.name)})")

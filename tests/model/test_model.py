@@ -116,3 +116,24 @@ def test_position_uncertainty_is_that_of_many_drawn_machines(machine, kinematics
         sources = (replace(kinematics[0], values=x[:6]), replace(kinematics[1], values=x[6:]))
         drawn.append(MachineModel(machine, sources).actual_poses(motion)[:, :3])
     assert np.allclose(np.std(drawn, axis=0), stated, rtol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("axis", "turned"),
+    [
+        (0, lambda x, y, z, c, s: [x, c * y - s * z, s * y + c * z]),
+        (1, lambda x, y, z, c, s: [c * x + s * z, y, c * z - s * x]),
+        (2, lambda x, y, z, c, s: [c * x - s * y, s * x + c * y, z]),
+    ],
+    ids="abc",
+)
+def test_a_tip_off_its_place_is_turned_with_the_platform(machine, axis, turned):
+    """A vector that is fixed in the platform turns by the elementary rotation about one axis, in every convention of angles."""
+    exact = replace(machine, reference_length_error_mm=np.zeros(6))
+    pose = np.array([10.0, -20.0, -1000.0, 0.0, 0.0, 0.0])
+    pose[3 + axis] = 12.0
+    off = np.array([0.3, -0.5, 0.8])
+    found = MachineModel(exact, (fitted("tool-ball-offset", *off),)).actual_poses(Motion(pose[None]))[0]
+    angle = np.radians(12.0)
+    assert found[:3] - pose[:3] == pytest.approx(turned(*off, np.cos(angle), np.sin(angle)), abs=1e-9)
+    assert found[3:] == pytest.approx(pose[3:], abs=1e-9)

@@ -291,7 +291,6 @@ def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.
 
 
 def _with_weight(finding: DriveFinding, values: dict[str, Value]) -> DriveFinding:
-    """Add an axis's slant that would explain a constant load by weight."""
     mass = values.get(MASS)
     load = finding.parameters.get("load_n")
     if (

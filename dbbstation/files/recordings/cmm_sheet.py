@@ -272,7 +272,6 @@ def _row(
 
 
 def _known_name(one: Measured, jig: JigFile) -> str:
-    """Return the ball's name in the jig, ignoring case and underscores, or that of this bore on this holder."""
     plain = {name.lower().replace("_", "-"): name for name in jig.balls}
     if one.name:
         return plain.get(one.name.lower().replace("_", "-"), one.name)

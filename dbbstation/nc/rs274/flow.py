@@ -112,7 +112,6 @@ class Flow:
         self._ran = 0
 
     def _append(self, text: str, file: str) -> None:
-        """Add the lines of a file."""
         before = len(self._lines)
         self.files += ((before, file),)
         self._lines += text.split("\n")
@@ -312,7 +311,6 @@ class Flow:
         return ""
 
     def _program(self) -> range:
-        """Return the lines of the program or subprogram that runs: from its number, or the begin of its file, to the next."""
         begins = [1 + before for before, _ in self.files] + [
             each.line for each in self._o_lines.values() if not each.keyword
         ]
@@ -322,7 +320,6 @@ class Flow:
         )
 
     def _loop_line(self, macro: OLine, number: int, place: Place, keyword: str) -> OLine:
-        """Return the next END of a loop, or its WHILE before."""
         form = _END if keyword == "END" else _DO
         near = [
             one

@@ -108,7 +108,6 @@ class _Interpreter(Moves):
             self._check_places(block)
 
     def _check_places(self, block: ProgramBlock) -> None:
-        """Check that the program names every axis, and state where it does so late."""
         away = [math.isnan(value) and axis not in self._away for axis, value in enumerate(self._state.pose)]
         unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
         place, fault = self._unplaced or (block.place, unknown_place(block, unknown, ""))

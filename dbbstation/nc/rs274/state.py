@@ -87,7 +87,6 @@ class ControlState:
         return f"G10 L2 P{system} {words}", SYSTEMS[system - 1], before
 
     def _set_tool(self, block: ProgramBlock) -> str:
-        """Run G10 L1, which sets length and radius of a tool in the control's table."""
         word, which, radius = block.words.pop("L"), block.words.pop("P", None), block.words.pop("R", None)
         if which is None or which.value < 1.0 or which.value != int(which.value):
             raise block.place.fault(word.column, "G10 L1 without the number of a tool", "give P, a whole number from 1")

@@ -250,7 +250,7 @@ def _print_schema(name: str) -> None:
     from dbbstation.instrument.profiles import ProtocolFile
     from dbbstation.results.schemas import RESULTS, result_schema
 
-    formats: dict[str, Any] = {**SCHEMAS, "dbb-instrument/1": ProtocolFile}
+    formats: Any = {**SCHEMAS, "dbb-instrument/1": ProtocolFile}
     if name in RESULTS:
         print_plain_json(result_schema(name))
     elif name in formats:

@@ -189,22 +189,20 @@ def made(
     """
 
     def give(function: Callable[..., Any]) -> click.Command:
-        kinds: dict[str, Any] = {
-            name: kind for name, (kind, _) in annotations_of(function).items() if is_dataclass(kind)
-        }
+        kinds: Any = {name: kind for name, (kind, _) in annotations_of(function).items() if is_dataclass(kind)}
         parts = {name: options_of(kind) for name, kind in kinds.items()}
         every = options_of(function) | {name: one for part in parts.values() for name, one in part.items()}
 
-        answers = function.__annotations__["return"] == Answer.__name__
-        if answers:
-            every["as_json"] = TaskParameter("as_json", bool, default=False, option=replace(o.JSON, flag="--json"))
+        answers = inspect.signature(function).return_annotation == Answer.__name__
+        as_json = TaskParameter("as_json", bool, default=False, option=replace(o.JSON, flag="--json"))
+        every |= {as_json.name: as_json} if answers else {}
 
         @functools.wraps(function)
         def run(**given: Any) -> Any:  # noqa: ANN401 - each option has a type of its own
-            as_json = answers and given.pop("as_json")
+            told = answers and given.pop(as_json.name)
             groups = {name: kinds[name](**{one: given.pop(one) for one in part}) for name, part in parts.items()}
             found = function(**given, **groups)
-            return found.tell(as_json=as_json) if answers else found
+            return found.tell(as_json=told) if answers else found
 
         options = sorted(map(_checked, every.values()), key=lambda one: isinstance(one, click.Option))
         text = inspect.cleandoc(function.__doc__ or "").replace(r"\b", "\b")

@@ -19,7 +19,7 @@ def plot(
     filter: o.Filter = "none",  # noqa: A002 - the standard's word
     tests: o.Tests = (),
     exclude: o.Exclude = (),
-    out: Annotated[Path, Option(o.OUTPUTS["figure"], kind="file", parse=known_format)],
+    out: Annotated[Path, Option(o.FIGURE, kind="file", parse=known_format)],
     force: o.Force = False,
     as_json: o.Json = False,
 ) -> None:

@@ -423,9 +423,7 @@ class ToolpathBuilder:
             known = np.flatnonzero(~np.isnan(poses[:, axis]))
             last = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
             poses[:, axis] = poses[known[np.maximum(last, 0)], axis] if len(known) else 0.0
-        alike: dict[str, Any] = {
-            name: each([getattr(rows, name) for rows in self._rows], kind) for name, kind in _ALIKE.items()
-        }
+        alike: Any = {name: each([getattr(rows, name) for rows in self._rows], kind) for name, kind in _ALIKE.items()}
         return Toolpath(
             name=self.name,
             **alike,

@@ -22,10 +22,11 @@ Model = Annotated[_Model, MODEL]
 FORCE, JSON = Option("Replace existing files."), Option("Print the result as JSON.")
 Force = Annotated[bool, FORCE]
 Json = Annotated[bool, replace(JSON, flag="--json")]
+FIGURE = "Write a figure here, as SVG, PNG or PDF by the ending of its name."
 OUTPUTS = {
     "out": "Write the result here.",
     "table": "Write the table here, as CSV.",
-    "figure": "Write a figure here, as SVG, PNG or PDF by the ending of its name.",
+    "figure": FIGURE,
     "page": "Write the page here, as HTML.",
 }
 """Of what a command writes: what it is stands in its metavar."""

@@ -116,10 +116,16 @@ def _waves(
     waves = [wave for _, wave in found[:strongest]]
     if variable.kind is not Kind.TIME:
         # What is found may be the pitch, or a multiple of it.
-        pitches = [wave.frequency / k for wave in waves[: BOUNDS.strongest] for k in (1, 2, 3)]
+        pitches = [wave.frequency / k for wave in waves[: BOUNDS.strongest] for k in MULTIPLES]
         most = pieces / (2.0 * extent)
         waves += [Wave(f, h) for f in pitches if f > 2.0 / extent for h in HARMONICS if h * f < most]
-    return [_pattern(variable, Family.WAVE, wave, tried) for wave in waves]
+    # Each pitch and each number of harmonics beside a wave was tried, too.
+    beside = len(MULTIPLES) * len(HARMONICS)
+    return [_pattern(variable, Family.WAVE, w, tried * (beside if w.harmonics > 1 else 1)) for w in waves]
+
+
+MULTIPLES = (1, 2, 3)
+"""Times its pitch that the frequency of a wave may be."""
 
 
 def _least(tried: float) -> float:

@@ -28,9 +28,8 @@ from dbbstation.inference.verdict import SURE
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.outliers.outlier import Fit, Outlier
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
@@ -324,11 +323,9 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
     return None
 
 
-def _estimated(
-    channel: CircleChannel, comparison: ModelComparison, hypothesis: Hypothesis
-) -> list[NDArray[np.float64] | None]:
+def _estimated(channel: CircleChannel, comparison: ModelComparison, hypothesis: Hypothesis) -> list[Floats | None]:
     values = comparison.estimates(hypothesis.members).values
-    found: list[NDArray[np.float64] | None] = []
+    found: list[Floats | None] = []
     for member in hypothesis.members:
         own, values = values[: len(member.columns)], values[len(member.columns) :]
         if not member.cause.named:
@@ -348,7 +345,7 @@ def _estimated(
     return found
 
 
-def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
+def _values_in(fit: Calibration, name: str) -> dict[str, Floats]:
     return {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
 
 
@@ -364,7 +361,7 @@ def _lay_out(
     member: Member,
     rival: Member,
     fit: Calibration,
-    target: NDArray[np.float64],
+    target: Floats,
 ) -> None:
     others = _lawful(best, member.cause.name)
     name, law = rival.cause.name, rival.variant.law

@@ -17,9 +17,7 @@ from dbbstation.sources.contract import Motion, Need, Setup
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.inference.model_comparison import Variant
     from dbbstation.machine.geometry import Machine
@@ -78,7 +76,7 @@ class _Run:
 
     ball: Floats
     weight: float
-    touched: NDArray[np.int64]
+    touched: Integers
     base: Floats
     of_sources: dict[_Form, Floats] = field(default_factory=dict)
 

@@ -29,8 +29,7 @@ from dbbstation.sources.laws.turning import since_turning
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.machine.kinematics import Struts
     from dbbstation.machine.rotation import Frames
@@ -115,8 +114,8 @@ class Samples:
         gain: of the reading by what moves, shape (n, d); struts (n, 6).
     """
 
-    values: dict[str, NDArray[np.float64]]
-    gain: dict[str, NDArray[np.float64]]
+    values: dict[str, Floats]
+    gain: dict[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -172,7 +171,7 @@ class Shape:
         """Return a wave's period in the variable's unit, else None."""
         return 1.0 / self.form.frequency if isinstance(self.form, Wave) else None
 
-    def columns(self, samples: Samples) -> NDArray[np.float64]:
+    def columns(self, samples: Samples) -> Floats:
         """Return amplitudes' effects on readings: directions times curves, shape (n, d p)."""
         values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
@@ -180,7 +179,7 @@ class Shape:
             return np.asarray((gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1))
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
-    def by_strut(self, samples: Samples, amplitudes: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    def by_strut(self, samples: Samples, amplitudes: Floats) -> tuple[Floats, int]:
         """Return each strut's contribution to readings, shape (n, 6), and its number of amplitudes."""
         gain, values = samples.gain[self.moves], self.followed(samples.values[self.variable])
         columns = self.form.columns(values)
@@ -189,13 +188,13 @@ class Shape:
         effect = gain * (curve[:, None] if curve.ndim == 1 else curve)
         return effect * (np.arange(1, STRUTS + 1) == self.strut) if self.strut else effect, count
 
-    def followed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def followed(self, values: Floats) -> Floats:
         """Return its variable's values, by strut or place."""
         if isinstance(self.form, Spring):
             return values[..., WAYS_DEG.index(self.form.towards_deg)]
         return values[..., self.strut - 1] if self.variable in OF_STRUTS and self.strut else values
 
-    def _gain(self, samples: Samples) -> NDArray[np.float64]:
+    def _gain(self, samples: Samples) -> Floats:
         gain = samples.gain[self.moves]
         if isinstance(self.form, Spring):
             gain = np.split(gain, len(WAYS_DEG), axis=1)[WAYS_DEG.index(self.form.towards_deg)]
@@ -227,11 +226,11 @@ ITS_OWN = {
 class Ranges:
     """Variables' extents over all runs."""
 
-    low: dict[str, NDArray[np.float64]]
-    high: dict[str, NDArray[np.float64]]
+    low: dict[str, Floats]
+    high: dict[str, Floats]
 
 
-def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]]:
+def variables(motion: Motion, machine: Machine) -> dict[str, Floats]:
     """Return variables of all rows: shape (n, 6) by strut, else (n,) or (n, c)."""
     struts = motion.struts(machine)
     found = {"strut-length": struts.length_mm}
@@ -261,7 +260,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
     return found
 
 
-def _since_reversal_s(time_s: NDArray[np.float64], speed_mm_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def _since_reversal_s(time_s: Floats, speed_mm_s: Floats) -> Floats:
     """Return time since each strut's reversal with its new sign; zero before, shape (n, 6) [s].
 
     The instant is interpolated at zero speed.
@@ -276,7 +275,7 @@ def _since_reversal_s(time_s: NDArray[np.float64], speed_mm_s: NDArray[np.float6
     return since
 
 
-def _temperatures(motion: Motion) -> dict[str, NDArray[np.float64]]:
+def _temperatures(motion: Motion) -> dict[str, Floats]:
     logged = known_thermometers(motion)
     found = {f"{name}-temperature": logged_degc(motion, name)[0] for name in THERMOMETERS if name in logged}
     on_struts = [f"strut{strut}" for strut in range(1, STRUTS + 1)]
@@ -285,9 +284,7 @@ def _temperatures(motion: Motion) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-def samples_of(
-    motion: Motion, machine: Machine, reading: BarReading, pivot_mm: NDArray[np.float64] | None = None
-) -> Samples:
+def samples_of(motion: Motion, machine: Machine, reading: BarReading, pivot_mm: Floats | None = None) -> Samples:
     """Return variables and gains of a run.
 
     Args:
@@ -311,7 +308,7 @@ def samples_of(
     return Samples(known, gain)
 
 
-def _pulled(struts: Struts) -> NDArray[np.float64]:
+def _pulled(struts: Struts) -> Floats:
     count = len(struts.length_mm)
     stretch = np.empty((count, STRUTS, 6))
     for k, load in enumerate(np.diag([1.0] * 3 + [LEVER_MM] * 3)):
@@ -320,7 +317,7 @@ def _pulled(struts: Struts) -> NDArray[np.float64]:
     return stretch
 
 
-def _hoses(frames: Frames, machine: Machine) -> NDArray[np.float64]:
+def _hoses(frames: Frames, machine: Machine) -> Floats:
     """Return vectors from the platform's middle to far places, shape (n, 12, 3) [mm]."""
     middle = frames.position_mm + frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)
     angles = np.radians(WAYS_DEG)
@@ -329,7 +326,7 @@ def _hoses(frames: Frames, machine: Machine) -> NDArray[np.float64]:
     return np.asarray(places - middle[:, None, :], dtype=np.float64)
 
 
-def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+def _pulled_towards(motion: Motion, machine: Machine) -> Floats:
     """Return struts' stretch by a unit pull, shape (n, 6, 60): five numbers per place.
 
     The numbers are the pull at the platform's middle, moments at `LEVER_MM` along its axes, and a downward force for

@@ -19,10 +19,8 @@ from dbbstation.sources.laws.by_temperature import FollowsTemperature
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.model.machine_model import Actual
     from dbbstation.model.observation import Observation
@@ -163,7 +161,7 @@ def _warmer_k(calibration: Calibration, name: str, motion: Motion) -> Floats:
     return next(source.warmer_k(motion) for source in own if isinstance(source, FollowsTemperature))
 
 
-def _branches(sense: Floats, *, signed: bool) -> list[tuple[str, NDArray[np.bool_]]]:
+def _branches(sense: Floats, *, signed: bool) -> list[tuple[str, Flags]]:
     if not signed:
         return [("", np.ones(len(sense), dtype=bool))]
     return [(label, sense == sign) for sign, label in SENSES.items()]
@@ -172,7 +170,7 @@ def _branches(sense: Floats, *, signed: bool) -> list[tuple[str, NDArray[np.bool
 def _branch(
     samples: _Samples,
     column: int,
-    rows: NDArray[np.bool_],
+    rows: Flags,
     sense: str,
     before_mm: Floats,
     left_mm: Floats,

@@ -19,9 +19,7 @@ from dbbstation.inference.triangle import triangle_of
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.blocks import Block, Columns
 
 
@@ -38,8 +36,8 @@ class Group:
         left: information on the border: rows, target last, shape (r, b + 1).
     """
 
-    columns: NDArray[np.int64]
-    border: NDArray[np.int64]
+    columns: Integers
+    border: Integers
     inner: Floats
     across: Floats
     target: Floats
@@ -57,9 +55,9 @@ class Arrow:
     """
 
     groups: tuple[Group, ...]
-    alone: NDArray[np.int64]
-    random: NDArray[np.int64]
-    fitted: NDArray[np.int64]
+    alone: Integers
+    random: Integers
+    fitted: Integers
     root: Floats
     target: Floats
     floor: float
@@ -127,10 +125,10 @@ class _Border:
         place: of each column, shape (k,); -1 for others.
     """
 
-    order: NDArray[np.int64]
+    order: Integers
     random: int
-    place: NDArray[np.int64]
-    alone: NDArray[np.int64]
+    place: Integers
+    alone: Integers
 
     def priors(self, known: Columns) -> Floats:
         """Return prior rows, padded with zeros for a full triangle."""
@@ -148,7 +146,7 @@ class _Border:
         return wide
 
 
-def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int], NDArray[np.int64]]], _Border]:
+def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int], Integers]], _Border]:
     touched = np.zeros(len(known.prior), dtype=np.bool_)
     for block in blocks:
         touched[block.columns] = True
@@ -164,7 +162,7 @@ def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int
     return members, _Border(order, len(random), place, np.flatnonzero(stated & ~touched))
 
 
-def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, noise: float) -> Group:
+def _group(blocks: Sequence[Block], columns: Integers, known: Columns, noise: float) -> Group:
     border = np.setdiff1d(np.concatenate([columns, *(block.columns for block in blocks)]), columns)
     size, total = len(columns), len(columns) + len(border)
     order = np.concatenate([columns, border])
@@ -183,7 +181,7 @@ def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, 
     return Group(columns, border, top[:, :size], top[:, size:-1], top[:, -1], triangle[size:, size:])
 
 
-def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[list[int], NDArray[np.int64]]]:
+def _groups(blocks: Sequence[Block], random: Flags) -> list[tuple[list[int], Integers]]:
     """Return blocks and random effects of each group.
 
     An effect of many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises rows times columns
@@ -212,9 +210,7 @@ def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[li
     return best
 
 
-def _tied(
-    blocks: Sequence[Block], which: NDArray[np.int64], touched: NDArray[np.int64], own: NDArray[np.bool_]
-) -> list[tuple[list[int], NDArray[np.int64]]]:
+def _tied(blocks: Sequence[Block], which: Integers, touched: Integers, own: Flags) -> list[tuple[list[int], Integers]]:
     number, total = len(blocks), len(own)
     touches = own[touched]
     edges = (np.ones(int(touches.sum())), (which[touches], number + touched[touches]))

@@ -43,9 +43,9 @@ from dbbstation.inference.uneven import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from numpy.typing import NDArray
     from scipy.sparse import csr_array
 
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.channel import Channel, Law
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.patterns import Pattern
@@ -88,7 +88,7 @@ class Bank:
         self.trust = np.ones(len(channel.target))
         self.tails, self.grows_with = np.inf, ""
         self._columns = CauseColumns(channel.base.samples[channel.kept], self._whitener())
-        self._everywhere: list[NDArray[np.float64]] = []
+        self._everywhere: list[Floats] = []
         self._of_patterns: dict[str, Cause] = {}
         self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
 
@@ -143,7 +143,7 @@ class Bank:
         for name in names:
             del self.patterns[name], self._of_patterns[name]
 
-    def samples(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+    def samples(self, columns: Integers) -> Floats:
         """Return columns over all rows, shape (n, p)."""
         starts = np.cumsum([0, *(part.shape[1] for part in self._everywhere)])
         found = np.empty((len(self.channel.residual), len(columns)))
@@ -152,11 +152,11 @@ class Bank:
             found[:, k] = self._everywhere[part][:, column - starts[part]]
         return found
 
-    def fitted(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+    def fitted(self, columns: Integers) -> Floats:
         """Return whitened columns over kept rows, shape (m, p)."""
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
-    def beside(self, but_for: NDArray[np.bool_] | None = None, only: NDArray[np.int64] | None = None) -> BesideBase:
+    def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
         """Return causes beside the base; rows, shape (m,), may be ignored if the target is zero there.
 
         Args:
@@ -165,7 +165,7 @@ class Bank:
         columns = self._columns if but_for is None else self._columns.but_for(but_for, only)
         return BesideBase(columns, self.channel.known, self.channel.held, self.noise.innovation)
 
-    def without(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> ModelComparison:
+    def without(self, rows: Flags, only: Integers | None = None) -> ModelComparison:
         """Return the comparison without some of all rows, shape (n,), in the same noise; `only` as of `beside`."""
         out = rows[self.channel.kept]
         return self.beside(out, only).comparison(np.where(out, 0.0, self.target))
@@ -253,7 +253,7 @@ class Bank:
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0]
         return has_long_tails(left / self.trust)
 
-    def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
+    def _spread_of(self, left: Floats) -> tuple[Floats, str]:
         if self.channel.levels is not None:
             return spread_by_kind(np.square(left * self.spread), self.channel.levels[self.channel.kept]), ""
         grows, known, follows = self.channel.grows, self.channel.known_noise, self.channel.noise_follows
@@ -278,9 +278,7 @@ class Bank:
         least = self.channel.least_noise / self.noise.innovation if name else 0.0
         return np.maximum(np.sqrt(best / np.mean(best)), least), name
 
-    def _colour_of(
-        self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
-    ) -> Coloured:
+    def _colour_of(self, left: Floats, draws: Floats, stretches: Sequence[slice], level: Coloured) -> Coloured:
         """Return the residual's noise before whitening, absorbed power restored; at a level if alike."""
         pairs = [(bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)) for k in range(draws.shape[1])]
         taken = [r.log_power - w.log_power for w, r in pairs if w is not None and r is not None]
@@ -304,13 +302,13 @@ class Bank:
         # Squares say the level best once the colour is right.
         return level if alike(found.with_innovation(level.innovation), level) else found
 
-    def _sizes(self, members: Sequence[Member]) -> NDArray[np.float64]:
+    def _sizes(self, members: Sequence[Member]) -> Floats:
         sd = np.zeros(self._columns.count)
         for member in members:
             sd[member.columns] = member.sd
         return sd
 
-    def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
+    def _taking_part(self, beside: BesideBase) -> Floats:
         found = [self._of_patterns[name] for name in self._of_patterns if name in self.looked_for]
         idle: set[str] = set()
         if found:
@@ -322,7 +320,7 @@ class Bank:
                 sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
         return sd
 
-    def _take(self, noise: Coloured, spread: NDArray[np.float64], trust: NDArray[np.float64]) -> None:
+    def _take(self, noise: Coloured, spread: Floats, trust: Floats) -> None:
         same = noise.partial == self.noise.partial and np.array_equal(spread, self.spread)
         same = same and np.array_equal(trust, self.trust)
         self.noise, self.spread, self.trust = noise, spread, trust
@@ -337,35 +335,35 @@ class Bank:
         for part in self._everywhere:
             self._columns.add(part)
 
-    def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def whitened(self, rows: Floats) -> Floats:
         """Return whitened kept rows of all rows, shape (n, ...)."""
         return _whitened(self.channel.kept, self.whitening, rows)
 
-    def _whitener(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    def _whitener(self) -> Callable[[Floats], Floats]:
         return partial(_whitened, self.channel.kept, self.whitening)
 
     @property
-    def target(self) -> NDArray[np.float64]:
+    def target(self) -> Floats:
         """Return the whitened residual of kept rows, shape (m,)."""
         return self.whitened(self.channel.residual)
 
     @property
-    def base(self) -> NDArray[np.float64]:
+    def base(self) -> Floats:
         """Return the whitened base over kept rows, shape (m, k)."""
         return self._columns.base
 
     @property
-    def axes(self) -> NDArray[np.float64]:
+    def axes(self) -> Floats:
         """Return orthonormal base axes over kept rows, shape (m, r)."""
         return self._columns.axes
 
-    def base_values(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+    def base_values(self, effect: Floats) -> Floats:
         """Return base values beside an effect over all rows, shape (k,)."""
         target = self.whitened(self.channel.residual - effect)
         block = compress(np.arange(self.base.shape[1]), self.base, target)
         return solve([block], self.channel.known, self.noise.innovation, self.channel.held).x
 
-    def refine(self, name: str, nonlinear: tuple[float, ...], amplitudes: NDArray[np.float64]) -> None:
+    def refine(self, name: str, nonlinear: tuple[float, ...], amplitudes: Floats) -> None:
         """Lay out a law at parameter values, with tangents and slack.
 
         Args:
@@ -395,9 +393,7 @@ class Bank:
         )
         self._of_laws[name] = replace(self._of_laws[name], variants=variants)
 
-    def _discrepancy(
-        self, law: Law, effect: NDArray[np.float64], nonlinear: tuple[float, ...], amplitudes: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _discrepancy(self, law: Law, effect: Floats, nonlinear: tuple[float, ...], amplitudes: Floats) -> Floats:
         if law.form_uncertainty == 0.0:
             return np.zeros((len(effect), 0))
         if law.discrepancy is not None:
@@ -415,7 +411,7 @@ class Bank:
             found += _forms(law, self._add(samples), law.plausible_of(samples), point, weight)
         return tuple(found)
 
-    def _cause(self, pattern: Pattern, own: NDArray[np.int64], plausible: float) -> Cause:
+    def _cause(self, pattern: Pattern, own: Integers, plausible: float) -> Cause:
         size = np.full(len(own), plausible)
         variants = tuple(
             Variant(own[list(part)], size[list(part)], label=label, log_weight=weight)
@@ -427,7 +423,7 @@ class Bank:
             variants = (Variant(own, size),)
         return Cause(pattern.name, variants, self._odds(pattern), named=pattern.family in NAMED)
 
-    def _blocks(self, own: NDArray[np.int64], size: NDArray[np.float64]) -> tuple[Variant, ...]:
+    def _blocks(self, own: Integers, size: Floats) -> tuple[Variant, ...]:
         half = float(np.log(0.5))
         alone = [
             Variant(own[k : k + 1], size[:1], label=self.channel.names[k], log_weight=half - float(np.log(len(own))))
@@ -442,20 +438,20 @@ class Bank:
         rank = sum(names.index(variable.name) for variable in pattern.variables if variable.name in names)
         return log_odds(len(over), pattern.tried) + odds_of_driven(pattern.variables) - TIE * rank
 
-    def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
+    def _add(self, samples: Floats) -> Integers:
         self._everywhere.append(samples)
         return self._columns.add(samples)
 
 
-def _whitened(kept: NDArray[np.bool_], whitening: csr_array | None, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _whitened(kept: Flags, whitening: csr_array | None, rows: Floats) -> Floats:
     own = rows if kept.all() else rows[kept]  # to pick all rows would copy all columns
     return own if whitening is None else np.asarray(whitening @ own)
 
 
 def _forms(
     law: Law,
-    columns: NDArray[np.int64],
-    plausible: NDArray[np.float64],
+    columns: Integers,
+    plausible: Floats,
     nonlinear: tuple[float, ...],
     log_weight: float,
 ) -> list[Variant]:
@@ -475,7 +471,7 @@ def _forms(
     ]
 
 
-def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
+def amplitudes_of(variant: Variant) -> Integers:
     """Return a form's amplitude numbers within its law, shape (p,)."""
     if not len(variant.whole):
         return np.arange(len(variant.columns))

@@ -20,9 +20,7 @@ from dbbstation.inference.square_root import free_directions
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.blocks import Columns
 
 
@@ -62,7 +60,7 @@ class CauseColumns:
         self._free: list[int] = []
         self._changed: list[int] = []  # columns of which products and share of the axes are those of former ones
         self.count = 0
-        self.numbers: NDArray[np.int64] | None = None
+        self.numbers: Integers | None = None
 
     @property
     def samples(self) -> Floats:
@@ -85,7 +83,7 @@ class CauseColumns:
         self._shared = other._shared = True
         return other
 
-    def of(self, columns: NDArray[np.int64]) -> Floats:
+    def of(self, columns: Integers) -> Floats:
         """Return some columns, shape (n, q)."""
         if not self._waiting or len(columns) > BOUNDS.columns_apart * self.count:
             return self.samples[:, columns]
@@ -140,7 +138,7 @@ class CauseColumns:
         self._renew()
         return self._along
 
-    def add(self, columns: Floats) -> NDArray[np.int64]:
+    def add(self, columns: Floats) -> Integers:
         """Add columns, shape (m, q), in freed places first, and return their numbers."""
         taken = np.array(self._free[: columns.shape[1]], dtype=np.int64)
         if len(taken):
@@ -159,7 +157,7 @@ class CauseColumns:
         self.count = last
         return np.concatenate([taken, np.arange(first, last)])
 
-    def give_back(self, columns: NDArray[np.int64]) -> None:
+    def give_back(self, columns: Integers) -> None:
         """Free columns, shape (q,)."""
         if self._whitened is None and not self._shared:
             self._free = sorted({*self._free, *columns.tolist()})
@@ -177,7 +175,7 @@ class CauseColumns:
         """Return products with a target, shape (n,), of columns, shape (p,), and axes, shape (k,)."""
         return self.samples.T @ target, self.axes.T @ target
 
-    def but_for(self, rows: NDArray[np.bool_], only: NDArray[np.int64] | None = None) -> CauseColumns:
+    def but_for(self, rows: Flags, only: Integers | None = None) -> CauseColumns:
         """Return the causes without some rows, where targets must be zero.
 
         Args:
@@ -189,7 +187,7 @@ class CauseColumns:
 class _Without(CauseColumns):
     """All rows but a part; axes are renewed from few products."""
 
-    def __init__(self, whole: CauseColumns, rows: NDArray[np.bool_], only: NDArray[np.int64] | None) -> None:
+    def __init__(self, whole: CauseColumns, rows: Flags, only: Integers | None) -> None:
         self._whole, self.numbers, self.count = whole, only, whole.count
         own = np.arange(whole.count) if only is None else only
         axes, self._out = whole.axes[rows], whole.samples.T[np.ix_(own, np.flatnonzero(rows))]
@@ -265,7 +263,7 @@ class BesideBase:
         # Of what lies along the axes of the base, how much its fit takes, given its priors.
         self._taken = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)].T
 
-    def comparison(self, target: Floats, only: NDArray[np.int64] | None = None) -> ModelComparison:
+    def comparison(self, target: Floats, only: Integers | None = None) -> ModelComparison:
         """Compare causes on a target, shape (n,)."""
         causes = self._causes
         if only is None:

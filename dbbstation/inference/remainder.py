@@ -18,9 +18,7 @@ from dbbstation.inference.harmonics import bands, centred_coefficients
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.harmonics import Spectrum
 
 
@@ -100,7 +98,7 @@ def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int,
     return at, chances[at]
 
 
-def _stretches(residual: Floats, phase_rad: Floats) -> tuple[Floats, NDArray[np.int64], int]:
+def _stretches(residual: Floats, phase_rad: Floats) -> tuple[Floats, Integers, int]:
     place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * BOUNDS.pulses).astype(np.int64) % BOUNDS.pulses
     counts = np.bincount(place, minlength=BOUNDS.pulses)
     means = np.bincount(place, residual, minlength=BOUNDS.pulses) / np.maximum(counts, 1)

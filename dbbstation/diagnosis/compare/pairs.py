@@ -17,9 +17,7 @@ from dbbstation.trace.average import means
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.model.observation import Observation
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.trace.circle import RawCircle
@@ -156,8 +154,8 @@ class Sectors:
     """
 
     count: int
-    there: NDArray[np.int64]
-    group: NDArray[np.int64]
+    there: Integers
+    group: Integers
     moved: Floats
 
     @classmethod

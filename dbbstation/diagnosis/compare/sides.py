@@ -17,9 +17,7 @@ from dbbstation.trace.average import averaged
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
@@ -53,7 +51,7 @@ class Sides:
         return tuple(a), tuple(b)
 
     @cached_property
-    def orders(self) -> tuple[NDArray[np.int64], ...]:
+    def orders(self) -> tuple[Integers, ...]:
         """Return each pair's rows among its common angles."""
         return tuple(np.argsort(pair.b[0].raw.circle.phi_deg(pair.theta_deg)) for pair in self.pairs)
 
@@ -105,7 +103,7 @@ class Sides:
             found.append(values)
         return found
 
-    def groups(self, source: ErrorSource) -> NDArray[np.int64]:
+    def groups(self, source: ErrorSource) -> Integers:
         """Return each pair's sharing set in both sessions, shape (r,)."""
         names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
         order = list(dict.fromkeys(names))

@@ -24,8 +24,7 @@ from dbbstation.inference.verdict import SURE, Acts
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.diagnosis.drive.signals import Signals
@@ -120,7 +119,7 @@ def drive_channel(
     return DriveChannel(recordings, channel, scale, {s.name: s for s in sources}, of_law, shortest)
 
 
-def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Iterator[Pattern]:
+def _beyond(straight: Floats, patterns: Iterator[Pattern]) -> Iterator[Pattern]:
     """Return curves orthogonal to base and single-parameter causes, which they contain.
 
     Curves near standstill are not orthogonalised, because friction would extend them to full speed. Over position the
@@ -167,7 +166,7 @@ def _law(
     name: str, source: DriveSource, form: DriveForm, recordings: Recordings, variables: dict[str, Variable]
 ) -> Law:
     @cache
-    def columns(values: tuple[float, ...]) -> NDArray[np.float64]:
+    def columns(values: tuple[float, ...]) -> Floats:
         return recordings.compared(lambda signals: form.columns(signals, values))
 
     positive = [p.name for p in form.amplitudes if p.positive]
@@ -195,7 +194,7 @@ def _law(
     )
 
 
-def _departure(effect: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+def _departure(effect: Floats, along: Floats) -> Floats:
     """Return formula slack, shape (m, q): effect times smooth functions, and shifts by a sample for reversals."""
     late = np.gradient(effect)
     return np.column_stack([modulated([effect[:, None]], [along[:, None]], None), late, np.gradient(late)])
@@ -208,21 +207,19 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
     # Nearer to a reversal than any sample that is compared, a curve goes on as at its end.
     nearest = float(np.min(travels, initial=scale.travel_m, where=travels > 0.0))
 
-    def time(signals: Signals) -> NDArray[np.float64]:
+    def time(signals: Signals) -> Floats:
         return signals.t_s + starts[id(signals)]
 
-    def since(signals: Signals) -> NDArray[np.float64]:
+    def since(signals: Signals) -> Floats:
         return np.log(np.clip(signals.since_reversal_m, nearest, scale.travel_m))
 
-    def way(signals: Signals) -> NDArray[np.float64]:
+    def way(signals: Signals) -> Floats:
         return signals.direction
 
-    def after_reversal(signals: Signals) -> NDArray[np.float64]:
+    def after_reversal(signals: Signals) -> Floats:
         return signals.direction * np.isfinite(signals.since_reversal_m)
 
-    every: list[
-        tuple[str, str, Kind, Callable[[Signals], NDArray[np.float64]], Callable[[Signals], NDArray[np.float64]] | None]
-    ] = [
+    every: list[tuple[str, str, Kind, Callable[[Signals], Floats], Callable[[Signals], Floats] | None]] = [
         ("speed", "mm/s", Kind.SPEED, lambda s: 1e3 * s.speed_m_s, None),
         ("acceleration", "mm/s²", Kind.SPEED, lambda s: 1e3 * s.acceleration_m_s2, None),
         ("position", "mm", Kind.LENGTH, lambda s: 1e3 * s.position_m, None),
@@ -240,7 +237,7 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
             yield from _curve_over(recordings, variable, spline, values, factor)
     slowest, slow = max(s.standing_m_s for s in recordings.signals), NEAR_STANDSTILL * scale.speed_m_s
 
-    def low_speed(signals: Signals) -> NDArray[np.float64]:
+    def low_speed(signals: Signals) -> Floats:
         return np.log(np.clip(np.abs(signals.speed_m_s), slowest, max(slow, slowest)))
 
     variable = Variable("log speed", "", Kind.ANY, recordings.at(low_speed))
@@ -253,8 +250,8 @@ def _curve_over(
     recordings: Recordings,
     variable: Variable,
     spline: Spline,
-    values: Callable[[Signals], NDArray[np.float64]],
-    factor: Callable[[Signals], NDArray[np.float64]] | None,
+    values: Callable[[Signals], Floats],
+    factor: Callable[[Signals], Floats] | None,
 ) -> Iterator[Pattern]:
     samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
     norms = np.linalg.norm(samples, axis=0)
@@ -266,9 +263,9 @@ def _curve_over(
 def _curve(
     signals: Signals,
     spline: Spline,
-    values: Callable[[Signals], NDArray[np.float64]],
-    factor: Callable[[Signals], NDArray[np.float64]] | None,
-) -> NDArray[np.float64]:
+    values: Callable[[Signals], Floats],
+    factor: Callable[[Signals], Floats] | None,
+) -> Floats:
     found = spline.columns(values(signals))
     return found if factor is None else found * factor(signals)[:, None]
 
@@ -280,7 +277,7 @@ def _starts(recordings: Recordings) -> list[float]:
     ]
 
 
-def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Scale, float]:
+def _first_look(recordings: Recordings, smooth: Floats) -> tuple[Scale, float]:
     """Return sizes with the strongest position waves, and the shortest searched [mm].
 
     The shortest wave passes in a cut-off period at usual speed. Waves are found successively.
@@ -309,7 +306,7 @@ def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Sc
     return with_waves(scale, tuple(found), len(waves) * WAVE_STEP), 1e3 / float(waves[-1])
 
 
-def _power(waves: NDArray[np.float64], position: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
+def _power(waves: Floats, position: Floats, left: Floats) -> Floats:
     return np.concatenate(
         [
             np.abs(np.exp(2j * np.pi * np.outer(waves[k : k + BOUNDS.waves_at_once], position)) @ left)

@@ -40,9 +40,7 @@ from dbbstation.inference.verdict import Verdict
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
@@ -272,7 +270,7 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
     return sides
 
 
-def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: NDArray[np.bool_]) -> list[ModelStep]:
+def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: Flags) -> list[ModelStep]:
     drive, settled = explained.drive, explained.settled
     by_name = {member.cause.name: member for member in settled.best.members}
     predicting = verdicts.predicting

@@ -10,9 +10,7 @@ from dbbstation.errors import CalibrationError
 from dbbstation.inference.bounds import BOUNDS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
 
 TOGETHER = 5
 """Equal samples in a row, at the greatest or least value, that count as saturated."""
@@ -24,9 +22,7 @@ MOST_STUCK = 0.3
 """Share of stuck samples beyond which the rest proves nothing."""
 
 
-def stuck_samples(
-    force_n: Floats, t_s: Floats, moving: NDArray[np.bool_], name: str
-) -> tuple[NDArray[np.bool_], list[str]]:
+def stuck_samples(force_n: Floats, t_s: Floats, moving: Flags, name: str) -> tuple[Flags, list[str]]:
     """Return samples with a stuck force, shape (n,), and notes; standstill does not count.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -65,6 +65,13 @@ RINGING_PERIODS_S = np.geomspace(0.2, 2.5, 40)
 RINGING_DECAYS_S = (0.4, 0.8, 1.6, 3.2)
 """Times over which it fades, a period at the least: what is gone before it has swung back once is a spike, which has a name."""
 
+RINGS = tuple(
+    Ringing(float(period_s), decay_s)
+    for decay_s in RINGING_DECAYS_S
+    for period_s in RINGING_PERIODS_S
+    if period_s <= decay_s
+)
+
 RINGING_PIECE_S = 0.02
 """A tenth of the shortest period."""
 
@@ -73,6 +80,31 @@ RINGING_S = 12.0
 
 PLACE_MM = 5.0
 """Of the platform's position, either way [mm]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Over:
+    """Sums over a variable of one mover, whose best forms are shapes."""
+
+    sums: Sums
+    variable: str
+    strut: int | None
+    moves: str
+
+    def best(self, kind: str, forms: Sequence[Form], apart: float = 1.0) -> list[Shape]:
+        """Return the best forms of a list of which every so many-th counts as a try."""
+        tried = max(len(forms) / apart, 1.0)
+        return self._shapes(kind, self.sums.best(forms, BOUNDS.strongest), tried)
+
+    def waves(self, grid: Floats, explained: Floats) -> list[Shape]:
+        """Return the best waves about the best of a grid."""
+        begun = [float(grid[k]) for k in peaks(explained, BOUNDS.made_finer)]
+        found = self.sums.finer(begun, float(np.ptp(self.sums.at)))
+        return self._shapes("wave", found[: BOUNDS.strongest], len(grid) / 2.0)
+
+    def _shapes(self, kind: str, found: Sequence[tuple[float, Form]], tried: float) -> list[Shape]:
+        own = self.variable, kind, self.strut, self.moves
+        return [Shape(*own, form, tried, explained) for explained, form in found]
 
 
 class TemplateScan:
@@ -108,6 +140,13 @@ class TemplateScan:
         )
         self._rest = np.concatenate(residual) / noise_mm
 
+    def over(
+        self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], Integers] | tuple[float, float]
+    ) -> _Over:
+        """Sum over pieces of a variable, or over even ones from a place on of some width."""
+        own = partial(_piece, low=pieces[0], width=pieces[1]) if isinstance(pieces, tuple) else pieces
+        return _Over(self.sums(variable, strut, moves, own), variable, strut, moves)
+
     def sums(self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], Integers]) -> Sums:
         """Sum over pieces of a variable."""
         values = np.concatenate([run.values[variable] for run in self._runs])
@@ -142,49 +181,36 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
     found: list[Shape] = []
     for strut in range(1, STRUTS + 1):
         low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
-        sums = look.sums("strut-length", strut, EVERY, partial(_piece, low=low, width=PIECE_MM))
+        lengths = look.over("strut-length", strut, EVERY, (low, PIECE_MM))
         grid = np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low)
-        explained = sums.of_forms([Wave(float(frequency)) for frequency in grid])
-        found += _waves("strut-length", strut, EVERY, sums, grid, explained)
-        found += _best("strut-length", "bump", strut, EVERY, sums, bumps(low, high, WIDTHS_MM), _BUMPS_APART)
-        found += _best("strut-length", "step", strut, EVERY, sums, steps(low, high, _STEPS), 1.0)
+        found += lengths.waves(grid, lengths.sums.of_forms([Wave(float(frequency)) for frequency in grid]))
+        found += lengths.best("bump", bumps(low, high, WIDTHS_MM), _BUMPS_APART)
+        found += lengths.best("step", steps(low, high, _STEPS))
         if "strut-force" in extent.low:
             low, high = (float(limit["strut-force"][strut - 1]) for limit in (extent.low, extent.high))
-            wide = max(high - low, 1e-6) / _FORCES
-            sums = look.sums("strut-force", strut, EVERY, partial(_piece, low=low, width=wide))
-            found += _best("strut-force", "step", strut, EVERY, sums, steps(low, high, _STEPS), 1.0)
+            forces = look.over("strut-force", strut, EVERY, (low, max(high - low, 1e-6) / _FORCES))
+            found += forces.best("step", steps(low, high, _STEPS))
     if "time" in extent.low:
         low, high = float(extent.low["time"]), float(extent.high["time"])
         wide = max(SHORTEST_S / 4.0, (high - low) / BOUNDS.pieces_of_travel)
         movers: list[tuple[int | None, str]] = [(None, READING), (None, BALL)]
-        movers += [(strut, EVERY) for strut in range(1, STRUTS + 1)]
-        for own, moves in movers:
-            sums = look.sums("time", own, moves, partial(_piece, low=low, width=wide))
-            length = next_fast_len(2 * (int(sums.place[-1]) + 1), real=True)
+        for own, moves in (*movers, *((strut, EVERY) for strut in range(1, STRUTS + 1))):
+            times = look.over("time", own, moves, (low, wide))
+            length = next_fast_len(2 * (int(times.sums.place[-1]) + 1), real=True)
             first, last = max(1, int(np.floor(0.5 * length * wide / (high - low)))), length // 4
-            grid = np.arange(first, last) / (length * wide)
-            found += _waves("time", own, moves, sums, grid, sums.of_waves(length, first, last))
-            found += _best("time", "step", own, moves, sums, steps(low, high, _TIMES), 1.0)
+            found += times.waves(np.arange(first, last) / (length * wide), times.sums.of_waves(length, first, last))
+            found += times.best("step", steps(low, high, _TIMES))
     if "time since its reversal" in extent.low:
-        rings: list[Form] = [
-            Ringing(float(period_s), decay_s)
-            for decay_s in RINGING_DECAYS_S
-            for period_s in RINGING_PERIODS_S
-            if period_s <= decay_s
-        ]
         for strut in range(1, STRUTS + 1):
-            sums = look.sums("time since its reversal", strut, EVERY, _since)
-            found += _best("time since its reversal", "ringing", strut, EVERY, sums, rings, _RINGS_APART)
+            found += look.over("time since its reversal", strut, EVERY, _since).best("ringing", RINGS, _RINGS_APART)
     if "angle" in extent.low:
-        sums = look.sums("angle", None, READING, partial(_piece, low=0.0, width=1.0))
-        found += _best("angle", "wave", None, READING, sums, [Lobes((k,)) for k in LOBES_ALONE], 1.0)
+        found += look.over("angle", None, READING, (0.0, 1.0)).best("wave", [Lobes((k,)) for k in LOBES_ALONE])
         waves = [WaveOfTurn(float(f)) for f in WAVES_PER_TURN]
         for moves in (READING, TOOL):
-            sums = look.sums("angle since the start", None, moves, partial(_piece, low=-1.5, width=_TURN))
-            found += _best("angle since the start", "wave", None, moves, sums, waves, _TURNS_APART)
+            found += look.over("angle since the start", None, moves, (-1.5, _TURN)).best("wave", waves, _TURNS_APART)
     for moves in (BALL, TABLE):
-        sums = look.sums("position of the platform", None, moves, _place)
-        found += _best("position of the platform", "step", None, moves, sums, _lines(sums.at), _LINES_APART)
+        places = look.over("position of the platform", None, moves, _place)
+        found += places.best("step", _lines(places.sums.at), _LINES_APART)
     return _shared(found, extent)
 
 
@@ -244,28 +270,3 @@ def _lines(places: Floats) -> list[Form]:
             lines = np.arange(along.min() + 2 * width, along.max() - 2 * width, max(width, 2 * PLACE_MM))
             found += [PlaneStep(float(across), float(at), width) for at in lines]
     return found
-
-
-def _best(
-    variable: str, kind: str, strut: int | None, moves: str, sums: Sums, forms: Sequence[Form], apart: float
-) -> list[Shape]:
-    tried = max(len(forms) / apart, 1.0)
-    return [
-        Shape(variable, kind, strut, moves, form, tried, explained)
-        for explained, form in sums.best(forms, BOUNDS.strongest)
-    ]
-
-
-def _waves(
-    variable: str,
-    strut: int | None,
-    moves: str,
-    sums: Sums,
-    grid: Floats,
-    explained: Floats,
-) -> list[Shape]:
-    found = sums.finer([float(grid[k]) for k in peaks(explained, BOUNDS.made_finer)], float(np.ptp(sums.at)))
-    tried = len(grid) / 2.0
-    return [
-        Shape(variable, "wave", strut, moves, wave, tried, explained) for explained, wave in found[: BOUNDS.strongest]
-    ]

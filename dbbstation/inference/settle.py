@@ -118,10 +118,6 @@ def _from(
     return replace(settled, beginning=beginning, log_probability=log_probability(bank, settled.best.members))
 
 
-def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
-    return next((one for one in known if _meets(settled, one)), settled)
-
-
 def _meets(one: Settled, other: Settled) -> bool:
     kinds = [sorted(each.bank.kind_of(name) for name in each.best.names) for each in (one, other)]
     if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
@@ -187,7 +183,7 @@ def _settled(
             times_placed += 1
             best = moved
             continue
-        met = _known_as(settled, known)
+        met = next((one for one in known if _meets(settled, one)), settled)
         seen_before = looking and (not how.thorough or posterior.best.names in looked)
         if not look or met is not settled or work.is_spent or seen_before:
             break
@@ -268,7 +264,7 @@ def _looked_about(
     if first and how.in_time and how.thorough:
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
         # follow variables have a start of their own, and what comes at once has one beside the laws alone.
-        begun = _grown_in(bank)
+        begun = grown(bank.beside().comparison(bank.target), bank.causes)
         starts.append(_looked(bank, begun, how, in_time=False))
         laws = tuple(member for member in begun if member.cause.name in bank.laws)
         starts.append(_looked(bank, laws, how) if laws else ())
@@ -322,10 +318,6 @@ def grown(
             break
         members.pop(int(worth.argmin()))
     return tuple(members)
-
-
-def _grown_in(bank: Bank) -> tuple[Member, ...]:
-    return grown(bank.beside().comparison(bank.target), bank.causes)
 
 
 def _laws_of(settled: Settled) -> list[Member]:

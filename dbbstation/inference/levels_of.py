@@ -58,7 +58,7 @@ def levels_of(
     probabilities = VariableProbabilities(settled)
     every = classes_of(settled, probabilities)
     # Parts may have in time what the best set has as part of a law, such as the drift of an integral.
-    ways = [one.wanted for one in every if _in_time(one)] or [{TIME, RUN}]
+    ways = [one.wanted for one in every if _in_time(one)] or [frozenset({TIME, RUN})]
     if parts is not None and not any(parts.of(wanted).predicts for wanted in ways):
         # What happened, and goes on in no other rows, would fill these with what a curve over time has between its rows.
         parts = parts.but_for({TIME, RUN})

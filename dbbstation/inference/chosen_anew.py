@@ -74,8 +74,8 @@ class KnownGains:
     anew: ChosenAnew | None = None
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """Return the gain of everything over some variables; None: everything."""
-        return self.gains[frozenset(wanted or ())]
+        """Return the gain of everything over some variables; None: everything. A class that none follows gains nothing."""
+        return self.gains.get(frozenset(wanted or ()), ClassGain(DensityGains(()), 0.0, 0.0))
 
     def but_for(self, _ignored: Collection[str]) -> KnownGains:
         """Return the same: what happens in a test is a random effect of it, and no term of a simulator follows the time."""

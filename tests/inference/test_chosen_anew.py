@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from dbbstation.inference.blocks import Columns
-from dbbstation.inference.chosen_anew import chosen_anew
+from dbbstation.inference.chosen_anew import KnownGains, chosen_anew
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.projection import BesideBase, CauseColumns
@@ -106,3 +106,9 @@ def test_what_brings_nothing_seldom_predicts(rng):
             brought.append(with_it - but_for)
         passed += DensityGains(tuple(brought)).predicts
     assert passed <= ABSENT * draws
+
+
+def test_a_class_that_nothing_follows_predicts_nothing():
+    gains = KnownGains([], {}, [])
+    assert not gains.of({"time", "run"}).predicts
+    assert gains.of({"time", "run"}).gains.total == 0.0

@@ -25,7 +25,8 @@ def folders(tmp_path_factory):
     where = tmp_path_factory.mktemp("days")
     plan = table_ii_plan(6)
     record(where / "monday", seed=6, plan=plan, mechanisms=[ERRORS], rate_hz=10.0)
-    record(where / "tuesday", seed=6, plan=elevated(plan, 5.0, "abcde"), mechanisms=[ERRORS], rate_hz=10.0)
+    # At another rate, so that no run repeats the other day's noise.
+    record(where / "tuesday", seed=6, plan=elevated(plan, 5.0, "abcde"), mechanisms=[ERRORS], rate_hz=9.0)
     return where / "monday", where / "tuesday"
 
 

@@ -15,10 +15,13 @@ WEIGHTS = "{strut_kg: 25, motor_kg: 20, motor_length_mm: 300}"
 
 @pytest.fixture
 def two(spoilt, tmp_path):
-    """A session, and the same circles as those of a second day, so that nothing but what a test changes differs."""
+    """A session, and its circles 0.5 µm longer as those of a second day: nothing else but what a test changes differs."""
     spoilt.replace("session.yaml", "format: dbb-session/1\n", "format: dbb-session/1\noperator: first\n")
     other = tmp_path / "second"
     shutil.copytree(spoilt.folder, other)
+    again = type(spoilt)(other)
+    for path in sorted(other.glob("runs/*.csv")):
+        again.column(f"runs/{path.name}", 1, lambda length_mm: length_mm + 0.0005)
     text = (other / "session.yaml").read_text()
     (other / "session.yaml").write_text(text.replace("operator: first", "operator: second"))
     return spoilt.folder, other

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 S_PER_MS = 1e-3
 
-USUAL_MS = 5.0
-"""Usual lag of a drive with feed-forward [ms]; without it 30 to 60, at gains of 1 to 2 m/min for 1 mm. All six may have it, unseen."""
-
 BY_DIRECTION = 0.3
 """Share by which a lag may be more one way and less the other, one standard deviation: weight and friction load a drive by direction."""
 
@@ -62,7 +59,7 @@ class ServoLag(ErrorSource):
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        return of_each_strut("strut_{}_ms", "ms", USUAL_MS, "time by which strut {} is late; negative: it is ahead")
+        return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         return Effect(strut_mm=self._lag(motion, machine, values)[0])

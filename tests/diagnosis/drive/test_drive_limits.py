@@ -95,7 +95,7 @@ def test_saturated_samples_are_left_out_and_told():
 
 def test_a_force_with_the_wrong_sign_is_refused():
     t, position, force = good()
-    with pytest.raises(CalibrationError, match=r"wrong sign: it acts against the motion.* turn the sign"):
+    with pytest.raises(CalibrationError, match=r"wrong sign: it acts against the motion.* change the sign"):
         answered(t, position, -force)
 
 

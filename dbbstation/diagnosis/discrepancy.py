@@ -84,18 +84,9 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
-    """Return changes by other constants, shape (n, q), with share one relative to the others.
-
-    None is larger than the effect: a law whose effect nobody sees would be named for what it leaves open.
-    """
-    changes = np.vstack([run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs])
-    if not changes.shape[1]:
-        return changes
-    amplitude = np.array([not p.grid for p in source.parameters(machine)])
-    effect = np.concatenate([run.derivative[:, amplitude] @ run.values[amplitude] for run in runs])
-    size = np.linalg.norm(changes, axis=0)
-    largest = np.linalg.norm(effect) / np.maximum(size, 1e-300)
-    return np.asarray(changes * np.minimum(largest, 1.0) / source.form_uncertainty)
+    """Return changes by other constants, shape (n, q), with share one relative to the others."""
+    changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
+    return np.vstack(changes) / source.form_uncertainty
 
 
 def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:

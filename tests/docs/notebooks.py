@@ -10,7 +10,8 @@ import base64
 import io
 import json
 import sys
-from contextlib import redirect_stdout
+import tempfile
+from contextlib import chdir, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -56,10 +57,12 @@ def _pictures() -> list[dict[str, Any]]:
 
 def main(path: Path) -> None:
     notebook = json.loads(path.read_text(encoding="utf-8"))
-    code = iter(executed(notebook))
+    # What cells write is no part of the project.
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        code = iter(executed(notebook))
     notebook["cells"] = [next(code) if cell["cell_type"] == "code" else cell for cell in notebook["cells"]]
     path.write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]).resolve())

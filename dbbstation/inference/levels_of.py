@@ -13,7 +13,6 @@ from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import detectable
 from dbbstation.inference.folds import HeldOutError
 from dbbstation.inference.followed import (
-    ChosenWithoutParts,
     VariableProbabilities,
     classes_of,
     estimated,
@@ -28,7 +27,7 @@ from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
     from dbbstation.inference.chosen_anew import ChosenAnew, KnownGains
-    from dbbstation.inference.followed import ClassGain, VariableClass
+    from dbbstation.inference.followed import ChosenWithoutParts, ClassGain, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Detectable
     from dbbstation.inference.settled import Settled
@@ -58,10 +57,9 @@ def levels_of(
     """
     probabilities = VariableProbabilities(settled)
     every = classes_of(settled, probabilities)
-    # Parts may have in time what the best set has as part of a law, such as the drift of an integral. Tests that are held back know
-    # the gains of its own classes alone, and what happens in a test is a random effect of it.
+    # Parts may have in time what the best set has as part of a law, such as the drift of an integral.
     ways = [one.wanted for one in every if _in_time(one)] or [frozenset({TIME, RUN})]
-    if isinstance(parts, ChosenWithoutParts) and not any(parts.of(wanted).predicts for wanted in ways):
+    if parts is not None and not any(parts.of(wanted).predicts for wanted in ways):
         # What happened, and goes on in no other rows, would fill these with what a curve over time has between its rows.
         parts = parts.but_for({TIME, RUN})
     found = [_followed(settled, one, probabilities, parts, held_out) for one in every]

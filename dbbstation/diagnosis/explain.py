@@ -21,7 +21,7 @@ from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.bounds import BOUNDS, CIRCLES
-from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, search
+from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, other_laws, search
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.verdict import SURE
 
@@ -199,7 +199,7 @@ class _Settling:
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
     best, named = settled.best, [cause for cause in settled.causes if cause.named]
     pairs = [(member, member) for member in settled.members]
-    pairs += [(member, rival) for member in settled.members for rival in _other_laws(settled, member)]
+    pairs += [(member, rival) for member in settled.members for rival in _by_other_laws(settled, member)]
     return pairs + [
         (member, rival)
         for member in settled.members
@@ -207,16 +207,14 @@ def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
     ]
 
 
-def _other_laws(settled: SettledCircles, member: Member) -> list[Member]:
-    """Return a member's cause by each other law: on its grid a law cannot stand up to one that is laid out."""
-    every = member.cause.variants
-    laws = dict.fromkeys(variant.law for variant in every if variant.law != member.variant.law)
-    causes = [replace(member.cause, variants=tuple(v for v in every if v.law == law)) for law in laws]
-    return list(settled.comparison.scan(_lawful(settled.best, member.cause.name), causes).best)
+def _by_other_laws(settled: SettledCircles, member: Member) -> list[Member]:
+    """Return a member by each other law of its cause: on its grid a law cannot stand up to one that is laid out."""
+    scan = settled.comparison.scan(_lawful(settled.best, member.cause.name), other_laws(member))
+    return [replace(one, cause=member.cause) for one in scan.best]
 
 
 def _lawful(best: Hypothesis, *but_for: str) -> tuple[Member, ...]:
-    """Return what a joint fit has: effects without a name take what a law lacks at its start, and would keep it there."""
+    """Return the members that a joint fit has. Unnamed effects are none: they fit a law's error at its start, and hold it there."""
     return tuple(one for one in best.without(*but_for) if one.cause.named or one.cause.setup)
 
 

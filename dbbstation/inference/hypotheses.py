@@ -449,16 +449,19 @@ class _Beside:
 
 def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[Member]:
     """Return a member by each other law that is laid out: a scan compares laws without slack, which one may need more than another."""
-    member = members[k]
-    laws: dict[str, list[Variant]] = {}
-    for variant in member.cause.variants:
-        if len(variant.slack) and variant.law != member.variant.law:
-            laws.setdefault(variant.law, []).append(variant)
-    if not laws:
+    if not (causes := other_laws(members[k], lambda variant: len(variant.slack) > 0)):
         return []
     comparison, others = beside.others(members, k)
-    causes = [replace(member.cause, name=law, variants=tuple(some)) for law, some in laws.items()]
-    return [replace(one, cause=member.cause) for one in comparison.scan(others, causes).best]
+    return [replace(one, cause=members[k].cause) for one in comparison.scan(others, causes).best]
+
+
+def other_laws(member: Member, wanted: Callable[[Variant], bool] = lambda _: True) -> list[Cause]:
+    """Return a member's cause by each of its other laws, under the law's name, with the wanted forms."""
+    laws: dict[str, list[Variant]] = {}
+    for variant in member.cause.variants:
+        if variant.law != member.variant.law and wanted(variant):
+            laws.setdefault(variant.law, []).append(variant)
+    return [replace(member.cause, name=law, variants=tuple(some)) for law, some in laws.items()]
 
 
 def _single(member: Member) -> bool:

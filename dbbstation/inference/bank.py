@@ -371,13 +371,8 @@ class Bank:
         """
         law = self.laws[name]
         exact = law.columns(nonlinear) if law.at is None else law.at(nonlinear, amplitudes)
-        tangents, spacings = [], []
-        for k, grid in enumerate(law.grids):
-            spacing = spacing_of(grid, nonlinear[k])
-            moved = [[v + sign * TANGENT * spacing * (i == k) for i, v in enumerate(nonlinear)] for sign in (1.0, -1.0)]
-            up, down = (law.columns(tuple(values)) @ amplitudes for values in moved)
-            tangents.append((up - down) / (2.0 * TANGENT * spacing))
-            spacings.append(spacing)
+        spacings = [spacing_of(grid, value) for grid, value in zip(law.grids, nonlinear, strict=True)]
+        tangents = tangents_of(law, nonlinear, amplitudes, spacings)
         slack = np.column_stack([*tangents, self._discrepancy(law, exact @ amplitudes, nonlinear, amplitudes)])
         own = self._add(np.hstack([exact, slack]))
         width = exact.shape[1]
@@ -469,6 +464,16 @@ def _forms(
         )
         for part, weight, label in law.choices
     ]
+
+
+def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: Sequence[float]) -> list[Floats]:
+    """Return slopes of a law's effect by each nonlinear parameter, shape (n,), by differences of a small part of its spacing."""
+    found = []
+    for k, spacing in enumerate(spacings):
+        ends = [[v + sign * TANGENT * spacing * (i == k) for i, v in enumerate(point)] for sign in (1.0, -1.0)]
+        up, down = (law.columns(tuple(values)) @ amplitudes for values in ends)
+        found.append((up - down) / (2.0 * TANGENT * spacing))
+    return found
 
 
 def amplitudes_of(variant: Variant) -> Integers:

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.mismatch import fitted_together
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.bank import TANGENT, amplitudes_of, spacing_of
+from dbbstation.inference.bank import amplitudes_of, spacing_of, tangents_of
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
@@ -119,13 +119,14 @@ def _effect(found: Mismatch, channel: Channel, member: Member, values: Floats) -
     own = np.array([k for k in range(width) if not fitted.parameters[used[k]].startswith("start ")], dtype=np.int64)
     per = growth(member, values)
     point = moved(fitted, member, values, per)
-    slopes[:, own] = law.columns(point)[:, used[own]]
+    exact = law.columns(point)
+    slopes[:, own] = exact[:, used[own]]
     effect = slopes[:, :width] @ values[:width]
-    for k, grid in enumerate(fitted.grids if len(member.variant.slack) else ()):
-        step = TANGENT * spacing_of(grid, point[k])
-        ends = [tuple(v + sign * step * (i == k) for i, v in enumerate(point)) for sign in (1.0, -1.0)]
-        up, down = (law.columns(end)[:, used[own]] @ values[own] for end in ends)
-        slopes[:, width + k] = (up - down) / (2.0 * step * per)
+    amplitudes = np.zeros(exact.shape[1])
+    amplitudes[used[own]] = values[own]
+    spacings = [spacing_of(grid, value) for grid, value in zip(fitted.grids, point, strict=True)]
+    for k, slope in enumerate(tangents_of(law, point, amplitudes, spacings if len(member.variant.slack) else ())):
+        slopes[:, width + k] = slope / per
     return effect, slopes
 
 

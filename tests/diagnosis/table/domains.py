@@ -11,11 +11,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +26,7 @@ from dbbstation.diagnosis.table.mismatch import Mismatch, find_mismatch
 from dbbstation.diagnosis.table.units import meaning_of
 from dbbstation.inference.levels import TIME, FollowsAnswer
 from dbbstation.inference.variables import Kind, Variable
-from tests.diagnosis.table.levels_study import interval
+from tests.diagnosis.table.levels_study import interval, stored_table
 
 Values = NDArray[np.float64]
 SIMULATED = "simulated_mm"
@@ -418,21 +416,15 @@ def main() -> None:
 
 
 def _stored(rows: list[dict[str, object]]) -> dict[str, object]:
-    git = ["git", "rev-parse", "--short=8", "HEAD"]
-    seconds = float(np.median([float(str(row["seconds"])) for row in rows]))
     seeds = ",".join(sorted({str(row["seed"]) for row in rows}, key=int))
-    return {
-        "question": "Are effects in tables of other fields located, named, sized and corrected, and is nothing found in their twins?",
-        "data": f"{len(rows)} tables of {len(SCENES)} kinds; 60 to 2,000 rows, effects of 1.5 to 8 times the noise, five kinds of noise.",
-        "command": f"python -m tests.diagnosis.table.domains --seeds {seeds} --out docs/validation/tables-domains.json",
-        "commit": subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip(),
-        "date": datetime.now(UTC).date().isoformat(),
-        "seed": seeds,
-        "limits": f"Effects and names are of the same hand as the program. Median time {seconds:.1f} s of one processor.",
-        "columns": ["tables", "of", "95 % interval"],
-        "figures": figures(rows),
-        "tables": rows,
-    }
+    return stored_table(
+        rows,
+        figures(rows),
+        question="Are effects in tables of other fields located, named, sized and corrected, and is nothing found in their twins?",
+        data=f"{len(rows)} tables of {len(SCENES)} kinds; 60 to 2,000 rows, effects of 1.5 to 8 times the noise, five kinds of noise.",
+        command=f"python -m tests.diagnosis.table.domains --seeds {seeds} --out docs/validation/tables-domains.json",
+        limits="Effects and names are of the same hand as the program.",
+    )
 
 
 if __name__ == "__main__":

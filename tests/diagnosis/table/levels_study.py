@@ -263,19 +263,38 @@ def main() -> None:
 
 
 def _stored(rows: list[dict[str, object]], seeds: str) -> dict[str, object]:
+    return stored_table(
+        rows,
+        figures(rows),
+        question="Do three levels of answer hold on tables with an effect of twice the noise, on their twins, and on ten kinds of noise?",
+        data=f"{len(rows)} tables of a simulated press and a moving axis. Sizes are before fitted parameters take their part.",
+        command=f"python -m tests.diagnosis.table.levels_study --seeds {seeds} --out docs/validation/levels.json",
+        limits="A sample: the command goes on where the file ends.",
+    )
+
+
+def stored_table(
+    rows: list[dict[str, object]],
+    figures: dict[str, list[object]],
+    *,
+    question: str,
+    data: str,
+    command: str,
+    limits: str,
+) -> dict[str, object]:
+    """What a study of tables stores: its figures with commit, date and seeds, and its rows, so that it can be resumed."""
     git = ["git", "rev-parse", "--short=8", "HEAD"]
-    commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip()
     seconds = float(np.median([float(str(row.get("seconds", 0.0))) for row in rows]))
     return {
-        "question": "Do three levels of answer hold on tables with an effect of twice the noise, on their twins, and on ten kinds of noise?",
-        "data": f"{len(rows)} tables of a simulated press and a moving axis. Sizes are before fitted parameters take their part.",
-        "command": f"python -m tests.diagnosis.table.levels_study --seeds {seeds} --out docs/validation/levels.json",
-        "commit": commit,
+        "question": question,
+        "data": data,
+        "command": command,
+        "commit": subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip(),
         "date": datetime.now(UTC).date().isoformat(),
         "seed": ",".join(sorted({str(row["seed"]) for row in rows}, key=int)),
-        "limits": f"A sample: the command goes on where the file ends. Median time {seconds:.1f} s of one processor.",
+        "limits": f"{limits} Median time {seconds:.1f} s of one processor.",
         "columns": ["tables", "of", "95 % interval"],
-        "figures": figures(rows),
+        "figures": figures,
         "tables": rows,
     }
 

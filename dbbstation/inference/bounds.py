@@ -232,7 +232,7 @@ class Bounds:
     take 26 µs; 400 take 30 µs. Of 6,000 rows with 40 before each 400 take 104 µs, all 168 µs, and 800 take 201 µs. It decides about time alone."""
 
     columns_at_first: int = 512
-    """Columns for which room is made at first, where nobody says how many there will be."""
+    """Columns that have room at first, if their number is unknown."""
 
     columns_apart: float = 0.5
     """Share of all columns up to which some are worked out by themselves."""
@@ -262,7 +262,7 @@ class Bounds:
     """Places of the friction curve that is drawn."""
 
     notes_of_stuck: int = 3
-    """Stretches of a stuck force that are told one by one, at the most."""
+    """Most stretches of a stuck force that a message lists."""
 
     trace_points: int = 360
     """Points of a trace: means of a degree."""
@@ -296,7 +296,7 @@ class Bounds:
     """Stretches of all samples that the scatter of the power is read from."""
 
     arcs_told: int = 36
-    """Arcs of a turn of which a mean difference is told: ten degrees each."""
+    """Arcs of a turn, each with its mean difference: ten degrees each."""
 
 
 BOUNDS = Bounds()

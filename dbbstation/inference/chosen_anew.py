@@ -110,7 +110,7 @@ def gains_of_tests(
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         return search(comparison, settled.causes, [settled.best.members], **limits).best.members
 
-    # What was laid out before it was laid out better is asked for by nobody.
+    # Columns of earlier layouts are in no cause any more.
     used = columns_of(settled.causes)
     comparisons = settled.comparison, (settled.bank.without(out, used) for out in rows)
     follow = follow_of(settled)

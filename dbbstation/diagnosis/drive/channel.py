@@ -172,7 +172,7 @@ def _law(
     positive = [p.name for p in form.amplitudes if p.positive]
 
     def possible(values: Mapping[str, float]) -> bool:
-        # What comes out negative is probably zero.
+        # A negative value is probably zero.
         return min((values[name] for name in positive), default=0.0) >= 0.0 and source.possible(
             values, recordings.scale
         )

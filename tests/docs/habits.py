@@ -30,6 +30,7 @@ MOST_WORDS = 30
 """Words of a sentence that is still read at once; two lines of a page."""
 
 MARKS = re.compile(r"[;:](?=\s|$)")
+CODE = re.compile(r"`[^`]*`")
 PATTERNS = {
     "what-clause as subject": r"^(what|whoever|who)\b(?!.*\?$)",
     "things that stand, say, know": r"\b(stands?|lies|speaks?|says?|knows?|asks|(is|are) (told|asked))\b",
@@ -45,6 +46,7 @@ HABITS = [*PATTERNS, LONG, MANY_MARKS]
 
 
 def habits_of(sentence: str) -> list[str]:
+    sentence = CODE.sub("code", sentence)
     found = [name for name, pattern in PATTERNS.items() if re.search(pattern, sentence, re.IGNORECASE)]
     if len(sentence.split()) > MOST_WORDS:
         found.append(LONG)
@@ -54,12 +56,11 @@ def habits_of(sentence: str) -> list[str]:
 
 
 def sentences_of(text: str) -> list[str]:
-    """Return the sentences of plain text: five words at least, code and links made plain."""
+    """Return the sentences of plain text: five words at least beside code, links made plain."""
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
-    text = re.sub(r"`[^`]*`", "code", text)
-    text = re.sub(r"[*_{}]|\b(e\.g|i\.e|cf|sec|eq)\. ", " ", text)
+    text = re.sub(r"[*{}]|(?<!\w)_|_(?!\w)|\b(e\.g|i\.e|cf|sec|eq)\. ", " ", text)
     found = re.split(r"(?<=[.!?])\s+(?=[A-Z\"(0-9])", " ".join(text.split()))
-    return [one for one in found if len(re.findall(r"[a-zA-Z]{2,}", one)) > 4]
+    return [one for one in found if len(re.findall(r"[a-zA-Z]{2,}", CODE.sub("code", one))) > 4]
 
 
 def in_documents(root: Path) -> Iterator[str]:
@@ -127,12 +128,17 @@ def _name(call: ast.Call) -> str:
 
 def _texts(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.JoinedStr):
-        yield "".join(str(one.value) if isinstance(one, ast.Constant) else "code" for one in node.values)
+        yield "".join(str(one.value) if isinstance(one, ast.Constant) else f"`{_value(one)}`" for one in node.values).replace("``", "`")
     elif isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     else:
         for child in ast.iter_child_nodes(node):
             yield from _texts(child)
+
+
+def _value(part: ast.AST) -> str:
+    """Return a value of a message as its code has it, so that a reader knows what is put there."""
+    return ast.unparse(part.value if isinstance(part, ast.FormattedValue) else part).replace("`", "'")
 
 
 def kinds(root: Path = HERE) -> dict[str, list[str]]:

@@ -128,7 +128,9 @@ def _name(call: ast.Call) -> str:
 
 def _texts(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.JoinedStr):
-        yield "".join(str(one.value) if isinstance(one, ast.Constant) else f"`{_value(one)}`" for one in node.values).replace("``", "`")
+        yield "".join(
+            str(one.value) if isinstance(one, ast.Constant) else f"`{_value(one)}`" for one in node.values
+        ).replace("``", "`")
     elif isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     else:

@@ -1,1 +1,1 @@
-"""Processes that end with the program, and threads of linear algebra."""
+"""Background threads, worker processes and BLAS thread limits."""

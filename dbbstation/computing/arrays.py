@@ -1,4 +1,4 @@
-"""Arrays of numbers, of any shape: docstrings say which."""
+"""Types of arrays; docstrings state their shapes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Work of some seconds in a thread; its outcome is fetched."""
+"""Run a function in a background thread and fetch its result later."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _Outcome = TypeVar("_Outcome")
 
 
 class Background(Generic[_Outcome]):
-    """One piece of work, begun at once."""
+    """A function call that starts at once in a thread."""
 
     def __init__(self, work: Callable[[], _Outcome]) -> None:
         self._work = work
@@ -23,18 +23,18 @@ class Background(Generic[_Outcome]):
 
     @property
     def done(self) -> bool:
-        """Return whether it has ended."""
+        """Return whether the call has ended."""
         return not self._thread.is_alive()
 
     def outcome(self) -> _Outcome:
-        """Wait for the outcome and return it, or raise its error."""
+        """Wait for the call and return its result, or raise its error."""
         self._thread.join()
         if self._error is not None:
             raise self._error
         return self._found[0]
 
     def wait(self, limit_s: float | None = None) -> None:
-        """Wait for the end, or for this time at most."""
+        """Wait for the call's end, at most `limit_s` seconds."""
         self._thread.join(limit_s)
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""Tells listeners that numerical loops are compiled: once on a computer, for some seconds."""
+"""Tell listeners that numerical loops are being compiled: some seconds, once per computer."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _told: list[Callable[[bool], None]] = []
 
 
 def tell_of_compiling(tell: Callable[[bool], None]) -> None:
-    """Call `tell` with True before a loop is compiled in this process and with False after."""
+    """Call `tell` with True before and False after this process compiles a loop."""
     _told[:] = [tell]
 
 
 def listen_to_compiler() -> None:
-    """Pass on the compiler's events; code loaded from disk has none."""
+    """Report compilations to the listeners; code loaded from disk causes no report."""
     from numba.core import event  # noqa: PLC0415 - a third of a second, of which the compiler's user has paid already
 
     class CompileListener(event.Listener):

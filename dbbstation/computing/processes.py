@@ -1,4 +1,4 @@
-"""Work on several cores in processes that end at once when interrupted."""
+"""Worker processes on several cores that end at once when interrupted."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Result = TypeVar("Result")
 
 
 def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> Generator[tuple[int, Result]]:
-    """Yield the place and result of items as they are done.
+    """Yield each item's index and result as soon as it is done.
 
     Raises:
         Exception: whatever `work` raises.
@@ -44,7 +44,7 @@ def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> G
 
 @contextmanager
 def processes(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield processes that end when this one is interrupted; give them work within `starting`."""
+    """Yield a pool whose processes end with this one; submit work to it within `starting`."""
     # Started anew rather than forked: a fork would copy the locks of the threads that kernels run on.
     context = multiprocessing.get_context("spawn")
     with starting():

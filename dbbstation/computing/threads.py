@@ -1,7 +1,7 @@
 """One thread of linear algebra for the program's own narrow matrices.
 
-More BLAS threads wait for each other between thousands of small products. Callers have other matrices, so the limit
-ends with the fit.
+Several BLAS threads would wait for each other between thousands of small products. A caller's matrices may need them,
+so the limit ends with the fit.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def with_one_thread(work: Callable[Asked, Result]) -> Callable[Asked, Result]:
 
 
 class _Limit:
-    """Counts workers. The first sets the limit and the last removes it."""
+    """Counts running functions: the first sets the limit, the last removes it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -61,7 +61,7 @@ _LIMIT = _Limit()
 
 
 def _set(library: LibController, count: int) -> None:
-    """Set a library's threads, from any thread of Python.
+    """Set a library's number of threads from any Python thread.
 
     threadpoolctl allows only the first thread to reset a limit, so `_Limit` keeps order itself.
     """
@@ -75,6 +75,6 @@ def _set(library: LibController, count: int) -> None:
 def _libraries() -> list[LibController]:
     import numpy as np  # noqa: F401, PLC0415 - loaded here, so that both are found
     import scipy.linalg  # noqa: F401, PLC0415
-    from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - whoever only asks for help does not wait for it
+    from threadpoolctl import ThreadpoolController  # noqa: PLC0415 - `--help` need not load it
 
     return ThreadpoolController().select(user_api="blas").lib_controllers

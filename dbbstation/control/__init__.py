@@ -1,1 +1,1 @@
-"""The correction inside a control: a LinuxCNC kinematics made of a model, or parameters for an existing one."""
+"""Corrections inside a control: a LinuxCNC kinematics generated from a model, or parameters of genhexkins."""

@@ -1,4 +1,4 @@
-"""Commands under a correcting control, as for a nominal one."""
+"""Commands that a correcting control actually drives."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def correction_of(
 
 
 def refuse_second_correction(machine: Machine) -> None:
-    """Refuse to compensate what the control corrects.
+    """Refuse to compensate programs if the control corrects the machine itself.
 
     Raises:
-        StationError: says what corrects.
+        StationError: names the control's correction.
     """
     if machine.control is not None:
         raise StationError(
@@ -48,7 +48,7 @@ def refuse_second_correction(machine: Machine) -> None:
 
 
 def nominal_commands(machine: Machine, poses: Floats, known: Mapping[str, ErrorSource]) -> Floats:
-    """Return the poses at which a nominal control drives the struts as this one does, shape (n, 6) [mm, deg].
+    """Return poses, shape (n, 6) [mm, deg], that would make a nominal control drive the same strut lengths as this control.
 
     Raises:
         ModelError: an unknown source, or one that follows more than the pose.

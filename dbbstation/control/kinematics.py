@@ -39,18 +39,18 @@ LARGEST_K = 30.0
 """A thermometer further from its zero than this is broken: a shop is between 10 and 40 degC."""
 
 LEAST_HELD = 0.02
-"""Least determinant of the Jacobian over that in the middle of the travel. Gravity's stretch is fifty times as large there, and
-joints still move evenly; at zero the machine folds, and a kinematics would jump."""
+"""Least Jacobian determinant, relative to the middle of the travel. At this limit gravity stretches struts fifty times
+as much, and joints still move evenly. At zero the platform is loose, and a kinematics would jump."""
 
 HELD_BY_BACKLASH = "backlash"
-"""Source with a history that a control has an entry for: `[JOINT_n]BACKLASH`."""
+"""The one source with memory that a control can correct itself, by `[JOINT_n]BACKLASH`."""
 
 _KEYWORDS = frozenset(
     """auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile
     while component pin param function option license author variable description include main""".split()  # noqa: SIM905 - words
 )
-"""Of C, and of halcompile."""
+"""Keywords of C and of halcompile."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Component:
     """A kinematics component.
 
     Attributes:
-        mathematics: its part without LinuxCNC, for a compiler alone.
+        mathematics: the C code that needs no LinuxCNC headers.
     """
 
     name: str
@@ -80,10 +80,10 @@ class _Part:
 
 
 def check_name(name: str) -> None:
-    """Refuse a name that a component cannot have.
+    """Refuse a name that halcompile does not accept.
 
     Raises:
-        StationError: says which names are possible.
+        StationError: states the possible names.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in _KEYWORDS or len(name) > LONGEST_NAME:
         raise StationError(
@@ -109,8 +109,8 @@ def component(
         thermometers: columns without unit that the control has.
 
     Raises:
-        ModelError: a source has a history, or no C form, and is not left out; or something that it needs is missing.
-        StationError: no such name, or no such source to leave out.
+        ModelError: a source not left out has memory, has no C form, or lacks an input.
+        StationError: impossible name, or unknown source to leave out.
     """
     check_name(name)
     acting = [f for f in model.of_the_machine().sources if f.values.any() and not f.source.of_currents]

@@ -1,7 +1,7 @@
-"""Parameters of LinuxCNC's genhexkins, and tables of its joints, fitted over a volume to a model.
+"""Fit parameters and joint tables of LinuxCNC's genhexkins to a model over a volume.
 
 genhexkins drives joint i to |T + R a_i - b_i|, with joints a of the platform and b of the base; a table adds to a
-joint's position. It imitates other errors by wrong joints, so fitted values describe a control, never the machine.
+joint's position. Wrong joints imitate other errors, so fitted values describe a control, never the machine.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ Errors left by 42 values are then 1.66 to 1.73 µm rms over three draws, 1.65 to
 100 [reference machine with gravity, lead and cyclic errors]."""
 
 LEVER_MM = 100.0
-"""A tilt counts as the way of a point at this distance from the tool tip, such as a part's far end [mm]."""
+"""Lever arm that converts tilt to a displacement: the distance from the tool tip of, for example, a part's far end [mm]."""
 
 POINTS = 256
 """Most triplets that LinuxCNC takes in a `COMP_FILE` [EMCMOT_COMP_SIZE]."""
 
 PER_WAVE = 4
-"""Least points for a wave in a table of straight pieces: with four a fifth of it is left in rms, with three more than a third."""
+"""Least table points per wave, linearly interpolated: with four, a fifth of its rms remains; with three, more than a third."""
 
 BEYOND_MM = 5.0
 """How far tables go beyond the struts' lengths in the volume; beyond their ends LinuxCNC holds the last value [mm]."""
 
 LOST = 1e-7
-"""Directions of parameters that move the tool by less than this share of the strongest direction keep their typed values: a
-millimetre along them moves the tool by less than a nanometre."""
+"""Relative singular value below which a parameter direction keeps its typed values: a millimetre along it moves the
+tool by less than a nanometre."""
 
 JOINTS = 3 * STRUTS
 
 ROUNDS = 4
-"""Gauss-Newton: joints that are off by millimetres settle in three."""
+"""Gauss-Newton steps: joints wrong by millimetres converge in three."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,9 @@ class Values:
     Attributes:
         base_mm: base joints less nominal, shape (6, 3).
         platform_mm: platform joints less nominal, shape (6, 3).
-        longer_mm: struts longer than counted, shape (6,).
+        longer_mm: actual less counted strut lengths, shape (6,).
         points_mm: positions of joints, shape (k,).
-        table_mm: added to joints there, shape (6, k); zeros for no tables.
+        table_mm: corrections at these positions, shape (6, k); zeros for no tables.
     """
 
     base_mm: Floats
@@ -89,7 +89,7 @@ class Values:
 
 @dataclass(frozen=True)
 class LeftOfModel:
-    """Errors of the tool over a volume: position [µm] and tilt [deg], rms and largest."""
+    """Remaining errors of the tool over a volume: position [µm] and tilt [deg], rms and largest."""
 
     rms_um: float
     largest_um: float
@@ -99,7 +99,7 @@ class LeftOfModel:
 
 @dataclass(frozen=True)
 class SourceLeft:
-    """Errors of the tool by one source alone, without and with parameters and tables [µm rms]."""
+    """Tool errors by one source alone, before and after correction by parameters and tables [µm rms]."""
 
     name: str
     rms_um: float
@@ -109,7 +109,7 @@ class SourceLeft:
 
 @dataclass(frozen=True, eq=False)
 class Refitted:
-    """Parameters of a model over a volume."""
+    """Fitted parameters, with the remaining errors."""
 
     values: Values
     left: dict[str, LeftOfModel]
@@ -117,7 +117,7 @@ class Refitted:
 
 
 def drawn_poses(low: Floats, high: Floats, count: int, seed: int) -> Floats:
-    """Return poses evenly drawn between limits of shape (6,), shape (count, 6) [mm, deg]."""
+    """Return uniformly drawn poses between limits of shape (6,), shape (count, 6) [mm, deg]."""
     return np.random.default_rng(seed).uniform(low, high, (count, 6))
 
 
@@ -125,7 +125,7 @@ def refitted(model: MachineModel, poses: Floats, others: Floats) -> Refitted:
     """Refit genhexkins to a model's sources that depend on the pose alone.
 
     Args:
-        others: at which the remaining errors are measured, shape (m, 6).
+        others: poses for measuring the remaining errors, shape (m, 6).
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
@@ -153,7 +153,7 @@ def refitted(model: MachineModel, poses: Floats, others: Floats) -> Refitted:
 
 
 def exact_joints(model: MachineModel, poses: Floats) -> Floats:
-    """Return the driven lengths that take the model to poses, shape (n, 6) [mm]."""
+    """Return driven strut lengths, shape (n, 6) [mm], that bring the model exactly to the poses."""
     commands = compensated(model, Motion(poses))
     return model.driven_mm(Frames.from_poses(commands, model.machine.hexapod.rotation))
 
@@ -191,7 +191,7 @@ def _typed(own: MachineModel, points: Floats) -> Values:
 
 @dataclass(frozen=True, eq=False)
 class _AtLengths(Motion):
-    """Rows of which only the strut lengths are known, shape (n, 6)."""
+    """A motion with known strut lengths and unknown directions, shape (n, 6)."""
 
     length_mm: Floats = field(default_factory=lambda: np.zeros((0, STRUTS)))
 
@@ -201,7 +201,7 @@ class _AtLengths(Motion):
 
 
 def _by_length(fitted: Fitted, machine: Machine, length_mm: Floats) -> Floats | None:
-    """Return a source's strut errors at lengths, shape (n, 6) [mm]; None if it is not a curve of strut length."""
+    """Return a source's strut errors at lengths, shape (n, 6) [mm]; None if they depend on more than strut length."""
     form = fitted.source.c_form(machine, fitted.values)
     if form is None or form.by_pose:
         return None
@@ -225,7 +225,7 @@ def _with_tables(values: Values, in_table: Sequence[Fitted], machine: Machine) -
 
 
 def _effects(machine: Machine, values: Values, frames: Frames) -> tuple[Floats, Floats]:
-    """Return joints' derivatives by all 42 parameters, and the tool's by the joints, turns at the lever, shapes (n, 6, 42), (n, 6, 6)."""
+    """Return two derivatives: of joints by the 42 parameters, (n, 6, 42), and of the tool by joints, (n, 6, 6), turns times the lever."""
     struts = inverse(machine.hexapod.moved(values.base_mm, values.platform_mm), frames)
     own = np.eye(STRUTS)[:, :, None]
     base = -struts.unit[:, :, None, :] * own

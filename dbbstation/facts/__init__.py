@@ -1,1 +1,1 @@
-"""A value with its uncertainty, and the one way to JSON."""
+"""Values with uncertainty, and their conversion to JSON."""

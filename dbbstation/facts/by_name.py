@@ -1,4 +1,4 @@
-"""A tuple of things with names."""
+"""A tuple whose items can also be found by name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ByName(tuple[_Item, ...]):
     @overload
     def __getitem__(self, key: slice, /) -> tuple[_Item, ...]: ...
     def __getitem__(self, key: SupportsIndex | str | slice, /) -> _Item | tuple[_Item, ...]:
-        """Return an item; an unknown name is a KeyError with the nearest one."""
+        """Return an item; for an unknown name, raise KeyError with the nearest name."""
         if not isinstance(key, str):
             return super().__getitem__(key)
         names: list[str] = [one.name for one in self]  # type: ignore[attr-defined]
@@ -31,6 +31,6 @@ class ByName(tuple[_Item, ...]):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:  # noqa: ANN401 - as pydantic has it
-        """Be a tuple in JSON."""
+        """Let pydantic treat it as a tuple."""
         kind: Any = tuple.__class_getitem__((get_args(source)[0], ...))
         return core_schema.no_info_after_validator_function(cls, handler.generate_schema(kind))

@@ -32,7 +32,7 @@ class WorstCircle(OfRun):
 
 @dataclass(frozen=True, kw_only=True)
 class HeldTolerance:
-    """A tolerance against circles [ISO 14253-1].
+    """A tolerance compared with measured circles [ISO 14253-1].
 
     Attributes:
         conformity: `exceeded` if one circle exceeds it, else `cannot tell` if one is within U; None without circles.
@@ -55,13 +55,13 @@ class HeldTolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedTolerance(HeldTolerance):
-    """A tolerance against circles now and before; None without applicable circles."""
+    """A tolerance compared with the circles of now and of before; None without applicable circles."""
 
     before: HeldTolerance | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ToleranceOfTest(ComparedTolerance):
-    """A tolerance against the circles of one test."""
+    """A tolerance compared with the circles of one test."""
 
     test: str

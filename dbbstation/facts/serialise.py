@@ -18,14 +18,14 @@ def _is_none(value: object) -> bool:
 
 
 Absent = Field(exclude_if=_is_none)
-"""Marks a field whose key is left out where it is None, as in `Annotated[str | None, Absent]`."""
+"""Marks a field whose key is omitted if it is None, as in `Annotated[str | None, Absent]`."""
 
 OrNull = Annotated[str, PlainSerializer(lambda text: text or None, return_type=str | None)]
-"""A text that is null in JSON where it is empty."""
+"""A text that becomes null in JSON if empty."""
 
 AsItIs = GetPydanticSchema(lambda _source, _handler: core_schema.any_schema())
 Kept = Field(exclude=True)
-"""Both together mark a field that belongs to the result and is no part of its JSON: objects to go on working with."""
+"""`AsItIs` and `Kept` together mark a field of the result that its JSON omits: objects for further work."""
 
 Array = Annotated[
     NDArray[np.float64],
@@ -37,13 +37,13 @@ Array = Annotated[
         )
     ),
 ]
-"""Numbers of any shape: nested lists in JSON."""
+"""An array of any shape; nested lists in JSON."""
 
 
 _Kind = TypeVar("_Kind")
 
 _ADAPTERS: dict[Any, TypeAdapter[Any]] = {}
-"""Made once for each class: that takes milliseconds."""
+"""Adapters by class, cached because each takes milliseconds to make."""
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
@@ -53,7 +53,7 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
 
 
 def plain(result: object) -> dict[str, Any]:
-    """Return a result as objects, lists, texts and numbers."""
+    """Return a result as dictionaries, lists, texts and numbers."""
     kind: type[Any] = type(result)
     return _adapter(kind).dump_python(result, mode="json", by_alias=True)
 
@@ -73,24 +73,24 @@ def schema_of(kind: type) -> dict[str, Any]:
 
 
 def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
-    """Return the dataclass that `json_of` wrote.
+    """Read a dataclass from the text of `json_of`.
 
     Raises:
-        ValueError: the text is no JSON, or not of this class.
+        ValueError: the text is not JSON or does not fit this class.
     """
-    # The parser of pydantic refuses what Python's takes: escapes of names that are not in UTF-8.
+    # pydantic's parser refuses escaped names that are not in UTF-8; Python's parser accepts them.
     return read_plain(kind, json.loads(text))
 
 
 def as_objects(data: Any) -> Any:  # noqa: ANN401 - of any result
-    """Return what `plain` wrote as objects with the same names, for who cannot load the classes of the results."""
+    """Return the data of `plain` as objects with attributes, for readers without the results' classes."""
     if isinstance(data, Mapping):
         return SimpleNamespace(**{name: as_objects(value) for name, value in data.items()})
     return [as_objects(value) for value in data] if isinstance(data, list) else data
 
 
 def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:
-    """Return the dataclass that `plain` wrote, or the part of it that another class has.
+    """Read a dataclass from the data of `plain`; another class reads the keys that it has.
 
     Args:
         data: further keys are ignored.

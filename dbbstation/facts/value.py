@@ -15,7 +15,7 @@ OrUnknown = Annotated[
     BeforeValidator(lambda number: math.nan if number is None else number),
     PlainSerializer(lambda number: number if math.isfinite(number) else None, return_type=float | None),
 ]
-"""A number that is nan or infinite where it is not known, and null in JSON."""
+"""A number that is nan or infinite if unknown, then null in JSON."""
 
 
 def finite(number: float | None) -> float | None:
@@ -43,5 +43,5 @@ class Value:
         return f"{known} {self.unit}".rstrip()
 
     def at_least(self, uncertainty: float) -> Value:
-        """Return the value with at least this standard uncertainty; NaN changes nothing."""
+        """Return the value with its standard uncertainty raised to at least this one; NaN leaves it unchanged."""
         return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self

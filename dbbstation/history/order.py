@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from dbbstation.history.record import SessionFigures
 
 MOSTLY = 0.8
-"""Share of a machine's sessions whose names must stand in the order of their dates before names are taken for a second witness of
-the order. Names that were given at random agree on about 2 / sqrt(n) of n [Logan and Shepp 1977]: a third of 36."""
+"""Share of a machine's sessions whose names must be in date order before a name counts as evidence of the order. Random
+names agree on about 2 / sqrt(n) of n [Logan and Shepp 1977]: a third of 36."""
 
 
 def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
-    """Return sessions with impossible or repeated dates."""
+    """Return messages on repeated, future or out-of-order dates."""
     faults = []
     by_date = sorted(sessions, key=_dated)
     for one, other in pairwise(by_date):

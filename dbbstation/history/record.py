@@ -1,9 +1,9 @@
-"""A history's facts of a session and a model."""
+"""What a history keeps of a session and of a model."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from datetime import datetime  # noqa: TC003 - JSON is read by it
+from datetime import datetime  # noqa: TC003 - pydantic needs it to read JSON
 from math import nan
 
 
@@ -31,7 +31,7 @@ class RunFigures:
 
     Attributes:
         direction: `ccw` or `cw`.
-        circle: in words; runs of a test with equal words are comparable.
+        circle: description; runs of a test are comparable if it is equal.
     """
 
     test: str
@@ -47,8 +47,8 @@ class SessionFigures:
     Attributes:
         name: folder relative to the history's.
         machine: serial number, or the name in its file.
-        programs: hash over NC programs run instead of the plan's circles, or empty.
-        anchor: link of the log's last event, else end of the chain of runs; empty without a seal.
+        programs: hash of NC programs that replaced the plan's circles, or empty.
+        anchor: hash of the log's last event, else of the last run; empty without a seal.
     """
 
     name: str
@@ -79,7 +79,7 @@ class ModelFigures:
 
     Attributes:
         sessions: SHA-256 of its session files, by name.
-        warnings: shown wherever its numbers are.
+        warnings: to be shown with its numbers.
     """
 
     file: str

@@ -1,4 +1,4 @@
-"""Run length of a control chart: a CUSUM together with a limit for single values.
+"""Run length of a control chart: a CUSUM combined with a limit for single values.
 
 The chart takes standardised values z, independent and standard normal without change. Upwards it adds S = max(0, S + z
 - k) and signals at S > h [Page 1954, Biometrika 41, 100], or at z > c [Lucas 1982, J. Quality Technology 14, 51];
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 STATES = 201
-"""Values of S that the chain tells apart. With twice as many the average run length changes by less than a thousandth."""
+"""States of the Markov chain. Twice as many change the average run length by less than a thousandth."""
 
 REFERENCE = 0.5
-"""k [standard deviations]: half the change that is to be found soonest [Page 1954], which is one standard deviation of a session.
-`python -m studies history` shows what others would bring."""
+"""k [standard deviations]: half the change to be found soonest [Page 1954], here one standard deviation of a session.
+`python -m studies history` compares other values."""
 
 SINGLE_SHARE = 0.5
-"""Share of the false alarms that the limit for single sessions may make; the CUSUM has the rest. A large step is then seen at once,
-before it widens the scatter that it is held against."""
+"""Share of false alarms allowed to the limit for single sessions; the CUSUM may cause the others. The limit detects a
+large step at once, before the step widens the estimated scatter."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Chart:
 
 
 def transitions(chart: Chart, mean: float = 0.0) -> Floats:
-    """Return transition probabilities of the upward sum, shape (STATES, STATES); the rest to one signals."""
+    """Return transition probabilities of the upward sum, shape (STATES, STATES); each row's complement to one is the probability of a signal."""
     width = 2.0 * chart.interval / (2.0 * STATES - 1.0)  # the last state's upper edge is h
     state = np.arange(STATES)
     edges = (state[None, :] - state[:, None] + 0.5) * width + chart.reference
@@ -56,7 +56,7 @@ def transitions(chart: Chart, mean: float = 0.0) -> Floats:
 
 
 def average_run_length(chart: Chart, mean: float = 0.0) -> float:
-    """Return the mean number of values until the two-sided chart signals, from zero sums.
+    """Return the average number of values until the two-sided chart signals, starting from zero sums.
 
     The rates of both directions add up [Kemp 1961, J. R. Stat. Soc. B 23, 149].
     """

@@ -1,8 +1,8 @@
-"""Values of one quantity, compared with earlier values, as independent standard normal numbers.
+"""Transform one quantity's values to independent standard normal numbers by comparison with earlier values.
 
-Level and, later, scatter are estimated from the values before. Recursive residuals are independent [Brown, Durbin and
-Evans 1975, J. R. Stat. Soc. B 37, 149]. Over their scatter they follow Student's t, and its probability gives a standard
-normal number [Hawkins 1987, The Statistician 36, 299]. Early residuals are scaled by the stated uncertainty.
+Earlier values give the level and, later, the scatter. Recursive residuals are independent [Brown, Durbin and Evans
+1975, J. R. Stat. Soc. B 37, 149]. Divided by their scatter they follow Student's t, whose probability gives a standard
+normal number [Hawkins 1987, The Statistician 36, 299]. Early residuals are divided by the stated uncertainty instead.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
 BASELINE = 10
-"""Values from which level and scatter are known well enough to stand for the stated uncertainty: the level to u / 3, the scatter
-to 24 %. `python -m studies history` shows what 5 and 20 would bring."""
+"""Number of values whose level and scatter replace the stated uncertainty: the level is then known to u / 3, the
+scatter to 24 %. `python -m studies history` compares 5 and 20."""
 
 CONTRADICTS = 0.05
-"""Probability below which a scatter contradicts the stated uncertainties. One quantity in twenty that scatters as stated is held
-against somewhat more than that for a few sessions."""
+"""Probability below which a scatter contradicts the stated uncertainties. One sound quantity in twenty is then compared
+with a slightly larger scatter for a few sessions."""
 
 _SMALLEST = 1e-300
-"""Probabilities below it are taken for it: the number that belongs to it is 37, far beyond every limit."""
+"""Lower bound of probabilities: its normal number is 37, far beyond every limit."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ScatterRatio:
         return self.freedom > 0 and bool(chdtrc(self.freedom, self.square) < CONTRADICTS)
 
     def with_residuals(self, residual: Floats) -> ScatterRatio:
-        """Return it with further recursive residuals, in their standard uncertainties."""
+        """Return the ratio updated by further recursive residuals, in standard uncertainties."""
         return ScatterRatio(self.freedom + len(residual), self.square + float(residual @ residual))
 
 
@@ -62,7 +62,7 @@ class Standardised:
     Attributes:
         z: standard normal without change; NaN for the first.
         by_stated: whether z rests on stated uncertainties alone.
-        u_level: its standard uncertainty by the stated ones alone; NaN for the first.
+        u_level: standard uncertainty of the level by the stated ones alone; NaN for the first.
         scatter: standard deviation of the values before, in stated uncertainties; NaN if not known.
     """
 
@@ -90,12 +90,12 @@ def standardised(
         u: standard uncertainty of each, positive, in the same unit, shape (n,).
         baseline: number of values from which scatter replaces stated uncertainty, at least 3.
         before: scatter about earlier levels.
-        hindsight: scatter to use while unknown; None: the stated uncertainties.
+        hindsight: scatter of the whole history, for early values; None: the stated uncertainties.
     """
     count = len(values)
     level, u_level, residual, z = (np.full(count, np.nan) for _ in range(4))
     if count:
-        about = values - values[0]  # sums of small numbers lose no digits
+        about = values - values[0]  # small numbers keep their digits in sums
         weight = 1.0 / u**2
         sums = np.cumsum(weight)[:-1]
         level[1:] = values[0] + np.cumsum(weight * about)[:-1] / sums
@@ -113,13 +113,13 @@ def standardised(
     if hindsight is not None and hindsight.freedom >= baseline - 1:
         of_all = np.full(int(early.sum()), hindsight.size)
         z[early] = _normal(residual[early], of_all, np.full(len(of_all), hindsight.freedom))
-    elif hindsight is not None:  # Student's t of one or two degrees of freedom would find nothing, however large
+    elif hindsight is not None:  # Student's t with one or two degrees of freedom would detect no change
         z[early] = residual[early] / hindsight.size
     return Standardised(z, early & (hindsight is None), residual, level, u_level, scatter)
 
 
 def _normal(residual: Floats, scatter: Floats, freedom: Integers) -> Floats:
-    # Values that are all alike have no scatter: the smallest departure is then beyond it, and none is none.
+    # Equal values have zero scatter: any departure is then infinite, and no departure is zero.
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(residual == 0.0, 0.0, residual / scatter)
     beyond = stdtr(freedom.astype(np.float64), -np.abs(ratio))

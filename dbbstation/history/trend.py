@@ -1,4 +1,4 @@
-"""Figures of all sessions as trends: one for each machine, quantity and circle."""
+"""Trends of figures over all sessions, one per machine, quantity and circle."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from dbbstation.plan.tolerance import Tolerance
 
 FALSE_ALARMS = 1e-3
-"""False alarms per session of a machine, all its quantities together: one in a thousand sessions, in nineteen years of weekly ones.
-As many as the findings of runs allow themselves."""
+"""False alarms per session of a machine over all its quantities: one in a thousand sessions, or nineteen years of
+weekly ones. The findings about runs have the same rate."""
 
 LIMITED = {
     "G": CircleFigure.CIRCULAR_DEVIATION,
     "R": CircleFigure.MEAN_RADIAL_ERROR,
     "C": CircleFigure.CENTRE_DEVIATION,
 }
-"""Figures that the shop's tolerances hold for."""
+"""Figures to which the shop's tolerances apply."""
 
 NOT_WATCHED = frozenset({"C"})
 """A distance, folded at zero, is not normal; X and Y, of which it is made, are watched."""
@@ -46,7 +46,7 @@ _FIRST = {"G": 0, "X": 1, "Y": 2, "R": 3, "C": 4}
 
 @dataclass(frozen=True)
 class Subject:
-    """What a trend is of.
+    """The quantity of a trend.
 
     Attributes:
         figure: such as `G`, or a parameter.
@@ -90,7 +90,7 @@ class Trend:
 
     @property
     def verdict(self) -> TrendVerdict:
-        """Return the verdict of its history."""
+        """Return the verdict on its history."""
         return TrendVerdict.CANNOT_TELL if self.watched is None else self.watched.verdict
 
 
@@ -100,7 +100,7 @@ class MachineHistory:
 
     Attributes:
         sessions: in time order.
-        chart: limits for each quantity; None without any.
+        chart: limits for each quantity; None if no quantity is watched.
         expected: false alarms expected over this history.
     """
 
@@ -144,7 +144,7 @@ def histories(
     """Return the history of every machine, by name.
 
     Args:
-        sessions: dated, each once.
+        sessions: dated, without duplicates.
         models: by the SHA-256 of their one session.
     """
     machines = sorted({one.machine for one in sessions})
@@ -193,12 +193,12 @@ def _circle_series(sessions: Sequence[SessionFigures], asked: TrendOptions) -> d
             for place, figure in enumerate(repeats[0]):
                 one = found.setdefault(Subject(figure.name, test, direction, circle), _Series())
                 one.at.append(k)
-                if len(repeats) == 1:  # as most are, and means take half of the time that a history opens in
+                if len(repeats) == 1:  # most runs have one repeat; means would double the time to open a history
                     one.values.append(figure.value_um)
                     one.u.append(figure.stated_u_um)
                     continue
                 one.values.append(fmean(figures[place].value_um for figures in repeats))
-                # What repeats do not share averages out; what is stated holds mostly what they share.
+                # Averaging removes only independent errors; stated uncertainties are mostly errors common to repeats.
                 one.u.append(sqrt(fmean(figures[place].stated_u_um ** 2 for figures in repeats)))
     order = sorted(found, key=lambda s: (s.test, s.direction, s.of, _FIRST.get(s.figure, len(_FIRST))))
     return {subject: found[subject] for subject in order}

@@ -1,4 +1,4 @@
-"""Changes of one quantity over the sessions of a machine."""
+"""Detect changes of one quantity over the sessions of a machine."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ class TrendVerdict(StrEnum):
     STEADY = "steady"
     """No change beyond scatter and uncertainty."""
     STANDS_OUT = "stands out"
-    """Single sessions lie beyond both, and the next ones do not."""
+    """Single sessions are beyond both, but the following ones are not."""
     CHANGED = "changed"
-    """From some session on it is another."""
+    """The level differs from some session on."""
     CANNOT_TELL = "cannot tell"
-    """One session, or no stated uncertainty."""
+    """No value could be compared: one session, or no stated uncertainty."""
 
 
 @dataclass(frozen=True)
 class TrendEvent:
-    """Something beyond scatter and uncertainty.
+    """A change or outlier beyond scatter and uncertainty.
 
     Attributes:
         verdict: `STANDS_OUT` or `CHANGED`.
-        difference: values from `since` to `found` less the level before; after a whole baseline: level after less level before.
+        difference: mean from `since` to `found`, less the level before; once a baseline follows, new level less old level.
         by_stated: whether only stated uncertainties show it, since scatter is not known yet.
     """
 
@@ -56,11 +56,11 @@ class Watched:
     Attributes:
         z: standard normal without change; NaN if not compared.
         high: CUSUM upwards, NaN as above.
-        level: from a change to the next, by each stretch's latest value.
-        u_level: standard uncertainty by the larger of stated and scatter.
+        level: mean between two changes, computed from all its values.
+        u_level: standard uncertainty by stated uncertainties or scatter, whichever is larger.
         scatter: of the last stretch, in stated uncertainties; NaN for too few values.
-        lacking: values missing before the next comparison: one just after a change, else none.
-        by_stated: whether the last statement rests on stated uncertainties alone.
+        lacking: values needed before the next comparison: one just after a change, else zero.
+        by_stated: whether the last comparison uses stated uncertainties alone.
     """
 
     events: tuple[TrendEvent, ...]
@@ -96,17 +96,17 @@ def watch(
 ) -> Watched:
     """Find changes beyond scatter and beyond stated uncertainty.
 
-    A change needs the chart's signal and a difference of more than k u. The new level begins with the next value, since
-    the signalling ones were selected. A single value beyond its limit is a change if the next one is too; else it stands
-    out and leaves the level.
+    A change requires the chart's signal and a difference above k u. The new level is estimated from the next value on,
+    because the signalling values were selected. A value beyond the single limit is an outlier and does not enter the
+    level. If an event to the same side follows directly, both become one change.
 
-    The chart's scale is the stated uncertainty until a baseline gives the scatter. If values scatter more than stated,
-    beyond chance, early ones are compared with that scatter too.
+    The chart uses the stated uncertainty until a baseline gives the scatter. If this scatter significantly exceeds the
+    stated uncertainty, early values are compared with it too.
     """
     looked, scatter = _look(values, u, chart, coverage_factor, baseline, None)
     if not any(event.by_stated for event in looked.events):
         return looked
-    # With fewer changes called there is more scatter: it grows until the same changes are called again.
+    # Fewer detected changes leave more scatter. Repeat until the detected changes no longer vary.
     taken = ScatterRatio()
     while scatter.more_than_stated and scatter.freedom > taken.freedom:
         taken = scatter
@@ -115,7 +115,7 @@ def watch(
 
 
 AT_FIRST = 32
-"""Values of a level that are looked at first."""
+"""Number of values of a level that are checked first."""
 
 
 def _look(
@@ -133,7 +133,7 @@ def _look(
     start, out, pooled = 0, list[int](), ScatterRatio()
     while True:
         at = np.array([k for k in range(start, count) if k not in out], dtype=np.intp)
-        for some in (at[:AT_FIRST], at):  # a change among the first is found without the work for all
+        for some in (at[:AT_FIRST], at):  # an early change is found without processing all values
             held = standardised(values[some], u[some], baseline, pooled, hindsight)
             stretch = _Stretch(some, held, values[some], u[some], chart, coverage_factor)
             found = stretch.first_event()
@@ -182,9 +182,9 @@ def _settled(event: TrendEvent, level: Floats, u_level: Floats, start: int) -> T
 
 
 def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[TrendEvent]:
-    """Return outstanding values that belong to a following change on the same side.
+    """Return outliers that become part of the following event on the same side.
 
-    Before a value that is outstanding itself, only the adjacent one counts.
+    If this event is an outlier itself, only an adjacent one counts.
     """
     first = found.since - 1
     return [
@@ -205,7 +205,7 @@ def _change(since: int, found: int, at: NDArray[np.intp], values: Floats, u: Flo
 
 
 def _scatter(values: Floats, u: Floats) -> float:
-    if len(values) < 2:  # noqa: PLR2004 - one value does not scatter
+    if len(values) < 2:  # noqa: PLR2004 - one value has no scatter
         return np.nan
     mean = np.average(values, weights=1.0 / u**2)
     return float(np.sqrt(np.sum(((values - mean) / u) ** 2) / (len(values) - 1)))
@@ -213,7 +213,7 @@ def _scatter(values: Floats, u: Floats) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """Values since a change, without those that stand out."""
+    """Values since a change, without outliers."""
 
     at: NDArray[np.intp]
     of: Standardised
@@ -234,7 +234,7 @@ class _Stretch:
         return out
 
     def first_event(self) -> TrendEvent | None:
-        """Return the first value beyond a limit whose difference exceeds the stated uncertainty."""
+        """Return the first event beyond a limit whose difference exceeds k times the stated uncertainty."""
         sums = self.sums
         high, low = (np.nan_to_num(one) for one in sums)
         single = np.abs(np.nan_to_num(self.of.z)) > self.chart.single
@@ -250,14 +250,14 @@ class _Stretch:
         return None
 
     def _since(self, k: int, side: float) -> int:
-        """Return the most probable first value of the change shown by value k: the largest sum over the root of its length [Hinkley 1970, Biometrika 57, 1]."""
+        """Return the most probable start of the change signalled at k: it maximises sum / sqrt(length) [Hinkley 1970, Biometrika 57, 1]."""
         sums = np.nan_to_num(self._sum(side))
-        first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # that of the first value is zero
+        first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # the first value's sum is zero
         behind = np.cumsum(side * self.of.z[first : k + 1][::-1])[::-1]
         return first + int(np.argmax(behind / np.sqrt(np.arange(len(behind), 0, -1))))
 
     def final(self, count: int) -> tuple[float, float]:
-        """Return the first values' level and standard uncertainty; NaN for none."""
+        """Return mean and standard uncertainty of the first `count` values; NaN for none."""
         if not count:
             return np.nan, np.nan
         level, u_level = _mean(self.values[:count], self.u[:count])

@@ -1,1 +1,1 @@
-"""What is measured: circles about balls on the jig."""
+"""Test plans: circles about balls on the jig."""

@@ -11,24 +11,24 @@ if TYPE_CHECKING:
     from datetime import datetime
 
 LONGEST_CALIBRATOR = timedelta(days=5 * 366)
-"""Time from a calibrator's certificate: the longest usual interval of gauge blocks and step gauges [ILAC-G24]."""
+"""Longest age of a calibrator's certificate: the longest usual interval for gauge blocks and step gauges [ILAC-G24]."""
 
 USUAL_TEMP_UNCERTAINTY_K = 0.3
-"""A thermometer of class B may be off by 0.4 K at 20 degC [IEC 60751]; as a rectangular distribution that is 0.23 K, and the bar is
-not quite as warm as it [K]."""
+"""Standard uncertainty [K]. A class B thermometer may err by 0.4 K at 20 degC [IEC 60751], 0.23 K as a rectangular
+distribution; the bar's temperature also differs a little from the thermometer's."""
 
 STEEL_BAR_UM_M_K = 11.5
 """Thermal expansion of unalloyed steel [µm/(m K)]."""
 
 EXPANSION_UNCERTAINTY = 0.05
-"""Standard uncertainty of a stated coefficient of expansion, as its share: of steel, from 11.5 µm/(m K), catalogues differ by 1 either
-way, which is 0.58 as a rectangular distribution."""
+"""Relative standard uncertainty of a stated expansion coefficient. For steel, catalogues give 11.5 ± 1 µm/(m K), 0.58
+as a rectangular distribution."""
 
 UNKNOWN_BAR_MM = 0.1
-"""Stated size of the error of a bar that nobody put on a calibrator: more than any calibrator leaves [mm]."""
+"""Assumed length error of an uncalibrated bar, larger than after any calibration [mm]."""
 
 USUAL_READINGS = 200
-"""Readings on the calibrator that are averaged: of a display twenty seconds."""
+"""Number of averaged readings on the calibrator: twenty seconds of a display."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Bar:
 
     Attributes:
         expansion_um_m_k: [µm/(m K)]; None if not noted.
-        stroke_mm: of its gauge, either way; None if not noted.
+        stroke_mm: of its gauge in each direction; None if not noted.
         temp_uncertainty_k: standard, of a bar temperature; None if not noted.
     """
 
@@ -57,9 +57,9 @@ class Bar:
     ball_form_um: float | None = None
 
     def certificate_fault(self, day: date) -> str:
-        """Return why the calibrator's certificate does not hold on a day, or an empty text.
+        """Return why the calibrator's certificate is not valid on a day; empty if valid.
 
-        A stated last day replaces the longest usual interval.
+        A stated expiry date replaces the longest usual interval.
         """
         of, until = self.calibrator_certified, self.calibrator_valid_until
         if until is not None and day > date.fromisoformat(until):
@@ -71,10 +71,11 @@ class Bar:
         return f"the calibrator was certified on {of}; without a stated last day its certificate holds for five years from then"
 
     def reads_long_mm(self, temp_c: float | None) -> tuple[float, float]:
-        """Return the expected reading minus true distance, with standard uncertainty [mm].
+        """Return how much too long the bar is expected to read, with standard uncertainty [mm].
 
-        Calibrator excess minus growth a L (T - T_calibration). Known effects are corrected [GUM 3.2.4]; an unstated
-        temperature uncertainty is the usual one. A difference of two temperatures has sqrt(2) times the uncertainty of one.
+        The value is the excess on the calibrator minus the growth a L (T - T_calibration). Known effects are corrected
+        [GUM 3.2.4]. `USUAL_TEMP_UNCERTAINTY_K` replaces an unstated temperature uncertainty. A difference of two
+        temperatures has sqrt(2) times the uncertainty of one.
         """
         long_mm = 0.0 if self.reading_mm is None else self.reading_mm - self.calibrated_length_mm
         if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
@@ -83,7 +84,7 @@ class Bar:
         return long_mm - grown_mm, math.hypot(self.calibrator_uncertainty_mm, self.grown_uncertainty_mm(temp_c) or 0.0)
 
     def grown_uncertainty_mm(self, temp_c: float | None) -> float | None:
-        """Return the standard uncertainty of growth since calibration [mm]; None if unknown."""
+        """Return the standard uncertainty of the thermal growth since calibration [mm]; None if unknown."""
         if self.expansion_um_m_k == 0.0:
             return 0.0
         if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
@@ -94,7 +95,7 @@ class Bar:
         return mm_per_k * math.hypot(math.sqrt(2.0) * usual, of_coefficient)
 
     def lacks(self, temp_c: float | None) -> tuple[str, ...]:
-        """Return unknown facts that an absolute length needs."""
+        """Return the facts that are missing for an absolute length."""
         if self.expansion_um_m_k == 0.0:
             return ()
         stated = (

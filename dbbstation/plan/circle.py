@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 FULL_TURN_DEG = 360.0
 
 USUAL_STROKE_MM = 10.0
-"""Travel of a bar's gauge either way where neither instrument nor session states it [mm]. One bar serves circles of 150
-and 144 mm radius, so it is no less than 6; bars of 100 and 150 mm are distinguished by anything up to 50."""
+"""Travel of a bar's gauge in each direction if neither instrument nor session states it [mm]. One bar measures circles
+of 150 and 144 mm radius, so it is at least 6; up to 50 still distinguishes bars of 100 and 150 mm."""
 
 
 class Direction(StrEnum):
-    """Sense of travel from +Z."""
+    """Sense of travel, seen from +Z."""
 
     CCW = "ccw"
     CW = "cw"
@@ -32,17 +32,17 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True)
 class Circle:
-    """A horizontal circle of the tool tip about a fixed ball, bar level or raised.
+    """A horizontal circle of the tool tip about a fixed ball, with a level or raised bar.
 
-    Elevation e gives the radius R cos e, R sin e above the ball.
+    A bar raised by e gives the radius R cos e, at the height R sin e above the ball.
 
     Attributes:
-        ball_mm: fixed ball by plan, machine frame (x, y, z).
+        ball_mm: planned place of the fixed ball, machine frame (x, y, z).
         centre_mm: as programmed, machine frame (x, y, z).
         bar_mm: nominal ball distance R.
         tilt_deg: constant (A, B, C).
         start_deg: of the full turn, from +X towards +Y.
-        feed_in_mm: begin outside the circle, along the bar.
+        feed_in_mm: length of the radial move onto the circle.
     """
 
     ball_mm: tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""Orders of tests: few changes of holder, or drift separated from height."""
+"""Orders of tests: with few holder changes, or with heights uncorrelated with drift."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
 
 LARGEST_LEAK = 0.05
-"""Correlation of height and drift up to which an order counts as separating them: a drift of 10 µm then looks like less than 0.5 µm
-of an effect of height, less than a holder is put back to. On Table II, 0.05 and 0.1 give the same order with 4 changes of holder, 0.02 takes
-7, and the plan's own order has 2 and a correlation of 0.945 (tests/plan/test_order.py)."""
+"""Largest correlation of height and drift that an order may have: a drift of 10 µm then imitates less than 0.5 µm of
+height effect, less than a holder's repeatability. On Table II, 0.05 and 0.1 give the same order with 4 changes of
+holder, 0.02 takes 7, and the plan's own order has 2 and a correlation of 0.945 (tests/plan/test_order.py)."""
 
 _STARTS = 40
-"""Orders from which the search begins, beside the plan's own and that by holder. With 40 it finds what trying all orders finds
-(tests/plan/test_order.py); each takes some milliseconds."""
+"""Random starting orders of the search, beside the plan's order and the order by holder. With 40 the search finds the
+optimum of all orders (tests/plan/test_order.py); each takes some milliseconds."""
 
 _SEED = 0
-"""Of these orders: the same plan always gets the same order, so that a session can be gone on with."""
+"""Seed of these orders: a plan always gets the same order, so an interrupted session can continue."""
 
 _TINY = 1e-9
-"""Correlations that differ by less are the same but for rounding."""
+"""Correlations that differ by less differ by rounding only."""
 
 
 def by_holder(plan: Plan) -> tuple[str, ...]:
-    """Return tests by holder, then ball, as first named: each is put up once."""
+    """Return tests grouped by holder, then ball, in order of first mention: each is set up once."""
     balls = {test.ball.name: test.ball.holder for test in plan.tests.values()}
     holders, names = list(dict.fromkeys(balls.values())), list(balls)
     tests = sorted(plan.tests.values(), key=lambda test: (holders.index(test.ball.holder), names.index(test.ball.name)))
@@ -39,9 +39,11 @@ def by_holder(plan: Plan) -> tuple[str, ...]:
 
 
 def against_drift(plan: Plan) -> tuple[str, ...]:
-    """Return tests in an order whose heights follow no drift.
+    """Return tests in an order whose heights are nearly uncorrelated with drift.
 
-    Priorities: a correlation of at most `LARGEST_LEAK` with a steady drift, then with a bent drift, then few balls to put up, then few holder changes. Tests count as equal time steps. Exchanges and moves are searched from several starts.
+    First priority is a correlation below `LARGEST_LEAK` with linear drift, second with linear plus quadratic drift.
+    Third are few ball set-ups, last few holder changes. Tests count as equal time steps. A local search exchanges and
+    moves tests from several starts.
     """
     names = list(plan.tests)
     tests = [plan.tests[name] for name in names]
@@ -59,10 +61,10 @@ def against_drift(plan: Plan) -> tuple[str, ...]:
 
 
 def height_and_drift(heights_mm: Sequence[float], degree: int = 2) -> float:
-    """Return the multiple correlation of heights with a drift in equal time steps; 1: inseparable, 0: none or equal heights.
+    """Return the multiple correlation of heights with drift in equal time steps: 1 if inseparable, 0 if uncorrelated or heights are equal.
 
     Args:
-        degree: 1: steady; 2: also bent.
+        degree: 1: linear drift; 2: also quadratic.
     """
     return float(_correlations(np.array([heights_mm], dtype=np.float64), degree)[0])
 
@@ -111,12 +113,12 @@ def _least(costs: Floats) -> int:
 
 
 def _correlations(heights: Floats, degree: int) -> Floats:
-    """Return multiple correlations of rows of heights, shape (m, n), with polynomials of place, shape (m,)."""
+    """Return multiple correlations, shape (m,), of rows of heights, shape (m, n), with polynomials of the test's number."""
     n = heights.shape[1]
     off = heights - heights.mean(axis=1, keepdims=True)
     size = np.linalg.norm(off, axis=1)
     if n < 2 or not size.any():  # noqa: PLR2004 - one test has no order
         return np.zeros(len(heights))
     drift = np.vander(np.linspace(-1.0, 1.0, n), min(degree, n - 1) + 1, increasing=True)
-    basis = np.linalg.qr(drift)[0][:, 1:]  # the first column is the mean, which is gone
+    basis = np.linalg.qr(drift)[0][:, 1:]  # the first column is the mean, already removed
     return np.minimum(np.linalg.norm(off @ basis, axis=1) / size, 1.0)

@@ -14,18 +14,17 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
 
 LARGEST_LOSS_PERCENT = 0.5
-"""Share of a run's samples that may be lost where the plan sets no limit [%].
+"""Share of a run's samples that may be lost if the plan sets no limit [%].
 
-A line that works loses none; noise on the cable costs single ones, hundredths of a percent. The centre is a mean over
-the turn, so a share p that is missing in one piece moves it by no more than 2 p times the amplitude of the form: 0.2 µm
-at 0.5 % and a form of ± 20 µm, less than the noise of a reading. At 5 % it would be 2 µm, as much as a ball's place is
-known to. More than the limit also says that the computer does not keep up, and then times, which give the angles, are
-in doubt."""
+A sound line loses no samples; noise on the cable loses single ones, hundredths of a percent. The centre is a mean over
+the turn: a contiguous missing share p moves it by at most 2 p times the form's amplitude. That is 0.2 µm at 0.5 % and a
+form of ± 20 µm, less than a reading's noise. At 5 % it would be 2 µm, the uncertainty of a ball's place. Larger losses
+also indicate an overloaded computer, whose times, and thus angles, are doubtful."""
 
 
 @dataclass(frozen=True)
 class Plate:
-    """The jig plate that balls stand on.
+    """The jig plate that carries the balls.
 
     Attributes:
         expansion_um_m_k: [µm/(m K)]; None if not noted.
@@ -37,13 +36,13 @@ class Plate:
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball, known by CMM or put up under the spindle.
+    """A ball, measured by a CMM or set up under the spindle.
 
     Attributes:
-        bore: None for none.
+        bore: None if not in a bore.
         centre_mm: machine frame (x, y, z).
         repeatability_mm: of the holder, one standard deviation per axis.
-        place_known: False under the spindle [CAL III-A], where `centre_mm` is the commanded place.
+        place_known: False for a ball set up under the spindle [CAL III-A]; `centre_mm` is then the commanded place.
         plate: None without bore.
         form_um: roundness deviation by its certificate; None if not stated.
     """
@@ -78,7 +77,7 @@ class Plan:
     """Tests by name, in order.
 
     Attributes:
-        repeat_at_end: tests measured again, to separate drift and height.
+        repeat_at_end: tests measured again at the end, to separate drift and height.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """A holder's repeatability: scatter over mountings, with uncertainty [CAL III-B].
 
-n mountings per bore are measured by a CMM. Deviations from each place's mean add squares and freedom f; f s² / sigma² is
-chi-square [GUM E.4.3].
+A CMM measures n mountings per bore. Squared deviations from each place's mean are summed, with f degrees of freedom; f
+s² / sigma² is chi-square [GUM E.4.3].
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ LEVEL = 0.95
 """Probability of the intervals, as that of U (k = 2)."""
 
 UNLIKE_AXES = 0.01
-"""Probability, of axes that scatter alike, to differ so much that it is told."""
+"""Probability of a ratio between equal axes below which the difference is reported."""
 
 FEWEST = 2
-"""Mountings of one place that show a scatter."""
+"""Fewest mountings of one place that show a scatter."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ class HolderResult:
 
     Attributes:
         repeatability_um: standard deviation per axis, as in a jig file.
-        rms_distance_um: from the mean place; estimates sigma sqrt(number of axes).
+        rms_distance_um: distance from the mean place; estimates sigma sqrt(number of axes).
         mean_distance_um: corrected for the estimated mean place.
-        p_axes_alike: probability of so large a ratio of variances for equal axes.
-        of_cmm_um: subtracted standard deviation of the CMM.
+        p_axes_alike: probability of so large a variance ratio if the axes are equal.
+        of_cmm_um: standard deviation of the CMM, already subtracted.
     """
 
     repeatability_um: float
@@ -73,8 +73,8 @@ def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float
     """Return a holder's repeatability.
 
     Args:
-        places_um: centres over one place's mountings, shape (n, 2) or (n, 3) each.
-        cmm_um: standard deviation for an untouched ball, subtracted in variance.
+        places_um: one array of measured centres per place, shape (n, 2) or (n, 3).
+        cmm_um: standard deviation of repeated measurements of an untouched ball; its square is subtracted.
 
     Raises:
         ValueError: no place has two mountings.
@@ -87,7 +87,7 @@ def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float
     freedom = sum(len(one) - 1 for one in off)
     axes = [scatter(float(total), freedom, cmm_um, level) for total in squares]
     together = scatter(float(squares.sum()), freedom * len(squares), cmm_um, level)
-    # Distances from the mean of the mountings themselves are too small by sqrt((n - 1) / n).
+    # Distances from an estimated mean are too small by sqrt((n - 1) / n).
     distances = np.concatenate([np.linalg.norm(one, axis=1) * math.sqrt(len(one) / (len(one) - 1)) for one in off])
     return HolderResult(
         repeatability_um=together.s_um,
@@ -104,7 +104,7 @@ def repeatability(places_um: Sequence[Floats], cmm_um: float = 0.0, level: float
 
 
 def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> HolderScatter:
-    """Return the standard deviation of a sum of squares, with chi-square interval."""
+    """Return the standard deviation from a sum of squares, with its chi-square interval."""
     tail = (1.0 - level) / 2.0
     variances = (
         squares_um2 / freedom,
@@ -116,7 +116,7 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
 
 
 def _axes_differ(squares: Floats, freedom: int) -> float:
-    """Return the probability of the greatest variance ratio, times the number of pairs [Bonferroni]."""
+    """Return the probability of so large a variance ratio if axes are equal, corrected for the number of pairs [Bonferroni]."""
     if squares.min() <= 0.0:
         return 1.0 if squares.max() <= 0.0 else 0.0
     pairs = len(squares) * (len(squares) - 1) / 2

@@ -1,4 +1,4 @@
-"""What an instrument's rate shows of a circle."""
+"""The undulations that an instrument's sample rate resolves on a circle."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
 
 UNDULATIONS = 30
-"""Undulations per revolution that figures of a circle are told up to."""
+"""Highest undulations per revolution in a circle's figures."""
 
 POINTS_PER_UNDULATION = 2.0
-"""Fewer make an undulation look like a slower one [Shannon, 1949]."""
+"""With fewer points, an undulation is aliased to a lower one [Shannon, 1949]."""
 
 SMALLEST_POINTS = 36
-"""A turn with fewer has gaps of more than ten degrees between its points, and is no circle any more."""
+"""With fewer points a turn has gaps above ten degrees and does not count as a circle."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +35,16 @@ class Sampling:
 
     @property
     def is_circle(self) -> bool:
-        """Return whether the points make a circle."""
+        """Return whether the points are dense enough for a circle."""
         return self.points_per_turn >= SMALLEST_POINTS
 
 
 def sampling(circle: Circle, rate_hz: float) -> Sampling:
-    """Return what is seen of a circle."""
+    """Return a circle's sampling at a sample rate."""
     points = rate_hz * FULL_TURN_DEG / circle.turning_deg_s
     return Sampling(points, FULL_TURN_DEG / points, int(points / POINTS_PER_UNDULATION))
 
 
 def enough_feed_mm_min(circle: Circle, rate_hz: float) -> float:
-    """Return the greatest feed with resolved figures [mm/min]."""
+    """Return the greatest feed that still resolves all figures [mm/min]."""
     return circle.feed_mm_min * sampling(circle, rate_hz).points_per_turn / (UNDULATIONS * POINTS_PER_UNDULATION)

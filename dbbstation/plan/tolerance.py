@@ -20,19 +20,19 @@ class CircleFigure(StrEnum):
     CENTRE_DEVIATION = "centre-deviation"
     """Distance between the least-squares centre and the commanded one [CAL Table III]."""
     MEAN_RADIAL_ERROR = "mean-radial-error"
-    """Mean length of the bar less its nominal length about the commanded centre, by its size [CAL Table III]."""
+    """Size of the mean bar length about the commanded centre less the nominal length [CAL Table III]."""
     RADIAL_DEVIATION = "radial-deviation"
-    """F: the greater of Fmax and Fmin about the least-squares centre, by its size [ISO 230-4]."""
+    """F: the larger of |Fmax| and |Fmin| about the least-squares centre [ISO 230-4]."""
     BIDIRECTIONAL_CIRCULAR_DEVIATION = "bidirectional-circular-deviation"
-    """G(b): greatest minus least deviation of both directions together from their least-squares circle [ISO 230-4]."""
+    """G(b): greatest minus least deviation of both directions from their common least-squares circle [ISO 230-4]."""
     MEAN_BIDIRECTIONAL_RADIAL_DEVIATION = "mean-bidirectional-radial-deviation"
-    """D: radius of the least-squares circle of both directions less the nominal one, by its size [ISO 230-4]."""
+    """D: size of the difference between the common least-squares radius of both directions and the nominal radius [ISO 230-4]."""
     CIRCULAR_HYSTERESIS = "circular-hysteresis"
-    """H: greatest radial difference of both directions at one angle [ISO 230-4:1996]."""
+    """H: greatest radial difference between both directions at one angle [ISO 230-4:1996]."""
 
 
 OF_A_MODEL = (CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION, CircleFigure.MEAN_RADIAL_ERROR)
-"""Figures that every circle has in summaries, and that a model predicts."""
+"""Figures that summaries give for every circle and that a model predicts."""
 
 OF_BOTH_DIRECTIONS = frozenset(
     {
@@ -41,7 +41,7 @@ OF_BOTH_DIRECTIONS = frozenset(
         CircleFigure.CIRCULAR_HYSTERESIS,
     }
 )
-"""Figures of both directions of a test together."""
+"""Figures computed from both directions of a test."""
 
 FILTERED = frozenset(
     {
@@ -51,10 +51,10 @@ FILTERED = frozenset(
         CircleFigure.CIRCULAR_HYSTERESIS,
     }
 )
-"""Figures that a filter acts on."""
+"""Figures that a filter changes."""
 
 USUAL_UPR = 30
-"""Filter of tolerances that name none: cut off sharply at 30 undulations per revolution, as predictions are."""
+"""Filter of a tolerance without a stated filter: a sharp cut-off at 30 undulations per revolution, as in predictions."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Worst:
-    """The circle nearest to or farthest beyond a tolerance."""
+    """The circle with the largest figure, compared with its tolerance."""
 
     tolerance: Tolerance
     run: str

@@ -1,1 +1,1 @@
-"""Bar trajectories: recorded, cut, analysed; raw and centred are two types."""
+"""Record, cut and analyse bar lengths along circles; raw and centred circles are two types."""

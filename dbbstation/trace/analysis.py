@@ -18,12 +18,12 @@ MOST_STEPS = 20
 CENTRE_TOLERANCE_MM = 1e-12
 
 AGREED_MM = 1e-9
-"""Change of the centre below which angles about the ball are settled: a thousandth of what bars resolve [mm]."""
+"""Change of the centre below which angles about the ball have converged: a thousandth of a bar's resolution [mm]."""
 
 
 @dataclass(frozen=True)
 class CircleFigures:
-    """Three figures of a circular test [CAL Table III].
+    """Centre, mean radial error and circularity of a circular test [CAL Table III].
 
     Attributes:
         centre_mm: least-squares centre from the fixed ball, X and Y.
@@ -44,7 +44,7 @@ def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = N
     """Return centre, shape (2,) [mm], radius [mm] and deviations, shape (n,) [mm], of the least-squares circle [CAL eq 6].
 
     Args:
-        near_mm: approximate centre, shape (2,), to save steps.
+        near_mm: approximate centre, shape (2,), to save iterations.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -72,9 +72,9 @@ def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = N
 
 
 def _step(columns: Floats, left: Floats) -> Floats | None:
-    """Return the least-squares solution of few columns, shape (k,), or None.
+    """Return the least-squares solution for a few columns, shape (k,), or None.
 
-    Normal equations suffice, since Gauss-Newton corrects rounding; short arcs are solved orthogonally.
+    Normal equations suffice, because Gauss-Newton corrects rounding. Ill-conditioned short arcs are solved by orthogonal decomposition.
     """
     normal = columns @ columns.T
     least, *_, most = np.linalg.eigvalsh(normal)
@@ -85,7 +85,7 @@ def _step(columns: Floats, left: Floats) -> Floats | None:
 
 
 WORST_CONDITION = 1e6
-"""Condition of normal equations up to which they are taken: a whole turn has 2, a quarter of one some thousands."""
+"""Largest condition number for normal equations: a whole turn has 2, a quarter some thousands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +105,11 @@ class BallPath:
 
 
 def path_about_ball(theta_deg: Floats, radius_mm: Floats) -> BallPath:
-    """Return a path's least-squares circle, each point at its angle about the fixed ball.
+    """Return a path's least-squares circle, with points at their angles about the fixed ball.
 
-    Commanded angles refer to the commanded centre. From a ball at distance c a point turns by c/R. At commanded angles
-    a perfect circle would have the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13 µm at 2 mm.
+    Commanded angles refer to the commanded centre. If the ball is off this centre by c, angles about the ball differ by
+    up to c/R. At commanded angles a perfect circle would show the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13 µm at
+    2 mm.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -143,11 +144,11 @@ def measured_path(raw: RawCircle) -> BallPath:
 
 
 _PATHS: WeakKeyDictionary[RawCircle, BallPath] = WeakKeyDictionary()
-"""Paths of raw circles, which figures and analyses ask for."""
+"""Cached paths of raw circles, shared by figures and analyses."""
 
 
 def figures(raw: RawCircle, length_mm: Floats | None = None) -> CircleFigures:
-    """Return figures of a raw circle, cached, or of other lengths at its angles, shape (n,) [mm].
+    """Return figures of a raw circle, cached, or of other lengths, shape (n,) [mm], at its angles.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -160,11 +161,11 @@ def figures(raw: RawCircle, length_mm: Floats | None = None) -> CircleFigures:
 
 
 _MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
-"""Figures of raw circles as measured, which checks, fits and reports all ask for."""
+"""Cached figures of measured raw circles, shared by checks, fits and reports."""
 
 
 def _figures(raw: RawCircle, length_mm: Floats) -> CircleFigures:
-    # A path is two numbers a sample: who asks for figures only does not leave it in the memory.
+    # Figures alone do not cache the path, which needs two numbers per sample.
     path = _PATHS.get(raw) if length_mm is raw.length_mm else None
     if path is None:
         path = path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
@@ -176,7 +177,7 @@ def _figures(raw: RawCircle, length_mm: Floats) -> CircleFigures:
 
 
 def centred(raw: RawCircle) -> CentredCircle:
-    """Remove the centre [CAL III-A step 4], at commanded angles [CAL eq 6].
+    """Remove the best-fit centre [CAL III-A step 4] at commanded angles [CAL eq 6].
 
     Raises:
         TraceError: the points do not determine a circle.

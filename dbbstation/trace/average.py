@@ -25,7 +25,7 @@ def sector_of(raw: RawCircle, sectors: int) -> Integers:
 
 
 def averaged(raw: RawCircle, sectors: int) -> RawCircle:
-    """Return the circle with the mean sample of each sector, still raw."""
+    """Return a raw circle with one mean sample per sector."""
     sector = sector_of(raw, sectors)
     return replace(
         raw,
@@ -37,7 +37,7 @@ def averaged(raw: RawCircle, sectors: int) -> RawCircle:
 
 
 def means(values: Floats, group: Integers) -> Floats:
-    """Return each group's mean row, shape (groups, ...); groups count from 0 without gaps."""
+    """Return the mean row of each group, shape (groups, ...); groups are numbered from 0 without gaps."""
     count = np.bincount(group)
     if values.ndim == 1:
         return np.bincount(group, values) / count

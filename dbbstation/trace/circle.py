@@ -1,4 +1,4 @@
-"""Circles cut from recordings: raw ones calibrate a machine, centred ones cannot."""
+"""Circles cut from recordings: raw circles can calibrate a machine, centred circles cannot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class RawCircle(WithLogged):
     Attributes:
         t_s: since the recording's first sample.
         phi_deg: along the turn, 0 to 360.
-        start_uncertainty_deg: of the turn's begin, one standard deviation; zero with recorded angles.
+        start_uncertainty_deg: standard uncertainty of the turn's start; zero with recorded angles.
     """
 
     name: str
@@ -44,7 +44,7 @@ class RawCircle(WithLogged):
 
 @dataclass(frozen=True, eq=False)
 class CentredCircle:
-    """A circle after centre compensation [CAL eq 6], without its position.
+    """A circle after removal of its centre [CAL eq 6].
 
     Attributes:
         theta_deg: from +X towards +Y, shape (n,).

@@ -1,4 +1,4 @@
-"""Columns of a recorded run, each declared once."""
+"""Declarations of a recorded run's columns."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class ColumnKind(StrEnum):
     """Kinds of columns by their use."""
 
     TIME = "time"
-    """Cutting, sources that act in time."""
+    """Used by cutting and by sources that act in time."""
     LENGTH = "length"
-    """Every fit."""
+    """Used by every fit."""
     ANGLE = "angle"
-    """Cutting, in place of time."""
+    """Used by cutting instead of time."""
     TEMPERATURE = "temperature"
-    """Sources that follow thermometers."""
+    """Used by sources that follow thermometers."""
     CURRENT = "current"
-    """The channel of the motors."""
+    """Used by the analysis of motor currents."""
     OTHER = "other"
-    """Sources that ask for it by its name."""
+    """Used by sources that request it by name."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Column:
     """One numeric column.
 
     Attributes:
-        decimals: written by the station.
+        decimals: number that the station writes.
         size: greatest plausible absolute value.
     """
 
@@ -86,7 +86,7 @@ TIME, LENGTH, THETA = "t_s", "length_mm", "theta_deg"
 TIME_UNCERTAINTY = "t_uncertainty_s"
 REQUIRED = (TIME, LENGTH)
 STATUS = "status"
-"""What the instrument says of a sample; `STATUS_GOOD` or nothing where it can be trusted."""
+"""Column of the instrument's status; `STATUS_GOOD` or empty for a usable sample."""
 STATUS_GOOD = "ok"
 CRC = "crc"
 """Checksum of the line, always the last column."""
@@ -99,7 +99,7 @@ def is_known(name: str) -> bool:
 
 
 class WithLogged:
-    """Holder of logged columns: values by name, shape (n,)."""
+    """Base of classes with logged columns: values by name, shape (n,)."""
 
     logged: Logged
 
@@ -120,7 +120,7 @@ class WithLogged:
 
 
 def each(logged: Logged, change: Callable[[Floats], Floats]) -> Logged:
-    """Return every column changed alike."""
+    """Return every column changed by one function."""
     return {name: change(values) for name, values in logged.items()}
 
 

@@ -1,4 +1,4 @@
-"""Cut the full turn from a recording with feed-in, overshoot and feed-out."""
+"""Cut the full turn out of a recording with feed-in, overshoot and feed-out."""
 
 from __future__ import annotations
 
@@ -23,60 +23,60 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 LARGEST_GAP_DEG = 10.0
-"""A wider stretch without a sample is not a full circle any more."""
+"""Widest gap without samples in a full circle."""
 
 WRITTEN_DEG = 1e-5
-"""Angles that differ by less are the same: run files have six decimals [deg]."""
+"""Smaller differences of angles are rounding: run files have six decimals [deg]."""
 
 SHORTEST_TURN = 0.3
-"""A trace that is shorter than a turn by more than this share holds no turn at any feed that was meant."""
+"""A trace shorter than a turn by more than this share contains no turn at any plausible feed."""
 
 FEED_SEARCH = 0.2
-"""Share of the overshoot arc by which the two passes of the overlap may be shifted against each other."""
+"""Largest shift between both passes of the overlap, as a share of the overshoot arc."""
 
 FEED_TOLERANCE = 4e-3
-"""Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian. Feeds are
-mistaken by percents; real overlaps, which friction, warming and a chiller keep from agreeing, scatter by thousandths."""
+"""Largest relative feed error; one per thousand costs 0.3 µm at 100 µm of error per radian. Feed mistakes are percents.
+Friction, warming and chillers scatter real overlaps by thousandths."""
 
 NEGLIGIBLE_DEG = 0.008
-"""Uncertainty of an angle that costs less than 0.02 µm at 0.1 mm of error [deg]."""
+"""Negligible uncertainty of an angle: it costs less than 0.02 µm at 0.1 mm of error [deg]."""
 
 FEED_SIGMAS = 6.0
-"""A disagreement counts only where the overlap shows it this clearly above its noise."""
+"""Standard deviations by which the overlap must disagree with the feed to count."""
 
 
 TELLING = 1e-3
-"""Share of the feed that an overlap must determine it to, one standard deviation, to be asked at all: a compensated
-circle has hardly any shape left, and what is left of it would say any feed."""
+"""Largest relative standard deviation of a feed that an overlap determines. A compensated circle has hardly any shape,
+so it would match any feed."""
 
 SMALLEST_SHAPE_MM = 1e-4
-"""Shape of the overlap below which there is none: finer than any bar resolves [mm]."""
+"""Overlaps with less shape are unusable: bars do not resolve it [mm]."""
 
 PIECES = 24
-"""Stretches of the overlap that are compared; what differs within one counts as one."""
+"""Number of pieces of the overlap whose means are compared."""
 
 ROUNDS = 8
-"""Rounds of the comparison: each leaves a small share of what the one before was off by."""
+"""Iterations of the comparison; each reduces the error to a small share."""
 
 SHAPE_ORDER = 7
-"""Degree of the polynomial that gives the slope of the overlap's shape."""
+"""Degree of the polynomial for the slope of the overlap's shape."""
 
 STANDING_S = 0.3
-"""How long the trace is taken to stand still at either end [s]."""
+"""Assumed standstill at both ends of the trace [s]."""
 
 LARGEST_JUMP_MM = 0.2
-"""Between neighbouring samples; a machine wrong by a millimetre per radian moves the bar by 0.1 mm in a second [mm]."""
+"""Largest change between neighbouring samples [mm]; a machine error of a millimetre per radian moves the bar by 0.1 mm in a second."""
 
 OUTSIDE_FEEDINGS = 6.0
 INSIDE_FEEDINGS = 3.0
-"""How far from an edge, in durations of the feed-in, its two levels are read."""
+"""Windows outside and inside an edge for reading its two lengths, in durations of the feed-in."""
 
 
 def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircle:
     """Return the full turn of a recording.
 
-    Rows with angles are cut already. Otherwise the turn is centred between feed-in and feed-out, with angles by the
-    programmed feed, since controls dwell at corners.
+    Recorded angles determine the turn directly. Otherwise the turn is centred between feed-in and feed-out, because
+    controls dwell at corners; the programmed feed gives its angles.
 
     Raises:
         TraceError: no feed-in or feed-out, a gap, a bar off the circle, or another feed; lost samples are named first as a
@@ -96,9 +96,9 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
 
 
 def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
-    """Return missing and present samples of the turn, or of the recording without turn.
+    """Return the numbers of missing and present samples on the turn, or in the whole recording if no turn is found.
 
-    Unusable ones are missing. Losses outside the turn do no harm.
+    Unusable samples count as missing. Losses outside the turn are harmless.
     """
     try:
         t_s = _cut(recording, circle).t_s
@@ -108,7 +108,7 @@ def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
 
 
 def unusable_on_turn(recording: Recording, circle: Circle) -> int:
-    """Return unusable samples within the turn; 0 without a turn."""
+    """Return the number of unusable samples within the turn; 0 without a turn."""
     try:
         return _left_out(recording, _cut(recording, circle).t_s)
     except TraceError:
@@ -129,7 +129,7 @@ def _cut(recording: Recording, circle: Circle) -> RawCircle:
 
 
 _TURNS: WeakKeyDictionary[Recording, dict[Circle, RawCircle]] = WeakKeyDictionary()
-"""Turns that were cut out, which findings, expectations and figures all ask for."""
+"""Cached turns, shared by findings, expectations and figures."""
 
 
 def _turn(recording: Recording, circle: Circle) -> RawCircle:
@@ -149,10 +149,10 @@ def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float
 
 
 def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
-    """Return the uncertainty of the middle between edges along the travel, one standard deviation [deg].
+    """Return the standard uncertainty of the midpoint between both edges, as an angle [deg].
 
-    An edge between two samples has spacing / sqrt(12); their mean that over sqrt(2). Several samples on the feed-in
-    divide it by their number; negligible values are zero.
+    An edge between two samples has the uncertainty spacing / sqrt(12); the mean of two edges has 1 / sqrt(2) of it.
+    Several samples on the feed-in divide it by their number. Negligible values are set to zero.
     """
     spacing_s = float(np.median(np.diff(recording.good.t_s)))
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
@@ -173,8 +173,8 @@ def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
     t, length = recording.good.t_s, recording.good.length_mm
     if not len(t):
         raise TraceError("no sample of it can be used", where=recording.name, remedy="repeat the run")
-    # Half the feed-in below where the trace stands at its ends, so that a machine that is wrong by as much as the
-    # feed-in is long still shows it.
+    # The threshold is half the feed-in below the length at the trace's ends, so a machine error as large as the feed-in
+    # does not hide the edge.
     first = _first_below(t, length, circle)
     last = _first_below(t[::-1], length[::-1], circle)
     if first is None or last is None:
@@ -207,24 +207,24 @@ def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
 
 
 COUNTS_BACKWARDS = "the gauge counts the wrong way round: turn its counting direction at the display or encoder"
-"""What a length means that grows where the machine feeds in, and what to do."""
+"""Cause and remedy if the length grows while the machine feeds in."""
 
 
 def _counts_backwards(t: Floats, length: Floats, circle: Circle) -> bool:
-    """Return whether both ends lie below the middle by a feed-in, as with an inverted gauge."""
+    """Return whether both ends are shorter than the middle by a feed-in, as with an inverted gauge."""
     ends = (float(np.median(length[np.abs(t - end) <= STANDING_S])) for end in (t[0], t[-1]))
     return all(abs(float(np.median(length)) - end - circle.feed_in_mm) < 0.5 * circle.feed_in_mm for end in ends)
 
 
 def _first_below(t: Floats, length: Floats, circle: Circle) -> int | None:
-    """Return the first sample half a feed-in below the start's length, or None."""
+    """Return the first sample that is half a feed-in shorter than the start, or None."""
     standing = np.abs(t - t[0]) <= STANDING_S
     below = np.flatnonzero(length < float(np.median(length[standing])) - circle.feed_in_mm / 2.0)
     return int(below[0]) if len(below) and below[0] > 0 else None
 
 
 def _edge(t: Floats, length: Floats, circle: Circle, first: int) -> float:
-    """Return an edge's time on the way in, halfway between outside and inside [s]."""
+    """Return the time at which the length is halfway between outside and inside [s]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     after_s = np.abs(t - t[first]) * np.where(np.arange(len(t)) < first, -1.0, 1.0)
     outside = (after_s > -OUTSIDE_FEEDINGS * feeding_s) & (after_s < -feeding_s)
@@ -238,9 +238,9 @@ def _edge(t: Floats, length: Floats, circle: Circle, first: int) -> float:
 
 
 def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> None:
-    """Compare the feed with duration and overlap.
+    """Refuse a recording whose duration or overlap contradicts the programmed feed.
 
-    Dwelling only lengthens a trace; the overlap passes the same places twice.
+    Dwells only lengthen a trace. The overlap passes the same places twice.
     """
     duration = edges[1] - edges[0]
     at_least = circle.feed_mm_min * circle.swept_deg / circle.turning_deg_s / duration
@@ -259,7 +259,7 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
 
 
 def feed_off(found: tuple[float, float], recording: Recording, circle: Circle, edges: tuple[float, float]) -> float:
-    """Return how far a feed that the overlap shows is off, in units of its limit."""
+    """Return the error of the overlap's feed, in units of its limit."""
     t, length = recording.good.t_s, recording.good.length_mm
     larger = circle.bar_mm / float(np.median(length[(t > edges[0]) & (t < edges[1])]))
     limit = max(FEED_TOLERANCE * circle.feed_mm_min, FEED_SIGMAS * found[1])
@@ -267,9 +267,9 @@ def feed_off(found: tuple[float, float], recording: Recording, circle: Circle, e
 
 
 def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
-    """Return feed and standard deviation [mm/min] that match both passes of the overlap, cached; None if undetermined.
+    """Return the feed that matches both passes of the overlap, with standard deviation [mm/min], cached; None if undetermined.
 
-    The search starts at the programmed feed and at that of the duration.
+    The search starts at the programmed feed and at the feed computed from the duration.
     """
     found = _found_feed(recording, circle, edges)
     return None if found is None else (found[0], found[1])
@@ -280,7 +280,7 @@ def overlap_feed_under(
 ) -> tuple[float, float] | None:
     """Return the overlap's feed and standard uncertainty [mm/min] under known noise; None if undetermined.
 
-    Scatter of pieces understates correlated noise; the turn's noise counts if larger.
+    The scatter of pieces understates correlated noise, so the turn's noise replaces it if larger.
     """
     found = _found_feed(recording, circle, edges)
     if found is None:
@@ -291,7 +291,7 @@ def overlap_feed_under(
 
 
 def _found_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float, float] | None:
-    """Return feed, standard deviation [mm/min], and the latter per mm of white noise [1/min], cached."""
+    """Return feed and standard deviation [mm/min], and standard deviation per mm of white noise [1/min], cached."""
     found = _FEEDS.setdefault(recording, {})
     key = (circle, edges)
     if key not in found:
@@ -302,7 +302,7 @@ def _found_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
 _FEEDS: WeakKeyDictionary[Recording, dict[tuple[Circle, tuple[float, float]], tuple[float, float, float] | None]] = (
     WeakKeyDictionary()
 )
-"""Feeds that overlaps show, which cutting, figures and findings all ask for."""
+"""Cached feeds of overlaps, shared by cutting, figures and findings."""
 
 
 def _overlap_feed(
@@ -328,12 +328,12 @@ def _match(
 ) -> tuple[float, float, float, float] | None:
     """Return the turn's duration near `start_s` at which both passes match, with its uncertainty.
 
-    If the second pass comes T later, the difference is offset + slope (T - turn): regression on the common slope,
-    repeated.
+    If the second pass is T later, the passes differ by offset + slope (T - turn). The regression on their common slope
+    is iterated.
     """
     half_s = circle.overshoot_deg / FULL_TURN_DEG * start_s
     t, length = recording.good.t_s - middle, recording.good.length_mm
-    # The first pass lies about half a turn before the middle; a wrong feed moves it, so its inner part is used.
+    # The first pass is about half a turn before the middle. A wrong feed shifts it, so only its inner part is used.
     rows = np.abs(t + start_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
     when, first = t[rows], length[rows]
     if len(when) < PIECES:
@@ -357,7 +357,7 @@ def _match(
     remaining = float(np.sqrt(left @ left / (PIECES - 2)))
     if not spread > 0.0:
         return turn, np.inf, remaining, np.inf
-    # A piece is a mean of so many differences of two samples.
+    # Each piece is the mean of len(when) / PIECES differences of two samples.
     of_noise = float(np.sqrt(2.0 * PIECES / len(when) / spread))
     return turn, remaining / float(np.sqrt(spread)), remaining, of_noise
 
@@ -374,8 +374,8 @@ def _slopes(t_s: Floats, piece: Integers) -> Callable[[Floats], Floats]:
 def one_turn_deg(theta_deg: Floats, circle: Circle) -> Floats:
     """Return progress along one turn at recorded angles, NaN outside, shape (n,) [deg].
 
-    Of a longer run the first whole turn from the plan's start counts, else the middle one. Slight overlaps at its ends do
-    not move across.
+    From a longer run, the first whole turn from the plan's start is selected, else the middle one. Samples slightly
+    beyond the ends do not wrap around.
     """
     travelled = circle.direction.sign * (np.unwrap(theta_deg, period=FULL_TURN_DEG) - circle.start_deg)
     first, last = float(travelled.min()), float(travelled.max())
@@ -392,7 +392,7 @@ def one_turn_deg(theta_deg: Floats, circle: Circle) -> Floats:
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: Flags) -> RawCircle:
-    """Return usable rows of the turn; refuse holes and a bar off the circle."""
+    """Return the turn's usable rows; refuse gaps, jumps and lengths far from the circle."""
     if recording.usable is not None:
         rows = rows & recording.usable
     phi = phi_deg[rows]
@@ -415,7 +415,7 @@ def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: Flags
             remedy="check balls, cups and cable, and repeat the run",
         )
     off = np.abs(length - circle.bar_mm)
-    # Recorded angles need no edges: only the bar's travel bounds how far such a machine may be off.
+    # Recorded angles need no edges, so only the bar's travel limits the machine's error.
     timed = recording.theta_deg is None
     if off.max() > (circle.feed_in_mm if timed else USUAL_STROKE_MM):
         worst = int(np.argmax(off))

@@ -1,4 +1,4 @@
-"""Ways of feed-in and feed-out by the readings, the only commanded change of length."""
+"""Measured lengths of feed-in and feed-out, the only commanded changes of length."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 LEFT_OUT_DEG = 2.0
-"""Arc beside a corner in which the machine still gathers speed, or brakes: 20 ms at a feed of 1000 mm/min and 1 m/s² are less, and so is
-what a length of 0.3 s at the corner shifts all angles by [deg]."""
+"""Ignored arc beside a corner, where the machine accelerates or brakes [deg]. Acceleration to 1000 mm/min at 1 m/s²
+takes 20 ms, which is less; a dwell of 0.3 s shifts angles by less, too."""
 
 READ_DEG = 20.0
-"""Arc behind that whose readings say what the length at the corner is [deg]: slow forms are straight or bent on it, not more."""
+"""Following arc, whose readings give the length at the corner [deg]; low undulations are at most parabolic on it."""
 
 SHAPE = 2
 """Degree of the polynomial through the readings of that arc."""
 
 FEWEST = 8
-"""Readings of an arc: five more than the polynomial has numbers."""
+"""Fewest readings of an arc: five more than the polynomial's coefficients."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class FeedingWay:
     """A feed-in or a feed-out.
 
     Attributes:
-        way_um: length outside less at the corner.
+        way_um: length outside less length at the corner.
     """
 
     phi_deg: float
@@ -44,7 +44,7 @@ class FeedingWay:
 def feeding_ways(
     recording: Recording, circle: Circle, edges: tuple[float, float]
 ) -> tuple[FeedingWay, FeedingWay] | None:
-    """Return feed-in and feed-out ways by the readings, or None for too few samples."""
+    """Return the measured feed-in and feed-out, or None for too few samples."""
     good = recording.good
     phi = progress_deg(good, circle, edges)
     begin = _way(good, circle, good.t_s - edges[0], phi + circle.overshoot_deg)
@@ -65,6 +65,6 @@ def _way(recording: Recording, circle: Circle, behind_s: Floats, along_deg: Floa
     left = recording.length_mm[chosen] - columns @ found
     sigma = float(np.sqrt(left @ left / (len(left) - SHAPE - 1)))
     at_corner = sigma * float(np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0]))
-    # Whether the machine stands outside nobody knows: how its readings scatter there counts in full.
+    # The machine may move outside, so the scatter of readings there counts in full, not divided by sqrt(n).
     scatter = float(np.std(outside)) if len(outside) > 1 else sigma
     return 1e3 * (float(np.median(outside)) - float(found[0])), 1e3 * float(np.hypot(at_corner, scatter))

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 LEAST_CELLS = 4096
 CELLS_PER_SAMPLE = 4
-"""Cells of the turn into which samples are shared out, per sample: the sharing costs a thousandth of an undulation that the
-samples themselves can just show."""
+"""Grid cells per sample. Distribution to the cells loses a thousandth of the shortest undulation that the samples
+resolve."""
 
 
 def transmission(undulations: Floats, cut_off_upr: float) -> Floats:
@@ -29,7 +29,7 @@ def gaussian(theta_deg: Floats, values: Floats, cut_off_upr: float) -> Floats:
     """Return a closed profile without short undulations, at the same angles.
 
     Args:
-        cut_off_upr: half of whose amplitude passes.
+        cut_off_upr: undulation that passes with half its amplitude.
     """
     cells = max(LEAST_CELLS, 1 << int(np.ceil(np.log2(CELLS_PER_SAMPLE * len(theta_deg)))))
     place = np.mod(theta_deg, FULL_TURN_DEG) / FULL_TURN_DEG * cells

@@ -10,20 +10,20 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 _OFF = 0.25
-"""How far a spacing may be from a whole number of periods [periods]: a device's own clock keeps to hundredths."""
+"""Largest deviation of a spacing from a whole number of periods [periods]; a device's clock deviates by hundredths."""
 
 _REGULAR = 0.9
-"""Share of spacings, and of wide ones, that must be whole numbers of periods for wide ones to be losses."""
+"""Share of all spacings, and of wide spacings, that must be whole periods before wide spacings count as losses."""
 
 
 def lost_samples(t_s: Floats) -> int:
-    """Return missing samples by times of a fixed rate; 0 without a fixed rate."""
+    """Return the number of samples missing from a fixed rate; 0 without a fixed rate."""
     if len(t_s) < _FEWEST:
         return 0
     periods = np.diff(t_s)
     periods /= np.median(periods)
     whole = np.round(periods)
-    periods -= whole  # in its place: a recording may have ten million samples
+    periods -= whole  # in place, because a recording may have ten million samples
     fits = np.abs(periods, out=periods) < _OFF
     wide = whole > 1.0
     if not wide.any() or np.mean(fits & (whole > 0.0)) < _REGULAR or np.mean(fits[wide]) < _REGULAR:
@@ -42,7 +42,7 @@ def share_lost(lost: int, kept: int, unusable: int = 0) -> str:
 
 
 def too_many_lost(lost: int, kept: int, largest_percent: float, unusable: int = 0) -> str:
-    """Return the fault of too many lost samples; empty within the limit.
+    """Return a message if too many samples are lost; else an empty text.
 
     Args:
         unusable: recorded but unusable, of these.
@@ -56,4 +56,4 @@ AFTER_LOSS = "look after the cable and after programs that keep the computer bus
 """What to do about lost samples."""
 
 _FEWEST = 10
-"""Samples below which there is no telling what the rate was."""
+"""Fewest samples that determine the rate."""

@@ -14,19 +14,19 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 FEWEST_POINTS = 4
-"""Three points lie on one circle: the zone of fewer than four has no width and no place."""
+"""Three points are always on one circle, so a zone needs four."""
 
 SECTORS = 6
-"""Parts of the turn whose highest and lowest points the search begins with: the four that touch lie apart."""
+"""The search starts with the highest and lowest point of each sector, because the four touching points are far apart."""
 
 AGREED_MM = 1e-10
-"""Width by which a point may stick out of the zone: far below what any bar resolves [mm]."""
+"""A point may protrude this far from the zone: much less than a bar's resolution [mm]."""
 
 MOST_ROUNDS = 60
 """Rounds of the search. Traces with noise need five to fifteen."""
 
 PARALLEL = 1e-12
-"""Sine below which two bisectors are parallel: they meet nowhere."""
+"""Sine of the angle below which two bisectors count as parallel."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,9 @@ class MinimumZone:
 def minimum_zone(points_mm: Floats) -> MinimumZone:
     """Return the exact minimum zone of a closed path.
 
-    Two outer and two inner points determine it, with crossing chords [Rivlin, Approximation by circles, Computing 21
-    (1979)]; its centre is where two bisectors meet. All pairs of a few points are tried, and protruding points join them
-    until none is left.
+    Two outer and two inner points with crossing chords determine it [Rivlin, Approximation by circles, Computing 21
+    (1979)]; its centre is the intersection of two bisectors. The search tries all pairs of a few points and adds
+    protruding points until no point protrudes.
 
     Raises:
         TraceError: fewer than four different points.
@@ -71,7 +71,7 @@ def minimum_zone(points_mm: Floats) -> MinimumZone:
 
 
 def _extremes(points_mm: Floats) -> Integers:
-    # Sorting all points takes longer than the search: those of a sound path differ from the first.
+    # Sorting all points takes longer than the search, so the first points are checked before.
     first = points_mm[:FEWEST_POINTS]
     if len(np.unique(first, axis=0)) < FEWEST_POINTS and len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
         raise TraceError("it has fewer than four points", remedy="record more of the turn")
@@ -88,7 +88,7 @@ def _extremes(points_mm: Floats) -> Integers:
 
 
 def _best_centre(points_mm: Floats) -> Floats:
-    """Return the zone's centre for a few points by all bisector crossings, shape (2,) [mm]."""
+    """Return the best centre for a few points among all bisector intersections, shape (2,) [mm]."""
     pairs = np.array(list(combinations(range(len(points_mm)), 2)))
     first, second = points_mm[pairs[:, 0]], points_mm[pairs[:, 1]]
     along = second - first
@@ -103,7 +103,7 @@ def _best_centre(points_mm: Floats) -> Floats:
     x = (offset[one] * along[other, 1] - offset[other] * along[one, 1]) / sine
     y = (along[one, 0] * offset[other] - along[other, 0] * offset[one]) / sine
     centres = np.column_stack([x, y])
-    # The zone of four points that lie far apart is no wider than that of all: most centres are out by it.
+    # The zone of four distant points is at most as wide as the zone of all, so it excludes most centres.
     outermost = points_mm[np.concatenate([points_mm.argmin(axis=0), points_mm.argmax(axis=0)])]
     at_least = _widths(centres, outermost)
     likely = int(np.argmin(at_least))
@@ -112,6 +112,6 @@ def _best_centre(points_mm: Floats) -> Floats:
 
 
 def _widths(centres_mm: Floats, points_mm: Floats) -> Floats:
-    # Points first: ranges are then taken row by row of a thousand centres, not centre by centre of a dozen points.
+    # Points are the first axis, so NumPy computes ranges over long rows of centres.
     across, along = (points_mm[:, k, None] - centres_mm[:, k] for k in (0, 1))
     return np.asarray(np.ptp(np.sqrt(across * across + along * along), axis=0))

@@ -1,4 +1,4 @@
-"""Both passes of the overlap: the same places, one turn apart."""
+"""Differences between both passes of the overlap, one turn apart."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 MARGIN_DEG = 5.0
-"""Stretch behind the feed-in and before the feed-out that does not count: the machine gathers speed there, and where the
-overlap begins is known to the dwell at the corners, 0.3 s, which is 2 degrees at the usual feed [deg]."""
+"""Ignored arc after the feed-in and before the feed-out [deg]. The machine accelerates there, and corner dwells of 0.3
+s make the overlap's start uncertain by 2 degrees at the usual feed."""
 
 FEWEST_SAMPLES = 20
-"""Samples of the overlap below which it says nothing."""
+"""Fewest samples of a usable overlap."""
 
 
 @dataclass(frozen=True, eq=False)
 class Passes:
-    """Second pass less first."""
+    """Readings of the second pass less the first."""
 
     phi_deg: Floats
     apart_um: Floats
@@ -37,12 +37,12 @@ class Passes:
         return float(self.apart_um.mean())
 
     def u_mean_um(self, sigma_um: float) -> float:
-        """Return its standard uncertainty for noise `sigma_um` per sample [µm]."""
+        """Return the standard uncertainty of `mean_um` for noise `sigma_um` per sample [µm]."""
         return sigma_um * float(np.sqrt(2.0 / len(self.apart_um)))
 
 
 def passes_of(recording: Recording, circle: Circle) -> Passes | None:
-    """Return both passes of the overlap; None if cut or too short.
+    """Return the difference of both passes; None for a recording already cut or too short an overlap.
 
     Raises:
         TraceError: feed-in or feed-out is missing.

@@ -1,9 +1,9 @@
-"""Possible lengths of the bar by the machine's speed: false readings without checksum show.
+"""Detect false readings by the greatest possible speed of the bar.
 
-The distance changes by at most F times the time (triangle inequality). On the full turn only errors change it: within the
-feed-in A and with at most n undulations, by at most n A per radian (Bernstein's inequality). With A = 1.5 mm, n = 3, F =
-1000 mm/min, radius 150 mm and override that is 0.6 mm/s: 43 um between readings at 14 per second, 2.4 um at 250. Sudden
-errors are added. A reading beyond is doubtful unless later ones agree with it.
+In time t the length changes by at most F t (triangle inequality). On the full turn only errors change it. Errors below
+the feed-in A with at most n undulations change by at most n A per radian (Bernstein's inequality). With A = 1.5 mm, n =
+3, F = 1000 mm/min, radius 150 mm and override, the limit is 0.6 mm/s: 43 um between readings at 14 per second, 2.4 um
+at 250. `SUDDEN_MM` is added. A reading beyond is doubtful unless later readings agree with it.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
 
 OVERRIDE = 1.2
-"""Greatest feed override of usual controls: a machine that runs faster than programmed is for others to notice."""
+"""Greatest feed override of usual controls; other checks detect a wrong feed."""
 
 UNDULATIONS = 3
-"""Per revolution, of the errors that are as large as the feed-in: centre and scale one, tilts and squareness two, struts three."""
+"""Highest undulations per revolution of errors as large as the feed-in: centre one, tilts and squareness two, struts three."""
 
 SUDDEN_MM = 0.05
-"""What a machine does between two readings however near: backlash at a reversal, a spike of friction, vibration [mm]. Tens of
-micrometres at a worn machine; calibrated ones stay below ten."""
+"""Largest sudden change between two readings [mm], by backlash at a reversal, friction spikes or vibration: tens of
+micrometres on a worn machine, below ten on a calibrated one."""
 
 HALF_WIDTH = float(np.sqrt(3.0))
-"""Half the width of a rectangle by its standard uncertainty [GUM 4.3.7]."""
+"""Half-width of a rectangular distribution over its standard deviation [GUM 4.3.7]."""
 
 AGREEING = 3
-"""Readings in a row that agree with each other and not with those before: then it was the bar."""
+"""Consecutive doubtful readings that are accepted if they agree with each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +42,10 @@ class _Seen:
 
 
 class Reachable:
-    """Separates possible lengths from impossible ones, in time order.
+    """Tells possible readings from impossible ones, in time order.
 
     Args:
-        circle: None: the bar rests on its calibrator.
+        circle: None if the bar rests on its calibrator.
     """
 
     def __init__(self, circle: Circle | None) -> None:
@@ -61,7 +61,7 @@ class Reachable:
         self._on_turn_mm_s = min(across_mm_s, feed_mm_s)
 
     def note(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0) -> None:
-        """Note a reading at unknown speed, without judging it."""
+        """Accept a reading without a check, because the speed is unknown."""
         self._believe(_Seen(t_s, length_mm, t_uncertainty_s))
 
     @classmethod
@@ -75,7 +75,7 @@ class Reachable:
         """Return why a reading is impossible, or an empty text.
 
         Args:
-            on_turn: on the full turn, not its approach.
+            on_turn: on the full turn, not on its approach.
         """
         one, last = _Seen(t_s, length_mm, t_uncertainty_s), self._good
         if last is None or self._follows(last, one, on_turn=on_turn):

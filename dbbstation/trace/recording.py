@@ -20,7 +20,7 @@ class Recording(WithLogged):
     Attributes:
         t_s: host time since the first sample, strictly rising.
         length_mm: between ball centres, raw.
-        theta_deg: commanded, from +X towards +Y, of a cut recording; None: find the circle in the trace.
+        theta_deg: commanded, from +X towards +Y, of a cut recording; None if the circle must be found in the trace.
         usable: False for bad and doubtful samples, which stay.
     """
 
@@ -37,7 +37,7 @@ class Recording(WithLogged):
     @property
     def good(self) -> Recording:
         """Return the usable samples, for all calculations."""
-        # Not kept where it is the recording itself: one that names itself stays in the memory until the collector of garbage comes by.
+        # A recording that equals its good part is not cached: a reference to itself would delay freeing its memory.
         return self if self.usable is None or self.usable.all() else self._usable_rows
 
     @cached_property

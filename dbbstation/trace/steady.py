@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 BATCHES = 10
-"""Readings that follow each other closely see the same vibration and the same draught; their batches hardly do."""
+"""Close readings share vibration and draught; means of ten batches are nearly independent."""
 
 
 @dataclass(frozen=True)
 class Steady:
-    """Mean of readings of one length.
+    """Mean of repeated readings of one length.
 
     Attributes:
         drift_mm: last batch's mean minus the first's.
@@ -33,11 +33,11 @@ class Steady:
 def steady(readings_mm: Floats, resolution_mm: float | None = None) -> Steady:
     """Return mean and standard uncertainty of readings of one length.
 
-    Type A is the standard deviation of the mean of ten batches, for correlated readings [GUM 4.2.3, 4.2.7]. The
-    resolution adds d / sqrt(12) [GUM F.2.2.1].
+    Type A is the standard deviation of the mean of ten batches, because readings are correlated [GUM 4.2.3, 4.2.7]. The
+    resolution d adds d / sqrt(12) [GUM F.2.2.1].
 
     Args:
-        resolution_mm: None: the smallest difference.
+        resolution_mm: None for the smallest difference of readings.
 
     Raises:
         ValueError: fewer readings, or all equal without resolution.

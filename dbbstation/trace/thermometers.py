@@ -1,4 +1,4 @@
-"""Thermometers over a session as curves."""
+"""Temperature curves over a session."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ def logged_curve(
 ) -> tuple[Floats, Floats]:
     """Return a session's temperature curve: rising times [s] and temperatures [degC], two points per run, shape (q,) each.
 
-    Of all curves within half a step of each half run's mean, the least bent is taken. Changes within half a run are
-    lost.
+    Among all curves within half a display step of each half run's mean, the least bent is chosen. Changes within half a
+    run are lost.
     """
     halves = [half for run in runs for half in zip(*(np.array_split(one, 2) for one in run), strict=True)]
     means = {float(one.mean()): float(degc.mean()) for one, degc in halves if len(one)}
@@ -31,7 +31,7 @@ def logged_curve(
         return time_s, shown
     slope = np.diff(np.eye(len(time_s)), axis=0) / gaps[:, None]
     bending = np.diff(slope, axis=0) / np.sqrt(0.5 * (gaps[1:] + gaps[:-1]))[:, None]
-    # In units of half a step about what was shown, so that bounds are plus and minus one.
+    # In units of half a display step about the displayed value, so bounds are plus and minus one.
     from scipy.optimize import lsq_linear  # noqa: PLC0415 - takes a fifth of a second; few sessions need it
 
     found = lsq_linear(bending * half_step, -bending @ shown, bounds=(-1.0, 1.0))
@@ -39,13 +39,13 @@ def logged_curve(
 
 
 _BENDS = 3
-"""Points of the shortest curve that can be bent."""
+"""Fewest points of a curve that can be bent."""
 
 SHOWN_K = 1e-3
-"""Finest step that a thermometer is taken to show, and that recordings have [K]."""
+"""Finest display step of a thermometer, as in recordings [K]."""
 
 
 def _resolution(degc: Floats) -> float:
-    """Return the greatest common step of shown differences [K]; zero for one value."""
+    """Return the greatest common divisor of displayed differences [K]; zero for one value."""
     steps = np.diff(np.unique(np.round(degc / SHOWN_K).astype(np.int64)))
     return SHOWN_K * float(np.gcd.reduce(steps)) if len(steps) else 0.0

@@ -31,21 +31,21 @@ DONE, FAILED, USAGE = 0, 1, 2
 _DEBUG, _VERBOSE, _SETTINGS = "--debug", "--verbose", "--settings"
 
 COMMANDS = {
-    "bar": "Read the bar on its calibrator, and keep what it read.",
+    "bar": "Measure the bar on its calibrator, and keep its length.",
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
     "circles": "Figures of measured circles after ISO 230-4, and findings.",
-    "compare": "Where two sessions differ, and which variable that follows.",
+    "compare": "Where two sessions differ, and what the difference follows.",
     "control": "Correct inside the control: its kinematics or parameters.",
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",
     "demo": "The whole job on a simulated machine, start to end.",
-    "evaluate": "Circle by circle: what a model leaves of recordings.",
+    "evaluate": "Residuals of recordings under a model, circle by circle.",
     "export": "Sessions as one tidy table, CSV or Parquet.",
-    "fleet": "One task on many sessions; which machines are unlike.",
+    "fleet": "One task on many sessions; which machines differ.",
     "history": "A folder of sessions as trends, and what changed.",
     "identify": "One strut drive: mass, friction, further causes.",
-    "import": "Take recordings that another program made into a session.",
+    "import": "Import recordings of another program into a session.",
     "instrument": "Instruments: list, ports, monitor, replay, emulate.",
     "jig": "A jig file from a CMM sheet; how well holders repeat.",
     "measure": "Measure a plan, test by test, into a session folder.",
@@ -54,10 +54,10 @@ COMMANDS = {
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "report": "A session as one HTML file: verdict, figures with U.",
-    "settings": "What the shop has set, and where each value comes from.",
+    "settings": "The shop's settings, and where each value comes from.",
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
-    "sources": "The causes of error that are known, and how to confirm them.",
+    "sources": "The known causes of error, and how to confirm them.",
     "station": "Measure a plan on a terminal screen.",
 }
 """Name and one line of help of every command; each is a module of this folder with a command of its name."""
@@ -75,14 +75,14 @@ COMMANDS = {
 @click.option(
     _SETTINGS,
     metavar="FILE",
-    help="Read the shop's settings from this file alone; may stand anywhere on the line.",
+    help="Read the shop's settings from this file alone; allowed anywhere on the line.",
 )
 @click.option(
     _VERBOSE,
     is_flag=True,
-    help="Show on standard error what goes into the log; may stand anywhere on the line.",
+    help="Show the log on standard error too; allowed anywhere on the line.",
 )
-@click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
+@click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; allowed anywhere on the line.")
 def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: ARG001 - read from the line before
     """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
 

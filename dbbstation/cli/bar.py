@@ -32,7 +32,7 @@ class BarOptions:
     temp_c: Annotated[float, Option("Temperature of the bar [degC].", least=-30.0, most=80.0)]
     temp_uncertainty_k: Annotated[
         float,
-        Option("Standard uncertainty of that temperature [K].", flag="--temp-u-k", least=0.001, most=10.0),
+        Option("Standard uncertainty of the bar's temperature [K].", flag="--temp-u-k", least=0.001, most=10.0),
     ] = USUAL_TEMP_UNCERTAINTY_K
     expansion_um_m_k: Annotated[
         float,
@@ -45,15 +45,17 @@ class CalibratorOptions:
     """The calibrator."""
 
     calibrator_serial: Annotated[str, Option("Serial number of the calibrator.")]
-    calibrator_mm: Annotated[float, Option("Its length on the certificate, at 20 degC.", least=20.0, most=2000.0)]
+    calibrator_mm: Annotated[
+        float, Option("Length of the calibrator at 20 degC, from its certificate [mm].", least=20.0, most=2000.0)
+    ]
     calibrator_u_um: Annotated[
-        float, Option("Standard uncertainty u of the calibrator's length (U/2).", least=0.0, most=100.0)
+        float, Option("Standard uncertainty u of the calibrator's length (U/2) [µm].", least=0.0, most=100.0)
     ]
     certified: Annotated[str, Option("Date of the certificate.", metavar="YYYY-MM-DD")]
     valid_until: Annotated[
-        str | None, Option("Last day on which it holds  [default: five years].", metavar="YYYY-MM-DD")
+        str | None, Option("Last day on which the certificate is valid  [default: five years].", metavar="YYYY-MM-DD")
     ] = None
-    certificate: Annotated[str, Option("Number of the certificate, and who issued it.")] = ""
+    certificate: Annotated[str, Option("Number and issuer of the certificate.")] = ""
 
     @property
     def data(self) -> dict[str, object]:
@@ -77,15 +79,16 @@ def bar(
     count: Annotated[int, Option("Number of readings.", least=20, most=1_000_000)] = USUAL_READINGS,
     resolution_um: Annotated[
         float | None,
-        Option("Last digit of the display  [default: as readings show].", least=0.0001, most=100.0),
+        Option("Size of the display's last digit [µm]  [default: found from the readings].", least=0.0001, most=100.0),
     ] = None,
     out: Annotated[Path, replace(o.OUT, metavar="BAR.yaml")],
     force: o.Force = False,
 ) -> Answer:
-    r"""Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
+    r"""Measure the bar's length on its calibrator and write the bar file that `measure --bar FILE` needs.
 
-    Put the bar on the calibrator, a block of known length such as of Zerodur, and wait until it has the temperature of the
-    shop. The readings are averaged. The bar's error is noted; recordings are never corrected. `calibrate` accounts for this error, its uncertainty and the bar's growth since.
+    Put the bar on the calibrator, a block of known length. Wait until the bar has the temperature of the shop. The
+    command averages the readings. The file states the bar's error; recordings are never corrected. `calibrate` accounts
+    for this error, its uncertainty and the bar's thermal growth since.
 
     \b
     Examples:

@@ -53,7 +53,7 @@ def check(
     schema: Annotated[
         str | None,
         Option(
-            "Print the JSON Schema of a format, such as dbb-plan/1, or of a command's --json, such as calibrate, and stop.",
+            "Print a JSON Schema and stop. FORMAT is a file format, such as dbb-plan/1, or a command with --json, such as calibrate.",
             metavar="FORMAT",
         ),
     ] = None,
@@ -64,12 +64,14 @@ def check(
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
     its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as by `dbbstation circles --findings` without a model. Findings are printed as notes.
 
-    Given plans and one machine, the command also makes a dry run: it checks the whole path of every program that `dbbstation program` would write against travel and feeds, and lists all faults.
+    With plans and one machine, the command also makes a dry run. The dry run checks travel and feeds along the whole
+    path of every program that `dbbstation program` would write.
 
-    The summary of a session ends with its anchor, the link of the last event of its log. Note it elsewhere, as reports do: with
-    --anchor HASH, sixteen digits or more of it, the command reports later changes.
+    The summary of a session ends with its anchor, the hash of the last event of its log. Note the anchor elsewhere, as
+    reports do. With --anchor HASH, at least its first sixteen digits, the command reports later changes.
 
-    With --instrument, the command states the points per turn at each plan's feeds, and which figures they do not resolve.
+    With --instrument, the command states the points per turn at each plan's feeds, and the figures that these points do
+    not resolve.
 
     \b
     Examples:

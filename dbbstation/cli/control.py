@@ -64,16 +64,16 @@ def kinematics(
     thermometers: Annotated[
         Names,
         Option(
-            "Thermometers of the control, as columns without `_temp_c`; may be given more than once.",
+            "Thermometers of the control: the names of their columns without `_temp_c`; may be given more than once.",
             metavar="NAME,...",
         ),
     ] = (),
     force: o.Force = False,
 ) -> Answer:
-    r"""Write a LinuxCNC kinematics component that takes the real machine to the commanded pose.
+    r"""Write a LinuxCNC kinematics component that moves the real machine to the commanded pose.
 
-    The component contains every source that depends on pose, strut length or thermometers. A source that depends on the way so far, such as
-    play, is refused by name; --leave-out leaves it uncorrected.
+    The component contains every source that depends on pose, strut length or thermometers. A source that depends on
+    earlier motion, such as play, is refused by name; --leave-out leaves it uncorrected.
 
     \b
     Examples:
@@ -112,13 +112,17 @@ def parameters(
     ] = None,
     tilt_deg: Annotated[float, Option("Greatest A and B [deg].", least=0.0, most=90.0)] = 15.0,
     ini: Annotated[
-        Path | None, Option("INI file in use: tables and backlash that it has are named.", kind="file")
+        Path | None,
+        Option(
+            "INI file in use. The command names the joint tables and backlash that it contains already.", kind="file"
+        ),
     ] = None,
     force: o.Force = False,
 ) -> Answer:
     r"""Write values and joint tables for LinuxCNC's own genhexkins, refitted over a volume.
 
-    A less exact alternative to `control kinematics`: refitted values imitate what genhexkins lacks. They do not describe the machine. The table states the remaining errors of the tool in the volume.
+    The result is less exact than with `control kinematics`. The refitted values imitate effects that genhexkins
+    lacks; they do not describe the machine. The table states the remaining errors of the tool in the volume.
 
     \b
     Examples:

@@ -32,8 +32,9 @@ def demo(
 
     Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. The commands are shown as they run. Their files stay in the folder.
 
-    With --control, LinuxCNC drives the machine: nominal, with compensated programs, with refitted parameters, and with a
-    kinematics of the model. An interrupted comparison goes on if the command is repeated with the same --out.
+    With --control, LinuxCNC drives the machine in four ways: nominal, with compensated programs, with refitted
+    parameters, and with a kinematics of the model. To continue an interrupted comparison, repeat the command with the
+    same --out.
 
     \b
     Examples:

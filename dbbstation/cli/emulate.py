@@ -40,7 +40,7 @@ def emulate(
     wait: Annotated[
         bool,
         Option(
-            "Let machine time pass only during runs, as fast as samples are read, for `measure --auto`, the same on any computer."
+            "For `measure --auto`: let machine time pass only during runs, as fast as samples are read. Results are then the same on any computer."
         ),
     ] = False,
     noise_um: Annotated[float, Option("Standard deviation of the noise of a reading [µm].", least=0.0)] = 0.3,
@@ -50,8 +50,9 @@ def emulate(
 ) -> None:
     r"""Run a virtual hexapod with a ball bar, as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.
 
-    Prints the port, and a control address on this computer that starts circles: one line of text per command, one line
-    of JSON per answer. Without --truth the machine has random kinematic errors of 0.1 mm. Its mountings, ball coordinates, bar and readings scatter as stated in plan and options.
+    Prints the port, and a control address on this computer that starts circles. The address reads one line of text per
+    command and answers with one line of JSON. Without --truth the machine has random kinematic errors of 0.1 mm. Its
+    mountings, ball coordinates, bar and readings scatter as stated in plan and options.
 
     \b
     Commands at the control address:

@@ -41,21 +41,26 @@ def fleet(
     exclude: o.Exclude = (),
     false_alarms: Annotated[float, Option(o.FALSE_ALARMS, least=1e-6, most=0.5)] = 0.01,
     out: Annotated[Path, replace(o.OUT, kind="folder", metavar="FOLDER")] = Path("fleet"),
-    table: Annotated[Path | None, Option("Write the table here too: a .csv or .parquet file.", kind="file")] = None,
-    jobs: Annotated[int | None, Option("Processes of this computer  [default: one for each core].", least=1)] = None,
+    table: Annotated[Path | None, Option("Write the table here too, as a .csv or .parquet file.", kind="file")] = None,
+    jobs: Annotated[
+        int | None, Option("Number of processes on this computer  [default: one for each core].", least=1)
+    ] = None,
     scheduler: Annotated[
-        str, Option("Dask scheduler that does it, such as tcp://server:8786.", metavar="ADDRESS")
+        str,
+        Option(
+            "Address of the Dask scheduler that distributes the sessions, such as tcp://server:8786.", metavar="ADDRESS"
+        ),
     ] = "",
     apart: Annotated[bool, Option("Count each session without a serial number as a separate machine.")] = False,
     anew: o.Anew = False,
     force: o.Force = False,
     as_json: o.Json = False,
 ) -> None:
-    r"""Do one task on every session of some folders, and show which machines are unlike their sisters.
+    r"""Run one task on every session of some folders, and show which machines differ from others of their kind.
 
-    Writes into --out one table, TASK.csv, one page with a row for each machine, TASK.html, and what each session gave:
-    everything as JSON, the model or the report. A session that fails is named and the others are done; the exit code is 1
-    then. Results with the same inputs, options and program are reused, so that interrupted work continues.
+    The folder --out gets a table, TASK.csv, a page with a row for each machine, TASK.html, and each session's result:
+    its JSON, model or report. If a session fails, the command names it and continues; the exit code is then 1. Results
+    with the same inputs, options and program are reused, so that interrupted work continues.
 
     \b
     Examples:

@@ -47,7 +47,7 @@ def import_(
     run: Annotated[
         tuple[str, ...],
         Option(
-            "Run of a file that does not state it, such as old1.csv=a-ccw or old1.csv=a-ccw-2; several in order.",
+            "Run in a file that does not name it, such as old1.csv=a-ccw or old1.csv=a-ccw-2. Several runs of a file follow in their order.",
             metavar="FILE=TEST-DIRECTION,...",
             whole=True,
         ),
@@ -63,22 +63,25 @@ def import_(
     trust: Annotated[
         tuple[Literal["unit", "centre"], ...],
         Option(
-            "Accept numbers that seem to have another unit, or circles that seem centred. The session notes it.",
+            "Accept numbers that seem to have another unit, or circles that seem centred. The session notes this.",
             whole=True,
         ),
     ] = (),
     not_known: Annotated[
         tuple[Literal["temperature", "operator", "job", "bar"], ...],
-        Option("A condition that is unknown; the session notes this. May be given more than once.", whole=True),
+        Option("Name of a condition that is unknown; the session notes this. May be given more than once.", whole=True),
     ] = (),
     yes: Annotated[bool, Option("Write without asking.")] = False,
     dry_run: o.DryRun = False,
     as_json: o.Json = False,
 ) -> None:
-    r"""Take recordings that another program made into a sealed session.
+    r"""Import recordings of another program into a sealed session.
 
-    Tables with angle or time, and deviation or length. The program guesses the columns' meanings from their names, shows them, and keeps them in the file of --mapping. Missing facts are asked for on a terminal; in a pipe they must be given. Computed values, such as times from angles at the plan's feed, are reported and noted in the session. The files as they came, the mapping
-    and all statements stay in the session's folder `imported`.
+    The recordings are tables with angle or time, and deviation or length. The program guesses the columns' meanings
+    from their names, shows them, and keeps them in the file of --mapping. On a terminal the program asks for missing
+    facts; in a pipe, options must state them. Computed values, such as times from angles at the plan's feed, are
+    reported and noted in the session. The session's folder `imported` keeps the original files, the mapping and all
+    stated facts.
 
     \b
     Examples:

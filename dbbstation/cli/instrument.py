@@ -17,7 +17,7 @@ instrument = LazyGroup(
     table=TABLE,
     package="dbbstation.cli",
     modules={"list": "instruments"},
-    help="""List instruments and ports, read an instrument, repeat its bytes, or be one.
+    help="""List instruments and ports, read an instrument, decode its recorded bytes, or emulate one.
 
 \b
 Examples:

@@ -25,16 +25,21 @@ PROFILE = Option(
     goes_with="instrument",
 )
 ZERO_MM = Option(
-    "Distance between the ball centres at which a short display, or a deviation, is zero [mm].", least=20.0, most=2000.0
+    "Distance between the ball centres at which the instrument or the file reads zero [mm].", least=20.0, most=2000.0
 )
 PORT = Option("Port name, or a URL such as socket://127.0.0.1:4001 or rfc2217://127.0.0.1:4001.", setting="port")
 BAUD = Option("Baud rate, if the instrument is not set to the usual one.", least=1, setting="baud")
 Baud = Annotated[int | None, BAUD]
-PROGRAMS = Option("Folder of NC programs, TEST-DIRECTION.", kind="folder")
-RateHz = Annotated[float | None, Option("Sampling rate [1/s], if it is not the usual one.", least=0.1, most=100_000.0)]
+PROGRAMS = Option("Folder of NC programs that are named TEST-DIRECTION.", kind="folder")
+RateHz = Annotated[
+    float | None,
+    Option("Sampling rate [1/s], if it differs from the instrument's usual rate.", least=0.1, most=100_000.0),
+]
 Spy = Annotated[
     Path | None,
-    Option("Write every byte of the line with its time into this new file, for `instrument replay`.", kind="file"),
+    Option(
+        "Write every byte of the serial line with its time into this new file, for `instrument replay`.", kind="file"
+    ),
 ]
 
 

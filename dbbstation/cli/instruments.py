@@ -21,7 +21,7 @@ def instruments(
     *,
     profile: Annotated[str | None, replace(PROFILE, setting="")] = None,
 ) -> Answer:
-    r"""List the instruments that are known, or show one: NAME, or a protocol file.
+    r"""List the known instruments, or describe one: NAME, or a protocol file.
 
     \b
     Examples:

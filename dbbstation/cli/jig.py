@@ -32,14 +32,14 @@ class SheetOptions(AsWritten):
     columns: Annotated[
         tuple[str, ...],
         Option(
-            "Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit of a row per coordinate; such as x=Ist_X  [default: by their names].",
+            "Meaning of a column, such as x=Ist_X: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit if each row has one coordinate  [default: by their names].",
             metavar="WHAT=NAME",
             whole=True,
         ),
     ] = ()
-    unit: Annotated[_Unit | None, Option("Unit of a table's coordinates  [default: as the sheet says, else mm].")] = (
-        None
-    )
+    unit: Annotated[
+        _Unit | None, Option("Unit of a table's coordinates  [default: as stated in the sheet, else mm].")
+    ] = None
 
     def read(
         self, coverage: float | None, u_unit: str | None = None, *, of_one_holder: bool = False
@@ -84,7 +84,7 @@ def sheet(
     ] = None,
     names: Annotated[
         tuple[str, ...],
-        Option("Ball of the jig with another name in the sheet.", metavar="LABEL=BALL", whole=True),
+        Option("Name of a ball in the sheet, and its name in the jig file.", metavar="LABEL=BALL", whole=True),
     ] = (),
     coverage: Annotated[
         float | None,
@@ -92,7 +92,7 @@ def sheet(
     ] = None,
     u_um: Annotated[
         float | None,
-        Option("Standard uncertainty of coordinates without a stated one [µm].", least=0.01, most=1000.0),
+        Option("Standard uncertainty of coordinates, if the sheet lacks it [µm].", least=0.01, most=1000.0),
     ] = None,
     cmm_temp_c: Annotated[
         float | None,
@@ -101,10 +101,10 @@ def sheet(
     out: Annotated[Path, replace(o.OUT, metavar="JIG.yaml")],
     force: o.Force = False,
 ) -> Answer:
-    r"""Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
+    r"""Write a jig file with the balls of a CMM sheet: a table, or a DMIS file with measured features (.dmo, .dmi, .dmis, .out).
 
-    Coordinates are in the jig's frame. Plate and holders come from --before. Uncertainties of three axes become one, their root mean
-    square: a jig file has one per ball. Each ball is shown with its change against the jig before.
+    Coordinates are in the jig's frame. Plate and holders come from --before. A jig file has one uncertainty per ball:
+    the root mean square of its three axes. Each ball is shown with its change since the former jig file.
 
     \b
     Examples:
@@ -175,7 +175,9 @@ def holders(
 ) -> Answer:
     r"""Compute how well holders reproduce the ball's position, from repeated mountings [CAL III-B].
 
-    One row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual. The scatter is about the mean of each place. The standard deviation per axis, with its chi-square interval, is what a jig file calls `repeatability_um`.
+    The table has one row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual.
+    The scatter is computed about the mean of each place. The standard deviation per axis is the jig file's
+    `repeatability_um`; its chi-square interval is printed too.
 
     \b
     Examples:

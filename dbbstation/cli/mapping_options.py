@@ -63,7 +63,7 @@ class MappingOptions(AsWritten):
 
     mapping: Annotated[
         Path | None,
-        Option("Meaning of the columns: read if the file exists, else written for the next time.", kind="file"),
+        Option("File with the meaning of the columns: read if it exists, else written for the next time.", kind="file"),
     ] = None
     columns: Annotated[
         tuple[str, ...],
@@ -74,7 +74,8 @@ class MappingOptions(AsWritten):
         ),
     ] = ()
     angle_zero_deg: Annotated[
-        float | None, Option("Angle of the machine, from +X to +Y, at angle 0 of the files.", least=-720.0, most=720.0)
+        float | None,
+        Option("Machine angle at angle 0 of the files [deg], counted from +X to +Y.", least=-720.0, most=720.0),
     ] = None
     angle_grows: Annotated[
         Literal["ccw", "cw", "travel"] | None, Option("Direction in which the files' angles increase, seen from +Z.")
@@ -82,19 +83,19 @@ class MappingOptions(AsWritten):
     angle_span_deg: Annotated[
         float | None,
         Option(
-            "Span of a run's angles, if it is neither one turn nor the plan's path; one turn is used.",
+            "Range of a run's angles [deg], if it is neither one turn nor the plan's path. The import uses one turn.",
             least=300.0,
             most=3600.0,
         ),
     ] = None
     trace: Annotated[
         Literal["whole", "turn"] | None,
-        Option("Files without angles: the whole run with feed-in and feed-out, or the full turn alone."),
+        Option("Content of files without angles: the whole run with feed-in and feed-out, or the full turn alone."),
     ] = None
     split: Annotated[
         Literal["gaps", "direction"] | None,
         Option(
-            "Several runs in a file: parted by gaps (pauses, times that begin anew, empty lines), or where the angles turn round."
+            "How runs in one file are separated: by gaps (pauses, restarting times, empty lines), or by a reversal of the angles."
         ),
     ] = None
     zone: Annotated[
@@ -103,7 +104,7 @@ class MappingOptions(AsWritten):
     ] = None
     zero_mm: Annotated[float | None, ZERO_MM] = None
     file_name: Annotated[
-        str | None, Option("Pattern that file names follow, such as '{test}_{direction}'.", metavar="PATTERN")
+        str | None, Option("Pattern of the file names, such as '{test}_{direction}'.", metavar="PATTERN")
     ] = None
 
     @property

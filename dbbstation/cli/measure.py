@@ -47,7 +47,10 @@ def measure(
     out: Annotated[Path, replace(o.OUT, kind="folder", metavar="SESSION")],
     auto: Annotated[
         str | None,
-        Option("Start each circle at this control address of `instrument emulate`, accept every run.", metavar="URL"),
+        Option(
+            "Start each circle through this control address of `instrument emulate`, and accept every run.",
+            metavar="URL",
+        ),
     ] = None,
     time_scale: Annotated[float, Option(o.TIME_SCALE, least=0.01, most=200.0)] = 1.0,
     rate_hz: RateHz = None,
@@ -55,15 +58,15 @@ def measure(
 ) -> None:
     r"""Measure a plan, test by test, into a session folder.
 
-    Tells you which ball goes into which bore and how to tilt the tool. It waits for Enter, then for the machine: it
-    detects start and end of a circle in the readings. Every sample is on the disk within a second. Ctrl-C stops the
-    measurement; the same command continues it.
+    The command tells you which ball goes into which bore and how to tilt the tool. It waits for Enter, then for the
+    machine, and detects start and end of a circle in the readings. Every sample is on the disk within a second. Ctrl-C
+    stops the measurement; the same command continues it.
 
     \b
     Examples:
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
-      dbbstation measure ... --order drift --gate first   (heights in turn, the first test again at the end)
+      dbbstation measure ... --order drift --gate first   (heights mixed, the first test again at the end)
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `instrument emulate`)
     """
     from dbbstation.files.formats.machine import read_machine

@@ -24,7 +24,7 @@ def replay(
     zero_mm: Annotated[float | None, replace(ZERO_MM, usual="lengths count from zero")] = None,
     as_json: o.Json = False,
 ) -> None:
-    r"""Decode a byte log that `--spy` wrote (or `monitor --log`): every reading, and everything that is not understood.
+    r"""Decode a byte log of `--spy` or `monitor --log`: print every reading, and all bytes that it does not understand.
 
     \b
     Examples:

@@ -26,7 +26,7 @@ _Reason = Annotated[str, Option("Reason, for the session file.")]
 
 @click.group()
 def session() -> None:
-    r"""List the runs of a session, accept or reject them afterwards, take in or seal recordings, change a plan on purpose.
+    r"""List the runs of a session, accept or reject them afterwards, add or seal recordings, change a plan on purpose.
 
     \b
     Examples:
@@ -99,8 +99,8 @@ def accept(
 ) -> Answer:
     r"""Accept a run that was rejected or not judged, such as a-cw-2.
 
-    A run that lost more samples than the plan allows, or whose recording shows no circle, is accepted with a reason only. On a
-    terminal it is asked for.
+    A run that lost more samples than the plan allows, or whose recording shows no circle, needs a reason. On a terminal
+    the command asks for the reason.
 
     \b
     Examples:
@@ -112,7 +112,7 @@ def accept(
 
 @made(group=session)
 def reject(folder: _Folder, run: _Run, *, reason: _Reason) -> Answer:
-    r"""Reject a run, such as a-cw-2, and note why. Its recording is kept; no command uses it any more.
+    r"""Reject a run, such as a-cw-2, and note why. The recording is kept, but no command uses it any more.
 
     \b
     Examples:
@@ -125,10 +125,10 @@ def reject(folder: _Folder, run: _Run, *, reason: _Reason) -> Answer:
 
 @made("take-in", session)
 def take_in(folder: _Folder) -> Answer:
-    r"""List sealed runs that lie in the session's folder and are in no list.
+    r"""Add runs to the session's list: sealed recordings in its folder that the list lacks.
 
-    `dbbstation check` names them. They may come from a second program that wrote into the folder, or from a session file
-    that was restored. Their state is then `complete`: accept or reject each run.
+    `dbbstation check` names such runs. They may come from a second program that wrote into the folder, or from before
+    the session file was restored. Their state becomes `complete`: accept or reject each run.
 
     \b
     Examples:
@@ -153,10 +153,12 @@ def amend(
     plan: Annotated[Path | None, o.PLAN] = None,
     machine: Annotated[Path | None, o.MACHINE] = None,
 ) -> Answer:
-    r"""Change what was sealed on purpose, and note why.
+    r"""Change sealed files of a session on purpose, and note the reason.
 
-    Plan and machine of a session are sealed when it is made: a change without a note is refused by every command. This accepts the session as it is, with another plan or machine if given. The file as it was stays in the folder
-    `sealed`. The session file says what was changed, when and why, with both hashes; `dbbstation check` shows it. A list of runs that was changed by hand is accepted in the same way.
+    Plan and machine are sealed when a session is made. Every command refuses a session whose sealed files were changed
+    without a note. `amend` accepts the session as it is, or with another plan or machine. The folder `sealed` keeps the
+    former file. The session file states what was changed, when and why, with both hashes; `dbbstation check` shows
+    this. The command also accepts a list of runs that was changed by hand.
 
     \b
     Examples:
@@ -186,8 +188,9 @@ def seal(
 ) -> Answer:
     r"""Seal a session that was recorded elsewhere.
 
-    A session file written by hand needs no hashes. This adds missing hashes of runs, machine, plan and jig, and a chain through all runs. Everything else in the file stays as it is. Copies of machine, plan and jig go into the folder
-    `sealed`. Every command then notices a changed recording or plan, and a removed or exchanged run.
+    A session file written by hand needs no hashes. `seal` adds missing hashes of runs, machine, plan and jig, and a
+    chain through all runs. The rest of the file stays unchanged. The folder `sealed` gets copies of machine, plan and
+    jig. Every command then notices a changed recording or plan, and a removed or exchanged run.
 
     \b
     Examples:
@@ -211,10 +214,10 @@ def seal(
 
 @made(group=session)
 def log(folder: _Folder) -> Answer:
-    r"""List what happened in a session: runs, verdicts with their reasons, notes, amendments, each with its time and link.
+    r"""List what happened in a session: runs, verdicts with their reasons, notes, amendments, each with its time and hash.
 
-    The last line is the anchor of the session. Noted elsewhere, it tells later whether anything was changed that stood there:
-    `dbbstation check --anchor`.
+    The last line is the anchor of the session. Note it elsewhere: `dbbstation check --anchor` then reports later
+    changes of these events.
 
     \b
     Examples:
@@ -246,10 +249,10 @@ def log(folder: _Folder) -> Answer:
 
 @made(group=session)
 def rebuild(folder: _Folder) -> Answer:
-    r"""Write the session file anew, as the event log has it.
+    r"""Write the session file again from the event log.
 
-    Use it for a session file that was damaged, lost or edited by mistake. The present file is kept in the folder `sealed`.
-    The recordings are not touched.
+    Use it for a session file that was damaged, lost or edited by mistake. The folder `sealed` keeps the present file.
+    The recordings stay unchanged.
 
     \b
     Examples:

@@ -26,7 +26,7 @@ class SessionOptions:
     """Stated facts of machine, shop and bar."""
 
     operator: Annotated[str, Option("Name of the operator.")] = ""
-    job: Annotated[str, Option("Job or order number: what it is measured for.")] = ""
+    job: Annotated[str, Option("Job or order number of the measurement.")] = ""
     serial_number: Annotated[str, Option("Serial number of the machine.", setting="serial_number")] = ""
     ambient_temp_c: Annotated[float | None, Option("Temperature of the shop [degC].")] = None
     bar_serial_number: Annotated[str, Option("Serial number of the bar.", setting="bar.serial_number")] = ""
@@ -39,12 +39,12 @@ class SessionOptions:
     ] = None
     bar_uncertainty_um: Annotated[
         float | None,
-        Option("Standard uncertainty u of that length [µm].", setting="bar.calibrator_uncertainty_mm", factor=1e3),
+        Option("Standard uncertainty u of the bar's length [µm].", setting="bar.calibrator_uncertainty_mm", factor=1e3),
     ] = None
     bar_temp_c: Annotated[
         float | None, Option("Temperature of the bar at its calibration [degC].", setting="bar.temp_c")
     ] = None
-    bar: Annotated[Path | None, Option("Calibration of the bar, from `dbbstation bar`.")] = None
+    bar: Annotated[Path | None, Option("File with the bar's calibration, written by `dbbstation bar`.")] = None
     bar_waiver: Annotated[str, Option("Reason for measuring without a fresh calibration of the bar.")] = ""
 
     def details(self, stroke_mm: float | None = None) -> SessionDetails:
@@ -121,7 +121,7 @@ class RecordingOptions(SessionOptions):
     largest_loss_percent: Annotated[
         float | None,
         Option(
-            "A run that lost more of its samples is repeated [%]  [default: the plan's, else 0.5].",
+            "Largest share of lost samples [%]; a run that lost more is repeated  [default: the plan's, else 0.5].",
             setting="limits.largest_loss_percent",
             least=0.0,
             most=100.0,
@@ -140,20 +140,20 @@ class RecordingOptions(SessionOptions):
     order: Annotated[
         Literal["plan", "holder", "drift"],
         Option(
-            "Order of tests: as in the plan; by holder, so that each ball is put up once; or heights in turn, against drift."
+            "Order of tests: as in the plan; by holder, so that each ball is put up once; or with mixed heights, so that drift does not look like an effect of height."
         ),
     ] = "plan"
     gate: Annotated[
         Literal["plan", "first", "holders"],
         Option(
-            "Test repeated at the end to show drift, if the plan names none: the first one, or the first of each holder."
+            "Test that is repeated at the end to show drift, if the plan names none: the first test, or the first test of each holder."
         ),
     ] = "plan"
     programs: Annotated[Path | None, PROGRAMS] = None
     largest_bar_age_h: Annotated[
         float | None,
         Option(
-            "Older calibrations of the bar are refused [h]  [default: 24].",
+            "Largest age of the bar's calibration [h]  [default: 24].",
             setting="limits.largest_bar_age_h",
             least=0.1,
             most=10_000.0,

@@ -49,8 +49,10 @@ def settings(
 ) -> None:
     r"""Show the shop's settings: every key, its value, and the file and line that it comes from.
 
-    Settings are looked for in `dbbstation-settings.yaml` beside SESSION, in the folder that holds it, or in the working folder if a command takes no session. Then in `settings.yaml` in the user's configuration folder. The first file
-    that has a key decides. `dbbstation --settings FILE` reads that file alone. An option on the command line overrides them, and each command reports the options that it took from settings.
+    Commands first read `dbbstation-settings.yaml` in the folder that contains SESSION, or in the working folder if they
+    use no session. Then they read `settings.yaml` in the user's configuration folder. The first file with a key
+    decides. `dbbstation --settings FILE` reads that file alone. Options on the command line override settings, and each
+    command reports the options that come from settings.
 
     \b
     Examples:
@@ -58,7 +60,7 @@ def settings(
       dbbstation settings 2026-11-20-hexapod-7
       dbbstation settings --template > dbbstation-settings.yaml
       dbbstation settings 2026-11-20-hexapod-7 --json
-      dbbstation settings shipped                         (what comes along; `settings shipped --help`)
+      dbbstation settings shipped                         (files of the program; `settings shipped --help`)
     """
     from dbbstation.cli.output import print_result
     from dbbstation.cli.shop import shop_settings

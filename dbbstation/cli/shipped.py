@@ -86,9 +86,9 @@ def shipped(
     out: Annotated[Path | None, Option("Copy NAME into this folder.", kind="folder")] = None,
     force: o.Force = False,
 ) -> Answer:
-    r"""List plans, machines, jigs, a small session and examples that come with the program, or copy some of them.
+    r"""List or copy the plans, machines, jigs, small session and examples that come with the program.
 
-    NAME is one of them, or a kind such as `plans`. `examples` has the files that help texts name.
+    NAME is one of these, or a kind such as `plans`. `examples` contains the files that help texts name.
 
     \b
     Examples:

@@ -23,12 +23,12 @@ def sources(
     machine: Annotated[
         Path | None,
         Option(
-            "Machine file or session folder: also print the parameters that the cause has there, with their usual sizes."
+            "Machine file or session folder: also print the cause's parameters on this machine, with their usual sizes."
         ),
     ] = None,
     source_files: o.SourcePaths = (),
 ) -> Answer:
-    r"""List the causes of error that are known, or show one: NAME.
+    r"""List the known causes of error, or describe the cause NAME.
 
     Each has a description, its symptoms in recordings, a way to confirm and to cure it, its equation with source, its needs, and how exactly real machines follow its formula.
 

@@ -62,8 +62,8 @@ def station(
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
 
-    Without options it begins with the existing sessions and the choices for a new one. Records what `dbbstation measure`
-    records. Quitting loses nothing; the same command continues the session.
+    Without options the screen begins with the existing sessions and the choices for a new one. The recorded files are
+    the same as with `dbbstation measure`. Quitting loses no data; the same command continues the session.
 
     \b
     Examples:

@@ -48,13 +48,13 @@ def calibrate(
 ) -> CalibrationResult:
     r"""Fit the machine's errors to the raw circles of one or more sessions.
 
-    Fits 24 kinematic parameters: the reference lengths of the struts and the positions of the base joints. The scatter of
-    mountings, CMM and bar enters as random effects. Combinations of parameters that the tests cannot identify are named
-    and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
+    Fits 24 kinematic parameters: the reference lengths of the struts and the positions of the base joints. The scatter
+    of mountings, CMM and bar enters the fit as random effects. Combinations of parameters that the tests cannot
+    identify are named and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
 
-    With --method conv-a or conv-b the balls were put up under the spindle, and their positions are unknown. Six
-    combinations cannot be identified then. Six parameters are held at nominal instead; the program chooses them, or
-    --prescribe names them.
+    Use --method conv-a or conv-b if the balls were put up under the spindle, at unknown positions. Six combinations of
+    parameters cannot be identified then. The program chooses six parameters and holds them at nominal; --prescribe
+    chooses others.
 
     With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
     drives, and with cog-shift the centre of gravity.

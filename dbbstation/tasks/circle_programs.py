@@ -51,11 +51,12 @@ def program(
     r"""Write the NC programs of a plan's circles, one for each test and direction, nominal or compensated.
 
     Every program is checked against the travel of axes, angles and struts before anything is written; all programs
-    are written or none. A program goes above its first point and comes down to it. The program waits for the bar to be put
-    on, runs the path of a run and waits for the bar to be taken off.
+    are written or none. Each program moves above its first point and down to it. The program waits until the bar is on,
+    runs the path, and waits until the bar is off.
 
-    With --model programs are compensated. The distance of points is what the control needs to keep the feed, within --chord-um. If that is not
-    far enough, the output states about how much slower the control is. --strict refuses the program instead.
+    With --model programs are compensated. Points are as far apart as the control needs to keep the feed, within
+    --chord-um. If this bound makes the control slower, the output states roughly how much. --strict refuses the program
+    instead.
 
     \b
     Examples:

@@ -37,11 +37,12 @@ def circles(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> CirclesResult:
-    r"""Work out the figures of measured circles, in the words of ISO 230-4:2005; no model is needed.
+    r"""Compute the figures of measured circles, in the terms of ISO 230-4:2005. No model is needed.
 
-    G is the circular deviation of the minimum zone, G(LS) about the least-squares circle, which is permitted too. F is the
-    radial deviation about the least-squares centre. X and Y are the centre less the commanded one: reported, never taken
-    out of calibration data. G(b), D and H are of both directions together. U is 2 u; --budget shows its terms.
+    G is the circular deviation of the minimum zone; G(LS) is the circular deviation about the least-squares circle. The
+    standard permits both. F is the radial deviation about the least-squares centre. X and Y are the measured centre
+    minus the commanded centre; calibration keeps them. G(b), D and H combine both directions. U is 2 u; --budget shows
+    its terms.
 
     \b
     Examples:

@@ -36,7 +36,9 @@ def compare(
 ) -> ComparisonResult:
     r"""Compare two sessions: where they differ, in what form, and by which cause. Differences are B less A.
 
-    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. Stated noise, scatter of mountings, and uncertainty of CMM sheets and bars do not count as a difference. Changed error sources, displaced balls and bars, and effects without a name compete by probability, as in `diagnose`.
+    Compare last year with today, or a simulation with a recording. The readings of A serve as the simulation of B.
+    Stated noise, scatter of mountings, and uncertainty of CMM sheets and bars do not count as a difference. The command
+    compares changed error sources, displaced balls and bars, and unnamed effects by probability, as `diagnose` does.
 
     \b
     Examples:

@@ -51,12 +51,12 @@ def compensate(
     source_files: o.SourceFiles = (),
     dialect: o.Dialect = "linuxcnc",
     written_in: Annotated[
-        str | None, Option("Language of PROGRAM, likewise [default: by its extension].", metavar="D")
+        str | None, Option("NC language of PROGRAM: a name, or FILE.py [default: by its extension].", metavar="D")
     ] = None,
     start: Annotated[
         Numbers | None,
         Option(
-            "Pose before the program in machine coordinates [mm, deg].",
+            "Machine coordinates of the pose before the program [mm, deg].",
             metavar="X,Y,Z,A,B,C",
             parse=partial(numbers_of, counts={6}),
         ),
@@ -73,14 +73,14 @@ def compensate(
     offsets: Annotated[
         Offsets | None,
         Option(
-            "Work offset in the control [mm], G54 to G59.3 or G92; place of G28 or G30. A, B, C may follow [default: zero].",
+            "Work offset in the control, G54 to G59.3 or G92, or position of G28 or G30 [mm]. A, B, C may follow [default: zero].",
             flag="--offset",
             metavar="G54=X,Y,Z",
             parse=partial(named_numbers, counts={3, 6}),
         ),
     ] = None,
     parameters: Annotated[
-        File | None, Option("LinuxCNC's parameter file, for offsets and places not given.", kind="file")
+        File | None, Option("LinuxCNC's parameter file, for offsets and positions that no option states.", kind="file")
     ] = None,
     tool_lengths_mm: Annotated[
         Lengths | None,
@@ -91,23 +91,26 @@ def compensate(
             parse=lengths_by_tool,
         ),
     ] = None,
-    tools: Annotated[File | None, Option("LinuxCNC's tool table, for lengths not given.", kind="file")] = None,
+    tools: Annotated[
+        File | None, Option("LinuxCNC's tool table, for lengths that no option states.", kind="file")
+    ] = None,
     subprograms: Annotated[
         File | None, Option("Folder of subprograms that the program calls and does not contain.", kind="folder")
     ] = None,
     block_delete: Annotated[
-        Literal["on", "off"] | None, Option("How the control's switch stands for lines that begin with a slash.")
+        Literal["on", "off"] | None,
+        Option("State of the control's block-delete switch; if it is on, lines that begin with a slash are skipped."),
     ] = None,
     chord_um: Annotated[float, replace(o.CHORD_UM, setting="program.chord_um")] = 1e3 * CHORD_MM,
     prefer: o.Prefer = "accuracy",
     strict: o.Strict = False,
     unexplained: Annotated[
-        bool, Option("Correct an error of unknown cause, too, that a diagnosis kept in the model.")
+        bool, Option("Also correct an error of unknown cause, if a diagnosis kept one in the model.")
     ] = False,
     time_s: o.TimeS = None,
     largest_correction_mm: o.LargestCorrectionMm = LARGEST_CORRECTION_MM,
     machine: Annotated[
-        File | None, Option("Machine file; refused if its control already corrects.", kind="file")
+        File | None, Option("Machine file. The command refuses a machine whose control already corrects.", kind="file")
     ] = None,
     force: o.Force = False,
     known: Mapping[str, ErrorSource] | None = None,
@@ -116,14 +119,14 @@ def compensate(
 ) -> ProgramsResult:
     r"""Compensate an NC program, so that the real machine follows PROGRAM.
 
-    Moves at feed are split into the longest pieces that keep the chord error. If the control is slower in such pieces, the
-    output states about how much. --strict refuses the program instead.
+    Moves at feed are split into the longest pieces that keep the chord error. If such pieces make the control slower,
+    the output states roughly how much. --strict refuses the program instead.
 
-    State the control's work offsets and tool lengths, or its files, and the angles of a program that names X, Y and Z only.
-    The result is right for these. Its first lines stop LinuxCNC if others are in force.
+    State the control's work offsets and tool lengths, or name its files. If the program names X, Y and Z only, state
+    the angles too. The result is right for these values only. Its first lines stop LinuxCNC if other values are active.
 
-    The program must be whole (M2, M30 or percent signs), not compensated yet, and of no other machine. Travel, feeds and
-    the size of corrections are checked before anything is written.
+    The program must be complete (with M2, M30 or percent signs), uncompensated, and made for the model's machine.
+    Travel, feeds and the size of corrections are checked before anything is written.
 
     \b
     Examples:

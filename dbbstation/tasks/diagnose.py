@@ -49,11 +49,11 @@ def diagnose(
 ) -> DiagnosisResult:
     r"""Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
 
-    A calibration can hide gravity, drift or play in its joints: the residual is then small here, and the machine is
-    wrong elsewhere. This command compares sets of causes. It fits each set together with the kinematic parameters and
-    gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability 0.95 or more,
-    five standard deviations out, and a gain in tests that were held back), happened (acts once), does-not-predict,
-    ambiguous, ruled-out, not-testable.
+    A calibration can absorb gravity, drift or play in its joint positions. The residual of these tests is then small,
+    but the machine errs elsewhere. This command compares sets of causes. It fits each set together with the kinematic
+    parameters and gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability
+    of at least 0.95, size of at least five standard deviations, better predictions of held-out tests), happened (acts
+    once), does-not-predict, ambiguous, ruled-out, not-testable.
 
     The model also keeps an effect of unknown cause over strut length or force, if other tests confirm it.
 

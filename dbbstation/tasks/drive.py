@@ -49,8 +49,8 @@ def identify(
     r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
 
     The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
-    fro at several speeds. Several recordings of one drive are taken together. Verdicts: identified, happened, does-not-predict,
-    ambiguous, not-testable, ruled-out.
+    fro at several speeds. Several recordings of one drive are fitted together. Verdicts: identified, happened,
+    does-not-predict, ambiguous, not-testable, ruled-out.
 
     \b
     Examples:

@@ -38,10 +38,10 @@ def evaluate(
 ) -> EvaluationResult:
     r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
-    \"After\" is the residual of the model, not a new measurement. The second table shows the circular
-    deviation G that was measured and the one that the model predicts. In both tables G is that of readings low-passed at
-    30 undulations per revolution. Flatness over X, Y = ±190 mm and parallelism of a move along X are what the model
-    predicts of programs that are not compensated. Every circle is compared with the tolerances of the shop's settings.
+    \"After\" is the residual of the model, not a new measurement. The second table shows the measured and the predicted
+    circular deviation G. In both tables G is computed from readings low-passed at 30 undulations per revolution. For
+    uncompensated programs the model also predicts flatness over X, Y = ±190 mm and parallelism of a move along X. Every
+    circle is compared with the tolerances of the shop's settings.
 
     \b
     Examples:

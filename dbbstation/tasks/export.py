@@ -45,8 +45,9 @@ def export(
 ) -> ExportResult:
     r"""Write sessions as one tidy table: one row per sample, with test, direction, repeat, state, time, angle, length, deviation.
 
-    Columns carry their units in their names. Lengths are raw. The provenance is in a file beside a CSV file (.provenance.json), or in the metadata of a Parquet file, which has one row group per run. `dbbstation import` reads the CSV
-    back, sample by sample the same.
+    Columns carry their units in their names. Lengths are raw. The provenance is in a file beside a CSV file
+    (.provenance.json), or in the metadata of a Parquet file, which has one row group per run. `dbbstation import` reads
+    identical samples back from the CSV.
 
     \b
     Examples:

@@ -69,7 +69,7 @@ def mismatch(
     simulator: Annotated[
         File | None,
         Option(
-            "Simulator of your own, or the name of an installed one, which is executed: it is refitted, and asked at its ports what it lacks.",
+            "File of your own simulator, or the name of an installed one. The command runs and refits it, and searches its ports for missing terms.",
             kind="path",
             metavar="model.yaml",
             not_with=("measured", "simulated", "variables", "run", "time", "known", "free", "offset"),
@@ -78,7 +78,7 @@ def mismatch(
     most_runs: Annotated[
         int | None,
         Option(
-            "With --simulator: simulations that may be run [default: what ten minutes hold].",
+            "With --simulator: greatest number of simulations [default: as many as run in ten minutes].",
             least=1,
             only_with="simulator",
         ),
@@ -94,8 +94,7 @@ def mismatch(
     variables: Annotated[
         Variables | None,
         Option(
-            "Columns that the difference may follow, each with its unit or kind if its name does not say it; NAME:result or "
-            "NAME=UNIT:result results from what is simulated and is no cause [default: all].",
+            "Columns that the difference may follow, each with its unit or kind if its name lacks it [default: all]. NAME:result or NAME=UNIT:result marks a column that results from the simulation and cannot be a cause.",
             metavar="A,B=UNIT,...",
         ),
     ] = None,
@@ -106,7 +105,7 @@ def mismatch(
     time: Annotated[
         str | None,
         Option(
-            "Column that says when; `rows`: the rows stand in the order of measuring [default: guessed].",
+            "Column with the time, or `rows` if the rows are in the order of measuring [default: guessed].",
             metavar="COLUMN",
         ),
     ] = None,
@@ -114,8 +113,7 @@ def mismatch(
     known: Annotated[
         Uncertainties | None,
         Option(
-            "Standard uncertainty to which parameters of columns d_NAME were known [default: what moves the simulated value "
-            "twice as far as it is off].",
+            "Prior standard uncertainty of each parameter NAME with a column d_NAME [default: the change that moves the simulated value by twice the mismatch].",
             metavar="NAME=U,...",
         ),
     ] = None,
@@ -125,8 +123,8 @@ def mismatch(
     matters: Annotated[
         float | None,
         Option(
-            'Smallest effect that matters to you, rms in the unit of the measured values. A "no" holds from this size on '
-            "[default: what refitted parameters leave].",
+            'Smallest effect that matters to you, rms in the unit of the measured values. A "no" excludes effects of this size or more '
+            "[default: the residual after the parameters are refitted].",
             metavar="SIZE",
             above=0.0,
         ),
@@ -134,7 +132,7 @@ def mismatch(
     apply: Annotated[
         Tables | None,
         Option(
-            "Other rows of the same columns, measured values not needed: --table then has their corrected simulation and its u.",
+            "File with other rows of the same columns; it needs no measured values. --table then has their corrected simulation and its u.",
             kind="path",
             metavar="OTHER.csv",
             objects=True,
@@ -152,13 +150,13 @@ def mismatch(
 ) -> MismatchResult | SimulatorResult:
     r"""Find where a simulation and a recording differ, in what form, and which physics the simulation lacks.
 
-    A row of the table is one measured value beside the simulated one, with everything that was known then: joint angles,
-    positions, loads, temperatures, the time. Units are at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
-    Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
+    A row of the table has one measured value, the simulated one, and all that was known at that moment: joint angles,
+    positions, loads, temperatures, the time. Units are at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in
+    --variables. Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
 
-    With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself. The answer says which
-    term is missing at which port; --out has the missing terms as Python code. Simulations of the same files and
-    values are kept in the user's cache folder and not run again, but with --anew. --table has the corrected simulation.
+    With --simulator the recordings have inputs and measured outputs, and the command runs your simulator itself. The
+    answer names each missing term and its port; --out writes the missing terms as Python code. The user's cache folder
+    keeps finished simulations; --anew runs them again. --table writes the corrected simulation.
 
     \b
     Examples:

@@ -48,8 +48,10 @@ Method = Annotated[
         "How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b)."
     ),
 ]
-FALSE_ALARMS = "Probability of a false alarm, in all compared quantities together."
-Dialect = Annotated[str, Option("Language to write: a name, or FILE.py.", metavar="D", setting="program.dialect")]
+FALSE_ALARMS = "Probability of a false alarm over all compared quantities together."
+Dialect = Annotated[
+    str, Option("NC language of the output: a name, or FILE.py.", metavar="D", setting="program.dialect")
+]
 StepDeg = Annotated[float, Option("Angle between points [deg].", setting="program.step_deg", least=0.01, most=5.0)]
 ClearanceMm = Annotated[
     float, Option("Height of rapid moves above the first point [mm].", setting="program.clearance_mm", least=0.0)
@@ -57,16 +59,20 @@ ClearanceMm = Annotated[
 BarStaysOn = Annotated[bool, Option("Start and end with the bar on its balls: no rapids, no stops.")]
 CHORD_UM = Option("Greatest distance between a move and the commanded path [µm].", least=0.001, most=1000.0)
 TimeS = Annotated[
-    float | None, Option("Start after the session's start [s], for models that depend on time.", metavar="S")
+    float | None,
+    Option(
+        "Time of the program's start [s], counted from the session's start; for models that depend on time.",
+        metavar="S",
+    ),
 ]
-Findings = Annotated[bool, Option("Judge every run too: number, limit, verdict.")]
+Findings = Annotated[bool, Option("Judge every run too: print each number with its limit and verdict.")]
 SESSIONS = Option("session folders or session files.", kind="argument", metavar="SESSION...")
 SessionPaths = Annotated[Sessions, SESSIONS]
 RecordedSessions = Annotated[
     Sessions | Recorded,
     Option("session folders, or what `load` returned of them.", kind="argument", metavar="SESSION...", objects=True),
 ]
-Tests = Annotated[Names, Option("Take these tests only; may be given more than once.", metavar="TEST,...")]
+Tests = Annotated[Names, Option("Use these tests only; may be given more than once.", metavar="TEST,...")]
 Exclude = Annotated[Names, Option("Leave tests out; may be given more than once.", metavar="TEST,...")]
 SOURCE_FILES = Option(
     "Python file with error sources or physics of your own. It is executed. May be given more than once.",
@@ -79,7 +85,7 @@ HeldOut = Annotated[bool, Option("Leave out the held-out test, which takes most 
 Filter = Annotated[
     Literal["none", "15", "30", "50", "150"],
     Option(
-        "Filter of G, F and H: its cut-off in undulations per revolution. Gaussian; 30 is cut off sharply, as for tolerances."
+        "Cut-off of the filter for G, F and H [undulations per revolution]. The filter is Gaussian; only 30 is cut off sharply, as for tolerances."
     ),
 ]
 Prefer = Annotated[
@@ -87,7 +93,7 @@ Prefer = Annotated[
     Option("Correct all six axes, or the tool tip alone with A, B and C as programmed."),
 ]
 Strict = Annotated[
-    bool, Option("Refuse a program that misses the chord error, or in which the control would not keep a feed.")
+    bool, Option("Refuse a program that exceeds the chord error, or in which the control would not reach a feed.")
 ]
 LargestCorrectionMm = Annotated[
     float,
@@ -99,8 +105,8 @@ LargestCorrectionMm = Annotated[
     ),
 ]
 DECIMAL, SEPARATOR = (
-    "Decimal sign in the files  [default: the shop's, else as found, else a dot].",
-    "Separator of columns  [default: the shop's, else as found, else a comma].",
+    "Decimal sign in the files  [default: from the shop's settings, else detected, else a dot].",
+    "Separator of columns  [default: from the shop's settings, else detected, else a comma].",
 )
 Decimal = Annotated[Literal[".", ","] | None, Option(DECIMAL, setting="numbers.decimal")]
 Separator = Annotated[

@@ -56,9 +56,10 @@ def predict(
 ) -> PredictionResult:
     r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
-    Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
-    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that depends on undetermined parameters is left empty, with the reason in u_not_known_because. A joint_tolerance_mm in the machine
-    file of the calibration bounds it.
+    Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. The output has the actual pose in these columns, and standard
+    uncertainties in u_x_mm,u_y_mm,u_z_mm. The output always has decimal dots, and commas between columns. Further
+    columns are copied. If an uncertainty depends on undetermined parameters, its cell is empty, and u_not_known_because
+    has the reason. A joint_tolerance_mm in the machine file of the calibration bounds this uncertainty.
 
     \b
     Examples:

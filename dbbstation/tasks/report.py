@@ -43,15 +43,19 @@ def report(
     settings: Settings,
     before: Annotated[File | None, Option("Earlier session for comparison.")] = None,
     model: o.Model | None = None,
-    job: Annotated[str, Option("Job or reason of the measurement; replaces that of the session.")] = "",
+    job: Annotated[str, Option("Job or reason of the measurement; replaces the session's job.")] = "",
     place: Annotated[
         str, Option("Place of the measurement, which a certificate needs  [with --certificate a terminal asks for it].")
     ] = "",
-    certificate: Annotated[bool, Option("Refuse to write if a certificate lacks a fact.")] = False,
+    certificate: Annotated[
+        bool, Option("Refuse to write the report if it lacks a fact that a certificate needs.")
+    ] = False,
     source_files: o.SourceFiles = (),
     tests: o.Tests = (),
     exclude: o.Exclude = (),
-    pdf: Annotated[File | None, Option("Print it here too, by an installed Chromium.", kind="file")] = None,
+    pdf: Annotated[
+        File | None, Option("Write the report here too, as PDF by an installed Chromium.", kind="file")
+    ] = None,
     force: o.Force = False,
     coverage_factor: float = USUAL_COVERAGE,
     known: Mapping[str, ErrorSource] | None = None,
@@ -62,9 +66,10 @@ def report(
 ) -> ReportResult:
     r"""Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
 
-    Its first page compares the circles with the tolerances of the shop's settings and states what to do. Conditions, polar traces, figures with U and findings of every run follow, then with --model its residual and unidentifiable directions, and all
-    files with their SHA-256. With --before both sessions are shown side by side as measured. The figures are those of
-    `circles` and `evaluate`.
+    Its first page compares the circles with the tolerances of the shop's settings and states what to do. Conditions,
+    polar traces, figures with U and findings of every run follow. With --model, the model's residual and unidentifiable
+    directions follow. All files with their SHA-256 are last. With --before both sessions are shown side by side as
+    measured. The figures are the same as in `circles` and `evaluate`.
 
     \b
     Examples:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 )
 @click.option("--candidates", metavar="A,B,...", help="Error sources to compare [default: all, as in `diagnose`].")
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
-@click.option("--again", is_flag=True, help="Diagnose sessions again that have a verdict already.")
+@click.option("--again", is_flag=True, help="Diagnose sessions with a verdict again.")
 @figure_option("Draw the reliability diagram here")
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
@@ -41,12 +41,12 @@ def blind(
     force: bool,
     as_json: bool,
 ) -> None:
-    r"""Diagnose sessions in which somebody has hidden effects, and score the verdicts.
+    r"""Diagnose sessions with hidden effects, and score the verdicts.
 
-    A FOLDER has one session folder per recording and `answers.json`, which is opened only after every session of every folder has
-    its verdict. Verdicts are kept in FOLDER/verdicts at once, so that a study can be interrupted and goes on where
-    it stopped. Several folders are scored together. --figure draws how often causes were there that were given a probability. The simulation under
-    tests/plant makes such folders: it shares no code with this program.
+    A FOLDER has one session folder per recording, and `answers.json`. The command opens the answers only after every
+    session of every folder has its verdict. FOLDER/verdicts keeps each verdict at once, so that an interrupted study
+    can continue. Several folders are scored together. --figure draws how often a cause was present, over its stated
+    probability. The simulation under tests/plant makes such folders; it shares no code with this program.
 
     \b
     Examples:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: bool) -> None:
-    r"""Hide gravity in a kinematic calibration, find it, name it, model it.
+    r"""Conceal gravity in a kinematic calibration; find, name and model it.
 
     \b
     Examples:

@@ -25,18 +25,17 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
 @click.option(
     "--part",
     type=click.Choice(["machines", "calibration", "bars", "circles", "feed", "noises"]),
-    help="Random machines per plan, rows of calibration and prediction, of these with bars that nobody knows or that are warm, rows "
-    "of circles, of the feed that they show, or of circles under noises of another generator, only.",
+    help="Compute this part only: random machines per plan (machines); figures of calibration and prediction (calibration), also with unknown or warm bars (bars); figures of circles (circles), their feed (feed), or circles with another generator's noises (noises).",
 )
 @click.option(
     "--draws",
     type=click.IntRange(min=3),
-    help=f"Draws for each row of a table; {SESSIONS} sessions of calibration, {CIRCLES} circles of each of six noises, or recordings, if not given.",
+    help=f"Draws for each row of a table [default: {SESSIONS} sessions of calibration, {CIRCLES} circles of each of six noises, or {CIRCLES} recordings].",
 )
 @click.option(
     "--keep",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Folder of the draws: a study that was interrupted goes on there.",
+    help="Folder that keeps the draws, so that an interrupted study can continue.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def coverage(
@@ -44,15 +43,17 @@ def coverage(
 ) -> None:
     r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.
 
-    On the plan with five raised bars all 24 parameters; on the level plan those combinations that level bars see, on
-    machines without a common height of their base joints. Mountings, CMM, bar and noise scatter as plan and session
-    state. Predicted positions are looked at 150 mm and 10 degrees about the middle of the travel.
+    On the plan with five raised bars, the study checks all 24 parameters. On the level plan it checks the combinations
+    that level bars determine, on machines without a common height error of the base joints. Mountings, CMM, bar and
+    noise scatter as plan and session state. Predicted positions are checked up to 150 mm and 10 degrees from the middle
+    of the travel.
 
-    The table has a row for each figure of calibration and prediction, with and without a stated tolerance of joints, from sessions of
-    the independent virtual machine in tests/plant.
+    The table has a row for each figure of calibration and prediction, with and without a stated joint tolerance. Its
+    sessions come from the independent virtual machine in tests/plant.
 
-    Figures of circles: of machines with serial axes that tests/plant makes, perfect, as good as the noise and worn, with three
-    sizes of white and of correlated noise, with errors of bar, temperatures and ball drawn as they are stated.
+    Figures of circles come from serial machines of tests/plant: perfect, as good as the noise, and worn. Each has three
+    sizes of white and of correlated noise. Errors of bar, temperatures and ball are drawn from their stated
+    uncertainties.
 
     \b
     Examples:

@@ -30,9 +30,9 @@ ROWS = {
 def gravity(*, machines: int, seed: int, figure: Path | None, force: bool, as_json: bool) -> None:
     r"""Compensate gravity in nine conditions of random machines [GRAV Table 4, Fig 6].
 
-    The struts' compliance is identified as the paper does it, after a kinematic calibration on the jig, and in one fit
-    with the kinematics. Each machine has random kinematic errors of 0.1 mm and the reference machine's gravity; bar
-    readings have 1 µm of noise.
+    The struts' compliance is identified in two ways: after a kinematic calibration on the jig, as in the paper, and in
+    one joint fit with the kinematics. Each machine has random kinematic errors of 0.1 mm and the reference machine's
+    gravity; bar readings have 1 µm of noise.
 
     \b
     Examples:

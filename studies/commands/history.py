@@ -18,13 +18,13 @@ import click
 @click.option(
     "--changes", default=300, show_default=True, type=click.IntRange(min=10), help="Histories per kind of change."
 )
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of all of them.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of all histories.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def history(*, tables: int, quantities: int, length: int, changes: int, seed: int, as_json: bool) -> None:
     r"""Simulate histories: how many raise a false alarm, and how soon steps and drifts are found.
 
-    The stated share of false alarms is that of the Markov chain, for the whole table and as many sessions. Delays are
-    those of one quantity in such a table, also for other settings than the program's.
+    The stated share of false alarms comes from the Markov chain, for the whole table and the same number of sessions.
+    Delays are given for one quantity of such a table, also with other settings than the program's.
 
     \b
     Examples:

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:
-    r"""Follow platform-joint errors of some µm, hidden to 99 %, from "cannot tell" to a name.
+    r"""Follow platform-joint errors of some µm, concealed to 99 %, from "cannot tell" to an identified cause.
 
-    The machine is measured on the jig and diagnosed; the tests that the diagnosis proposes are recorded on it, and it
-    is diagnosed again, until platform joints are named.
+    The machine is measured on the jig and diagnosed. The study then records the tests that the diagnosis proposes and
+    diagnoses again, until platform joints are named.
 
     \b
     Examples:

@@ -23,7 +23,7 @@ _FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
     type=(_FILE, click.FloatRange(min=0.0, min_open=True)),
     multiple=True,
     metavar="DRIVE.csv N/A",
-    help="A recording of current, and the force that an ampere makes; may be given more than once.",
+    help="Recording of motor current, and the force per ampere [N/A]; may be given more than once.",
 )
 @click.option(
     "--pair",
@@ -39,7 +39,7 @@ _FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
     type=(_FILE, str, str),
     multiple=True,
     metavar="TABLE.csv MEASURED SIMULATED",
-    help="A table with the names of its measured and simulated column; may be given more than once.",
+    help="A table, and the names of its measured and simulated columns; may be given more than once.",
 )
 @click.option(
     "--only", multiple=True, metavar="NAME", help="Vary this constant; may be given more than once [default: all]."
@@ -56,10 +56,11 @@ def sensitivities(
     jobs: int | None,
     as_json: bool,
 ) -> None:
-    r"""Ask again with every constant that decides an answer halved and doubled.
+    r"""Repeat an analysis with every deciding constant halved and doubled.
 
-    Drive recordings are asked by the constants of `drive`, pairs of sessions by those of `compare`, tables by those of
-    `mismatch`. What is printed tells which verdicts change, and which parameter changes most in its standard uncertainties.
+    Drive recordings use the constants of `drive`, pairs of sessions the constants of `compare`, and tables the
+    constants of `mismatch`. The command prints which verdicts change, and which parameter changes most in units of its
+    standard uncertainty.
 
     \b
     Examples:

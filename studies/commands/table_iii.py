@@ -17,15 +17,17 @@ TITLES = {
 
 @click.command()
 @click.option("--machines", default=100, show_default=True, type=click.IntRange(min=5), help="Random machines.")
-@click.option("--rigid", is_flag=True, help="Struts that gravity does not stretch: nothing but kinematic errors.")
+@click.option(
+    "--rigid", is_flag=True, help="Simulate struts that gravity does not stretch: machines with kinematic errors only."
+)
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def table_iii(*, machines: int, rigid: bool, seed: int, as_json: bool) -> None:
     r"""Calibrate random machines in the paper's three ways and verify them on the jig [CAL Table III, Fig 7].
 
-    Conv-A: balls put up under the spindle, centres removed. Conv-B: the same with set-up errors measured to 1 µm.
-    Proposed: raw circles on the jig plate. Default: not calibrated. Each machine has random kinematic errors of
-    0.1 mm and, unless --rigid, the reference machine's gravity, which none of the three models.
+    Conv-A puts balls under the spindle and removes the centres. Conv-B does the same with set-up errors measured to 1
+    µm. Proposed uses raw circles on the jig plate. Default is not calibrated. Each machine has random kinematic errors
+    of 0.1 mm. Without --rigid it also has the reference machine's gravity, which no method models.
 
     \b
     Examples:

@@ -1,1 +1,1 @@
-"""The hexapod: geometry, kinematics, Jacobians, travel, statics."""
+"""Geometry, kinematics, Jacobians, travel and statics of the hexapod."""

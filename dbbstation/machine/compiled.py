@@ -22,15 +22,15 @@ Result = TypeVar("Result")
 Kernel = TypeVar("Kernel", bound="Callable[..., Any]")
 
 SMALLEST_BLOCK = 2048
-"""Poses per thread below which starting a thread costs more than it gains."""
+"""Fewest poses per thread that repay starting it."""
 
 REORDER = frozenset({"reassoc", "contract", "arcp", "nsz"})
-"""What the compiler may do to arithmetic: reorder sums, fuse multiplication with addition, multiply by reciprocals,
-forget the sign of zero. It may not assume that there is no NaN and no infinity, which the kernels have to notice."""
+"""Arithmetic changes allowed to the compiler: reorder sums, fuse multiplication with addition, multiply by reciprocals,
+ignore the sign of zero. NaN and infinity must remain, because the kernels detect them."""
 
 
 class NotKeptWarning(UserWarning):
-    """Compiled code could not be kept."""
+    """Compiled code could not be stored on disk."""
 
 
 NOT_KEPT = (
@@ -42,14 +42,14 @@ NOT_KEPT = (
 def compiled(kernel: Kernel) -> Kernel:
     """Compile a loop at its first call and keep the code on disk.
 
-    Without a writable place, beside the package or in the cache folder, `NotKeptWarning` is issued once. Kernels run
-    without Python's global lock for `in_blocks`; Numba's parallel loops abort when two threads enter them.
+    If neither the package folder nor the cache folder is writable, `NotKeptWarning` is issued once. Kernels release
+    Python's global lock, so `in_blocks` can use threads; Numba's parallel loops abort when two threads enter them.
     """
     return cast("Kernel", _Kernel(kernel, cache=True, nogil=True))
 
 
 def inlined(part: Kernel) -> Kernel:
-    """Compile a part into each kernel, where constant shapes allow vector instructions (twice as fast)."""
+    """Compile a function into each calling kernel: constant shapes then allow vector instructions (twice as fast)."""
     return cast("Kernel", _Kernel(part, forceinline=True))
 
 
@@ -59,11 +59,11 @@ class _Kernel:
         self._options = options
         self._dispatcher: Callable[..., Any] | None = None
 
-    def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401 - as the loop has them
+    def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401 - same arguments as the loop
         return (self._dispatcher or self.dispatcher())(*arguments)
 
     def dispatcher(self) -> Callable[..., Any]:
-        """Return the compiled loop with its parts."""
+        """Return the compiled loop with its inlined parts."""
         with _COMPILING:
             if self._dispatcher is None:
                 import numba  # noqa: PLC0415 - takes a third of a second
@@ -76,7 +76,7 @@ class _Kernel:
                 how: Any = {"error_model": "numpy", "fastmath": set(REORDER), **self._options}
                 try:
                     made = numba.njit(**how)(whole)
-                except RuntimeError:  # before anything is compiled: no folder for the code can be written to
+                except RuntimeError:  # raised before compilation: no folder for the code is writable
                     made = numba.njit(**{**how, "cache": False})(whole)
                     _say_not_kept()
                 self._dispatcher = cast("Callable[..., Any]", made)
@@ -93,7 +93,7 @@ def _say_not_kept() -> None:
 
 
 _COMPILING = threading.RLock()
-"""Threads that call a kernel first at the same time compile it once."""
+"""Lock that makes simultaneous first calls compile a kernel once."""
 
 
 def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:

@@ -1,4 +1,4 @@
-"""Differences of two machine files, in their terms."""
+"""Differences of two machine files, by their keys."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 DESCRIPTION = frozenset({"name", "control"})
-"""Keys that say nothing of the nominal machine itself; what a control corrects is counted as a part of the commands."""
+"""Keys that do not describe the nominal machine; a control's correction counts as part of the commands."""
 
 NOT_PREDICTED = frozenset({"travel", "joint_tolerance_mm", "acceleration_mm_s2"})
-"""Keys that no prediction of a calibrated model uses: what the machine may reach, and what a fit took for likely."""
+"""Keys that no prediction of a calibrated model uses: limits of motion, and prior standard deviations of a fit."""
 
 CONTROL = frozenset({"base_joints_mm", "platform_joints_mm", "rotation", "reference_length_error_mm"})
-"""Keys that every prediction uses: what the control drives the struts by."""
+"""Keys that every prediction uses, because the control computes strut lengths from them."""
 
 NOT_GIVEN = "not given"
 
 ROUNDED_MM = 1e-6
-"""Joints and lengths that differ by no more are the same, written with fewer decimals: a nanometre, which no test sees [mm]."""
+"""Smaller differences of joints and lengths are rounding: a nanometre, which no test resolves [mm]."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Difference:
 
 
 def differences(one: Machine, other: Machine) -> tuple[Difference, ...]:
-    """Return every difference beyond a nanometre, names aside."""
+    """Return every difference beyond a nanometre, except names."""
     return tuple(found for found in _between("", one, other) if found.first_key not in DESCRIPTION)
 
 

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 STRUTS = 6
 
 GREATEST_FEED_MM_MIN = 100_000.0
-"""Feed that a machine is taken to reach where its file says nothing: 100 m/min, the rapid of the fastest parallel machine
-tools. It keeps senseless numbers out of programs; what the machine really reaches belongs into its file [mm/min]."""
+"""Greatest feed if the machine file states none [mm/min]: 100 m/min, the rapid of the fastest parallel machine tools.
+It only keeps senseless numbers out of programs; the true limit belongs in the machine file."""
 
 GREATEST_TURN_DEG_MIN = 36_000.0
-"""The same for moves that only turn: a hundred turns per minute [deg/min]."""
+"""Greatest feed of pure rotations if unstated: a hundred turns per minute [deg/min]."""
 
 ACCELERATION_MM_S2 = 1000.0
-"""Acceleration of the tool tip that a control is taken to plan with where the machine file says nothing: 1 m/s², a tenth of
-gravity, at the lower end of machine tools. Pieces that keep their feed with it keep it with more [mm/s²]."""
+"""Planned acceleration of the tool tip if the machine file states none [mm/s²]: 1 m/s², a tenth of gravity, low for
+machine tools. Segments that keep their feed at this acceleration keep it at higher ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +97,9 @@ class StrutMasses:
     Attributes:
         strut_kg: spread evenly between the joints.
         motor_kg: behind the base joint, turning with the strut.
-        motor_length_mm: its centre is half of it behind the joint.
+        motor_length_mm: its centre is half this length behind the joint.
         screw_kg: ends at the platform joint and slides through the base joint.
-        screw_length_mm: its rear end sticks out behind the joint.
+        screw_length_mm: its rear end protrudes behind the base joint.
     """
 
     strut_kg: float
@@ -113,7 +113,7 @@ class StrutMasses:
 class JointAxes:
     """Directions of universal joints' axes in base and platform, of any length.
 
-    The first axis is fixed there, the second in the strut, across it.
+    The first axis is fixed in base or platform, the second in the strut, perpendicular to it.
 
     Attributes:
         base: machine frame, shape (6, 3) [1].
@@ -130,7 +130,7 @@ class ControlCorrection:
 
     Attributes:
         correction: `kinematics`, or `parameters` of a kinematics with tables.
-        sources: values of the error sources that it takes out, by name and parameter.
+        sources: values of the corrected error sources, by name and parameter.
     """
 
     correction: str
@@ -146,14 +146,14 @@ class ControlCorrection:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The nominal machine, as its controller assumes.
+    """The nominal machine, as the controller assumes it.
 
     Attributes:
-        reference_length_error_mm: corrected by the controller, which drives strut i to F_i(T) minus this, shape (6,).
+        reference_length_error_mm: corrected by the controller: it drives strut i to F_i(T) minus this error, shape (6,).
         joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly; None if unknown.
         greatest_turn_deg_min: at a resting tool tip; None if unknown.
         acceleration_mm_s2: planned by the control; None if unknown.
-        control: the control's own correction; None for none. Everything else here is nominal.
+        control: the control's own correction; None for a nominal control.
     """
 
     name: str
@@ -173,15 +173,15 @@ class Machine:
 
     @property
     def feed_limit_mm_min(self) -> float:
-        """Return the greatest F written for the tool tip [mm/min]."""
+        """Return the greatest F word for moves of the tool tip [mm/min]."""
         return GREATEST_FEED_MM_MIN if self.greatest_feed_mm_min is None else self.greatest_feed_mm_min
 
     @property
     def planned_acceleration_mm_s2(self) -> float:
-        """Return the acceleration for choosing pieces [mm/s²]."""
+        """Return the acceleration used to choose segment lengths [mm/s²]."""
         return ACCELERATION_MM_S2 if self.acceleration_mm_s2 is None else self.acceleration_mm_s2
 
     @property
     def turn_limit_deg_min(self) -> float:
-        """Return the greatest F of a pure turn [deg/min]."""
+        """Return the greatest F word for pure rotations [deg/min]."""
         return GREATEST_TURN_DEG_MIN if self.greatest_turn_deg_min is None else self.greatest_turn_deg_min

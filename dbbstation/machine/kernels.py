@@ -1,8 +1,9 @@
 """Compiled loops over poses: forward kinematics and bar sensitivities.
 
-Arrays only; `kinematics.py` is the interface. Kernels work on poses `start` to `stop`. Joints have shape (m, 6, 3),
-balls (m, 3), m = 1 or n. Poses are processed in groups of `LANES`, the last axis of work arrays and innermost loop.
-Lanes do not branch, so results do not depend on grouping; a last group repeats its last pose.
+`kinematics.py` is the interface; kernels accept arrays only and compute poses `start` to `stop`. Joints have shape (m,
+6, 3), balls (m, 3), with m = 1 or n. Poses are processed in groups of `LANES`, the last axis of work arrays and
+innermost loop. Lanes do not branch, so results do not depend on grouping. The last group is filled by repeating its
+last pose.
 
 t (3, LANES) and r (3, 3, LANES) are platform positions and rotations, q and p joints of base and platform (6, 3,
 LANES); a Jacobian (6, 6, LANES) has rows [u, (R P) x u]. All kernels are in one file because the compiler's cache checks one file.
@@ -24,14 +25,14 @@ SINGULAR = 1
 TOO_MANY_STEPS = 2
 
 REUSING = 2
-"""Number of the Newton step, from 0, that takes the Jacobian of the one before."""
+"""Newton step, counted from 0, that reuses the previous Jacobian."""
 
 LANES = 64
-"""Poses in a group: the fewest whose loops the compiler does not unroll away; work arrays stay in the inner caches."""
+"""Poses per group: the fewest whose loops the compiler does not unroll; work arrays still fit the inner caches."""
 
 LOOSE = 1e-20
-"""Square of how far a column of a matrix has to lean out of those before it. Rounding alone comes to 1e-26 where the
-struts hold nothing; a pose just above the limit is useless as well, but it has a solution [1 or mm², by column]."""
+"""Least squared distance of a matrix column from the span of the previous columns [1 or mm², by column]. Rounding gives
+1e-26 at exactly singular poses. A pose just above the limit has a solution, but a useless one."""
 
 
 @inlined
@@ -41,7 +42,7 @@ def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> 
 
 @inlined
 def _gather(first: int, stop: int, rows: Floats, lanes: Floats) -> None:
-    """Gather rows from `first`, shape (n, k), into lanes, shape (k, LANES); a single row goes to all."""
+    """Gather rows from `first`, shape (n, k), into lanes, shape (k, LANES); a single row fills all lanes."""
     for lane in range(LANES):
         n = min(first + lane, stop - 1, rows.shape[0] - 1)
         for k in range(rows.shape[1]):
@@ -105,7 +106,7 @@ def _lengths(
     p: Floats,
     length: Floats,
 ) -> None:
-    """Lengths of the struts, shape (6, LANES)."""
+    """Compute strut lengths, shape (6, LANES)."""
     for i in range(6):
         for lane in range(LANES):
             _, _, _, sx, sy, sz = _arm_and_span(i, lane, t, r, q, p)
@@ -122,7 +123,7 @@ def _struts(
     arm: Floats,
     jacobian: Floats,
 ) -> None:
-    """Lengths (6, LANES), arms (6, 3, LANES) and Jacobian (6, 6, LANES) of the struts."""
+    """Compute strut lengths (6, LANES), arms (6, 3, LANES) and the Jacobian (6, 6, LANES)."""
     for i in range(6):
         for lane in range(LANES):
             ax, ay, az, sx, sy, sz = _arm_and_span(i, lane, t, r, q, p)
@@ -139,9 +140,9 @@ def _struts(
 def _orthogonalise(matrix: Floats, triangle: Floats, sound: Floats) -> None:
     """Orthogonalise columns of a matrix, shape (6, 6, LANES), in place by modified Gram-Schmidt.
 
-    With the right-hand side as a further column (`_substitute`) this is as stable as pivoted elimination without
-    exchanges: Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal.
-    Appl. 13 (1992) 176-190]
+    With the right-hand side as a further column (`_substitute`), this is equivalent to Householder's method: as stable
+    as pivoted elimination, but without row exchanges. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix
+    Anal. Appl. 13 (1992) 176-190]
     """
     for k in range(6):
         for lane in range(LANES):
@@ -193,7 +194,7 @@ def _compare(
     square: Floats,
     state: Integers,
 ) -> int:
-    """Set the residual to wanted less present lengths, (6, LANES); return the number of searching lanes."""
+    """Set the residual to target minus present lengths, (6, LANES); return the number of unconverged lanes."""
     for lane in range(LANES):
         square[lane] = 0.0
     for i in range(6):
@@ -229,7 +230,7 @@ def _newton(
 
 @inlined
 def _move(t: Floats, r: Floats, step: Floats, state: Integers) -> None:
-    """Move searching platforms by (dt, w), shape (6, LANES) [mm, rad].
+    """Move unconverged platforms by (dt, w), shape (6, LANES) [mm, rad].
 
     Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4) is an exact rotation without sine; its angle is |w| less |w|³/12.
     """
@@ -269,8 +270,8 @@ def forward(
 ) -> None:
     """Newton-Raphson on strut lengths [CAL eq 2], from near poses to lengths `target` (n, 6).
 
-    J (dt, w) = target - L with exact Jacobian and rotation converges quadratically; only the third step reuses a
-    Jacobian. `outcome` (n,): converged if the root of summed squared residuals is within `tolerance` [mm].
+    Solving J (dt, w) = target - L with exact Jacobian and rotation converges quadratically; only the third step reuses
+    a Jacobian. `outcome` (n,) is converged if the residual's norm is within `tolerance` [mm].
     """
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, wanted = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, LANES))
@@ -281,7 +282,7 @@ def forward(
         _gather_machine(start, first, stop, near_position, near_rotation, base, platform, t, r, q, p)
         _gather(first, stop, target, wanted)
         for lane in range(LANES):
-            state[lane] = TOO_MANY_STEPS  # until it turns out otherwise
+            state[lane] = TOO_MANY_STEPS  # initial value
         for number in range(most_steps):
             reuse = number == REUSING
             if reuse:
@@ -388,11 +389,12 @@ def bar(
     gain: Floats,
     outcome: Integers,
 ) -> None:
-    """Return a bar's length and sensitivities by the adjoint: one solution per pose.
+    """Return a bar's length and sensitivities by the adjoint method: one linear solution per pose.
 
-    With n from fixed to tool ball and o the tool ball in the platform frame, J^T g = [n, (R o) x n] gives the sensitivity
-    to strut lengths; g_i u_i is that to base joint i. Shapes: fixed_ball in the machine frame, tool_ball in the platform
-    frame, lengths (n,), directions (n, 3), gain (n, 24): six struts, then base joints' x, y, z.
+    With n from fixed to tool ball and o the tool ball in the platform frame, J^T g = [n, (R o) x n] gives the
+    sensitivity to strut lengths; g_i u_i is the sensitivity to base joint i. Shapes: fixed_ball in the machine frame,
+    tool_ball in the platform frame, lengths (n,), directions (n, 3), gain (n, 24): six struts, then base joints' x, y,
+    z.
     """
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 TOLERANCE_MM = 1e-11
-"""Strut length residual at which the forward kinematics is content: it puts the pose itself within 1e-9 mm."""
+"""Strut length residual at which the forward kinematics stops: the pose is then within 1e-9 mm."""
 
 PARAMETERS = 4 * STRUTS
-"""Strut lengths and base-joint coordinates: the 24 of [CAL II-C]."""
+"""The 24 parameters of [CAL II-C]: strut lengths and base-joint coordinates."""
 
 MOST_STEPS = 25
-"""Newton steps: three do from a commanded pose; more than ten mean that there is no pose nearby."""
+"""Most Newton steps: three suffice from a commanded pose; after ten no nearby pose exists."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,10 @@ def forward(hexapod: Hexapod, length_mm: Floats, near: Frames) -> Frames:
     """Return the poses of these strut lengths within 1e-11 mm [CAL eq 2].
 
     Args:
-        near: start of Newton-Raphson, usually commanded.
+        near: starting values of Newton-Raphson, usually commanded poses.
 
     Raises:
-        KinematicsError: no pose; names the first.
+        KinematicsError: lengths without pose; names the first.
     """
     count = len(near)
     found = Frames(np.empty((count, 3)), np.empty((count, 3, 3)))
@@ -95,7 +95,7 @@ def forward(hexapod: Hexapod, length_mm: Floats, near: Frames) -> Frames:
     failed = outcome != kernels.CONVERGED
     if failed.any():
         first = int(np.argmax(failed))
-        # A length that is no number makes a pose that is none, and that one counts as singular.
+        # A NaN length makes a NaN pose, which counts as singular.
         singular = bool(outcome[first] == kernels.SINGULAR and np.isfinite(target[first]).all())
         _refuse(first, near, hexapod, target, singular=singular)
     return found
@@ -112,7 +112,7 @@ class Response:
 
     Attributes:
         per_parameter: struts, then x, y, z of base joints in machine axes, shape (n, 24) [unit/mm].
-        direction: to the tool ball's shift, machine axes, shape (n, 3) [unit/mm].
+        direction: sensitivity to shifts of the tool ball, machine axes, shape (n, 3) [unit/mm].
         rotation: of the platform, shape (n, 3, 3).
     """
 
@@ -148,7 +148,7 @@ class BarSensitivity:
 
     Attributes:
         length_mm: between ball centres, shape (n,).
-        direction: from fixed to moving ball, shape (n, 3) [1]; minus the derivative by the fixed ball.
+        direction: from fixed to moving ball, shape (n, 3) [1]; the derivative by the fixed ball's place is minus this.
         response: of the length [mm/mm].
     """
 
@@ -163,11 +163,11 @@ def bar_sensitivity(
     fixed_ball_mm: Floats,
     tool_ball_mm: Floats | None = None,
 ) -> BarSensitivity:
-    """Return a bar's length and analytic derivatives by the adjoint: one 6x6 solve per pose.
+    """Return a bar's length and its exact derivatives by the adjoint method: one 6x6 solution per pose.
 
-    [CAL II-D] says "can be computed only numerically"; by the implicit function theorem a strut error dL moves the pose
-    by J^-1 dL. With bar direction n and J^T g = [n, (R o) x n] the bar feels g dL; joints enter as strut errors u dQ and
-    -u R dP.
+    [CAL II-D] says "can be computed only numerically"; but by the implicit function theorem a strut error dL moves the
+    pose by J^-1 dL. With bar direction n and J^T g = [n, (R o) x n], the length changes by g dL. Joint errors act as
+    strut errors u dQ and -u R dP.
 
     Args:
         tool_ball_mm: platform frame, shape (3,) or (n, 3); default: the tool tip.
@@ -224,7 +224,7 @@ def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Resp
 def _spans(hexapod: Hexapod, frames: Frames) -> tuple[Floats, Floats]:
     """Return T + R P - Q and R P, both (n, 6, 3) [mm].
 
-    NumPy avoids half a second of compiler start.
+    NumPy is used because starting the compiler takes half a second.
     """
     base, platform = _joints(hexapod, len(frames))
     arm = platform @ np.swapaxes(frames.rotation, 1, 2)

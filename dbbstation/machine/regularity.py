@@ -1,4 +1,4 @@
-"""Check that joints fit together: every second joint is turned by 120 degrees."""
+"""Check that joints are consistent: every second joint is rotated by 120 degrees."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 REGULAR_MM = 0.05
-"""The sides of a triangle that was designed equal agree by this, written with one decimal. Three joints of a design of another
-kind, with sides of half a metre, do so by chance once in (0.05 / 500)² = a hundred million [mm]."""
+"""Sides of an equilateral design, written with one decimal, agree within this [mm]. Three joints of another design,
+half a metre apart, agree by chance once in (500 / 0.05)², a hundred million."""
 
 OFF_MM = 1.0
-"""No rounding makes sides differ by more [mm]."""
+"""Rounding cannot make sides differ by more [mm]."""
 
 
 def check_joints(machine: Machine) -> None:
-    """Refuse a machine with three exactly regular joints and three that are not.
+    """Refuse a machine if three of its joints are regular and the other three are not.
 
-    Machines are accepted if all or none of their joints are regular.
+    Machines with all joints regular, or all irregular, are accepted.
 
     Raises:
-        ModelError: names the joint, or its three, and the deviation.
+        ModelError: names the joint, or its triplet, and the deviation.
     """
     for key in ("base_joints_mm", "platform_joints_mm"):
         joints = np.asarray(getattr(machine.hexapod, key))
@@ -64,7 +64,7 @@ def _sides_mm(triangle: Floats) -> Floats:
 
 
 def _turned(vector: Floats, axis: Floats, turn: float) -> Floats:
-    """Return a vector turned by a third about an axis [Rodrigues]."""
+    """Return a vector rotated by 120 degrees about an axis [Rodrigues]."""
     angle = turn * 2.0 * np.pi / 3.0
     turned: Floats = (
         vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1.0 - np.cos(angle))

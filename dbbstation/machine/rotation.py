@@ -1,4 +1,4 @@
-"""Two conventions of the tilt angles A, B, C, and frames."""
+"""Frames, and two conventions of the tilt angles A, B, C."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 class Rotation(StrEnum):
-    """How A, B and C make R, from platform to machine vectors."""
+    """Conventions by which A, B and C give R, from platform to machine vectors."""
 
     XYZ = "Rx(A) Ry(B) Rz(C)"
     ZYX = "Rz(C) Ry(B) Rx(A)"
-    """As LinuxCNC's `genhexkins` has it."""
+    """The convention of LinuxCNC's `genhexkins`."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 @dataclass(frozen=True)
 class Load:
-    """Load on the platform beside axial strut forces.
+    """Load on the platform, without axial strut forces.
 
     Attributes:
         force_n: machine axes, shape (n, 3).
@@ -49,7 +49,7 @@ class Load:
 def platform_weight(frames: Frames, masses: Masses) -> Load:
     """Return the platform's weight at its centre of gravity: [W, r_G x W], W = m g.
 
-    The mass is the platform's own; [GRAV eq 1] takes the entire system's, part of which base joints carry.
+    The mass is the platform's own. [GRAV eq 1] uses the mass of the entire system, although base joints carry part of it.
     """
     weight = masses.platform_kg * GRAVITY_M_S2 * DOWN
     lever = frames.rotation[:, :, 2] * masses.centre_of_gravity_above_tip_mm
@@ -78,9 +78,9 @@ def _first_moment_kg_mm(struts: Struts, masses: StrutMasses) -> Floats:
 
 
 def transverse_load(struts: Struts, pull_n: Floats) -> Load:
-    """Return the struts' transverse load: [sum f, sum (R P) x f].
+    """Return the platform load by the struts' transverse pulls: [sum f, sum (R P) x f].
 
-    [GRAV eq 3 and 6] have the moment; [GRAV eq 1] omits the force.
+    [GRAV eq 3 and 6] contain the moment, but [GRAV eq 1] omits the force.
     """
     return Load(pull_n.sum(axis=1), np.cross(struts.arm_mm, pull_n).sum(axis=1))
 
@@ -88,10 +88,10 @@ def transverse_load(struts: Struts, pull_n: Floats) -> Load:
 def strut_tensions(struts: Struts, load: Load) -> Floats:
     """Return axial forces at platform joints, tension positive, shape (n, 6) [N].
 
-    Solves J^T T = [F, M]: [GRAV eq 1 and 6], signed, where eq 7 prints the magnitude.
+    Solves J^T T = [F, M] [GRAV eq 1 and 6]. The result has a sign; eq 7 uses the magnitude.
 
     Raises:
-        KinematicsError: a pose where the struts cannot hold the platform.
+        KinematicsError: the struts cannot hold the platform at a pose.
     """
     count = len(struts.length_mm)
     tension = np.empty((count, STRUTS))
@@ -112,10 +112,10 @@ def strut_tensions(struts: Struts, load: Load) -> Floats:
 
 
 def compliance_mm_per_n(length_mm: Floats, compliance: Compliance) -> tuple[Floats, Floats]:
-    """Return a strut's compliance: constant part and growing part.
+    """Return a strut's compliance: a constant part and a part proportional to length.
 
-    [GRAV eq 7] K (alpha L + C_B) as c at 1000 mm with growing share s: c (1 - s) and c s L / 1000 mm. (alpha, printed
-    S/E, means 1/(S E).) Both have shape (n, 6) [mm/N] for lengths between joints, shape (n, 6) [mm].
+    [GRAV eq 7] gives K (alpha L + C_B); alpha, printed S/E, means 1/(S E). With the compliance c at 1000 mm and its
+    growing share s, the parts are c (1 - s) and c s L / 1000 mm. Both have shape (n, 6) [mm/N].
     """
     at_1000mm, share = compliance.at_1000mm_mm_per_n, compliance.growing_share
     return np.full(length_mm.shape, at_1000mm * (1.0 - share)), at_1000mm * share * length_mm / 1000.0
@@ -124,9 +124,9 @@ def compliance_mm_per_n(length_mm: Floats, compliance: Compliance) -> tuple[Floa
 def stretch_mm(struts: Struts, compliance: Compliance, tension_n: Floats, masses: StrutMasses | None = None) -> Floats:
     """Return elastic elongation, shape (n, 6) [mm] [GRAV eq 7].
 
-    The strut's own axial weight, omitted in [GRAV eq 7], stretches sections above it. The constant part sees
-    `motor_loads`; along the growing part an even rod counts half, and a screw of length l, L of it below the joint, L /
-    (2 l) of its weight. The motor stretches nothing.
+    [GRAV eq 7] omits the strut's own axial weight, which stretches the sections above it. `motor_loads` act on the
+    constant part. On the growing part, an even rod counts with half its weight. A screw of length l with L below the
+    joint counts with L / (2 l) of its weight; the motor does not count.
     """
     fixed, growing = compliance_mm_per_n(struts.length_mm, compliance)
     stretch = (fixed + growing) * tension_n
@@ -140,7 +140,7 @@ def stretch_mm(struts: Struts, compliance: Compliance, tension_n: Floats, masses
 def motor_loads(struts: Struts, tension_n: Floats, masses: StrutMasses | None = None) -> Floats:
     """Return the motors' axial forces, positive if the platform pulls, shape (n, 6) [N].
 
-    Tension plus the axial weight of the moving part, by virtual work.
+    By virtual work, this is the tension plus the axial weight of the moving parts.
     """
     if masses is None:
         return tension_n

@@ -17,28 +17,28 @@ if TYPE_CHECKING:
     from dbbstation.machine.kinematics import Struts
 
 ROUNDING = 1e-9
-"""A pose on the limit itself is inside; rounding must not decide [mm or deg]."""
+"""Tolerance for rounding: a pose exactly on the limit is inside [mm or deg]."""
 
 
 LEAST_STIFFNESS = 0.02
-"""Share of the middle's Jacobian determinant below which a pose counts as loose: the struts then hardly hold the
-platform in some direction. Travel limits alone allow such poses: on a PM-600-like machine at high tilt near the
-upper rim, where the determinant passes through zero."""
+"""Least Jacobian determinant, relative to the middle of the travel. Below it a pose counts as loose: the struts hardly
+hold the platform in some direction. Travel limits alone allow such poses. On a PM-600-like machine the determinant
+passes through zero at high tilt near the upper limit."""
 
 
 SMALLER = "move the circle, make it smaller or tilt it less"
-"""What helps against a pose outside the travel."""
+"""Remedy for poses outside the travel."""
 
 
 def check_travel(machine: Machine, poses: Floats, *, where: str, remedy: str = SMALLER) -> None:
     """Refuse poses, shape (n, 6) [mm, deg], outside the nominal travel.
 
     Raises:
-        TravelError: names `where`, the first pose outside, and its worst limit.
+        TravelError: names `where`, the first pose outside, and the limit that it exceeds most.
     """
     quantities = _limited_quantities(machine, poses)
     excess = np.stack([np.maximum(low - value, value - high) for _, _, value, low, high in quantities])
-    # A quantity that is not a number is outside as well.
+    # NaN is also outside.
     outside = ~(excess <= ROUNDING)
     if not outside.any():
         return
@@ -54,7 +54,7 @@ def check_travel(machine: Machine, poses: Floats, *, where: str, remedy: str = S
 
 
 def middle(machine: Machine) -> Frames:
-    """Return the middle of the travel: on the Z axis, half-way, untilted, one pose."""
+    """Return the pose in the middle of the travel: on the Z axis, at mid-height, untilted."""
     height = sum(machine.travel.z_mm) / 2.0
     return Frames.from_poses(np.array([[0.0, 0.0, height, 0.0, 0.0, 0.0]]), machine.hexapod.rotation)
 
@@ -82,5 +82,5 @@ def _limited_quantities(
 
 def _hold(machine: Machine, struts: Struts) -> Floats:
     there = inverse(machine.hexapod, middle(machine))
-    with np.errstate(invalid="ignore"):  # a pose that is no number has no hold, and is refused for it
+    with np.errstate(invalid="ignore"):  # a NaN pose counts as loose and is refused
         return np.asarray(np.linalg.det(strut_jacobian(struts)) / np.linalg.det(strut_jacobian(there)))

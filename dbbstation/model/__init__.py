@@ -1,1 +1,1 @@
-"""Machine models: nominal geometry plus error sources, predicted and inverted."""
+"""Machine models, nominal geometry plus error sources: prediction and inversion."""

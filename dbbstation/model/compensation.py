@@ -1,6 +1,7 @@
-"""Inversion of a machine model: commands for wanted motion.
+"""Invert a machine model: find commands for wanted motion.
 
-Stretches are inverted in order, with the memory of play, friction and lag, in bounded computer memory.
+The path is inverted in successive stretches, which bounds computer memory. The states of play, friction and lag pass
+from one stretch to the next.
 """
 
 from __future__ import annotations
@@ -22,37 +23,37 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Fitted, Motion, State
 
 MOST_ROUNDS = 50
-"""An error that hangs on the pose needs three or four: each round leaves the ratio of error to travel, about 1e-4."""
+"""Most iterations. A pose-dependent error needs three or four: each reduces the difference to the ratio of error to travel, about 1e-4."""
 
 AGREED_MM = 1e-10
 
 MET_MM = 1e-9
-"""How well a strut meets its length where there is a history: a thousandth of what programs write."""
+"""Tolerance of strut lengths with sources that have memory: a thousandth of the resolution of programs."""
 
 MOST_TOGETHER = 512
-"""Rows that are tried at once behind the last one that is met."""
+"""Most rows solved together after the last solved row."""
 
 TRIES = 8
-"""Most rounds for rows together, before the first one that is not met is looked for alone."""
+"""Most iterations for rows together; then the first unsolved row is searched alone."""
 
 GETS_ON = 0.5
-"""Share of what the first row lacks that a round may leave of it; a row in which more is left is looked for alone."""
+"""If an iteration leaves more than this share of the first unsolved row's error, this row is searched alone."""
 
 FEWEST_TOGETHER = 16
-"""Rows that are tried at once where few were met: a round over so many costs as much as over one."""
+"""Fewest rows solved together: an iteration over so many costs as much as over one."""
 
 STEEPEST, FLATTEST = -3.0, -0.2
-"""Bounds of the slope that is taken from two rounds: of what a strut lacks by what is commanded, -1 where its error does not
-change with the command."""
+"""Bounds of the secant slope of a strut's missing length over its command; -1 if the error does not depend on the
+command."""
 
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """A model's memory of a path between stretches.
+    """A model's memory at the end of a stretch.
 
     Attributes:
-        states: of sources with history, accumulating ones first, else in the model's order.
-        held_back_mm: the history's addition in the last row, start of the next search, shape (6,).
+        states: of sources with memory: accumulating sources first, otherwise in the model's order.
+        held_back_mm: addition by these sources in the last row, at which the next search starts, shape (6,).
     """
 
     model: MachineModel
@@ -61,11 +62,11 @@ class Passed:
 
 
 def compensated(model: MachineModel, wanted: Motion) -> Floats:
-    """Return commands for wanted poses in six degrees of freedom, shape (n, 6) [mm, deg], for all rows.
+    """Return the commands, shape (n, 6) [mm, deg], that bring the machine to all wanted poses.
 
     Args:
         model: only the machine's sources are inverted.
-        wanted: motion between commanded poses is straight: predict it as `straight`.
+        wanted: motion between commanded poses is straight, so predict it with `straight`.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
@@ -75,11 +76,11 @@ def compensated(model: MachineModel, wanted: Motion) -> Floats:
 
 
 def begun(model: MachineModel, wanted: Motion) -> Passed:
-    """Return the memory before a path.
+    """Return the memory at the start of a path.
 
     Args:
         model: only the machine's sources are inverted.
-        wanted: the path or its begin, which shows directions.
+        wanted: the path, or its beginning, which gives directions of motion.
 
     Raises:
         ModelError: a source needs missing data, or looks ahead.
@@ -99,12 +100,12 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
 
 
 def compensated_on(passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
-    """Return commands along one stretch, shape (n, 6) [mm, deg], and the memory behind it.
+    """Return commands along one stretch, shape (n, 6) [mm, deg], and the memory at its end.
 
-    The command is the pose at which nominal lengths equal F(T wanted; actual) minus the sources' errors. Weights act at
-    wanted poses, other sources on commands. Sources without history converge in a few rounds; accumulating ones state
-    what reaches the wanted lengths, without the jumps of others. Other histories are tried for rows together; the first
-    missed row is bisected strut by strut [as at a reversal, where play makes the command jump].
+    The command is the pose whose nominal strut lengths equal F(T wanted; actual) minus the sources' errors. Weights act
+    at wanted poses, other sources at commanded poses. Sources without memory converge in a few iterations. Accumulating
+    sources invert their own effect. Other sources with memory are solved for many rows together. If a row fails, as at
+    a reversal with play, it is searched alone by bisection for each strut.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
@@ -119,7 +120,7 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
 def shifted(model: MachineModel, wanted: Motion) -> Floats:
     """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
 
-    This first-order method, with a wrong orientation, is kept for comparison.
+    This first-order method leaves the orientation wrong; it is kept for comparison.
     """
     error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
     poses = wanted.poses.copy()
@@ -167,15 +168,15 @@ class _Stretch:
         self._smooth, self._known = self._without_search()
 
     def commanded(self, driven: Floats) -> Floats:
-        """Return poses of nominal lengths, shape (n, 6) [mm, deg]."""
+        """Return the poses at nominal lengths, shape (n, 6) [mm, deg]."""
         return forward(self._nominal, driven, self._target).to_poses(self._convention)
 
     def passed(self) -> Passed:
-        """Return the memory behind the last row."""
+        """Return the memory after the last row."""
         return Passed(self._own, (*self._built_up, *self._states), self._held_back)
 
     def _without_search(self) -> tuple[Floats, Effect]:
-        """Return driven lengths without search, shape (n, 6) [mm], and the effect's part that does not jump with the command."""
+        """Return driven lengths for sources that need no search, shape (n, 6) [mm], and the effect of weights and accumulating sources."""
         motion, last, bent = self._wanted, np.full((len(self._wanted), 6), np.inf), Effect()
         built_up = [np.zeros((len(self._wanted), 6)) for _ in self._building_up]
         there: Actual | None = None
@@ -207,7 +208,7 @@ class _Stretch:
         return driven, bent + Effect(strut_mm=sum(built_up, np.zeros_like(driven)))
 
     def with_history(self) -> Floats:
-        """Return driven lengths, shape (n, 6) [mm], row by row with memory."""
+        """Return driven lengths with memory, shape (n, 6) [mm]."""
         if not self._searched:
             return self._smooth
         count, row, together = len(self._wanted), 0, MOST_TOGETHER
@@ -236,7 +237,7 @@ class _Stretch:
             self._held_back = driven[row - 1] - self._smooth[row - 1]
 
     def _tried(self, rows: slice) -> tuple[Floats, int, tuple[State, ...]]:
-        """Try rows together; return driven lengths, shape (k, 6) [mm], the number of met rows, and the states behind all."""
+        """Solve rows together; return driven lengths, shape (k, 6) [mm], the number of solved rows, and the states after all."""
         smooth = self._smooth[rows]
         driven = smooth + self._held_back
         slope = _Slope()
@@ -257,7 +258,7 @@ class _Stretch:
         return driven, met, states
 
     def _alone(self, row: int) -> tuple[Floats, tuple[State, ...]]:
-        """Search one row; return driven lengths, shape (1, 6) [mm], and the states behind it."""
+        """Search one row; return driven lengths, shape (1, 6) [mm], and the states after it."""
         rows = slice(row, row + 1)
         search = RootSearch((self._smooth[row] + self._held_back), MET_MM)
         while not search.done:
@@ -273,7 +274,7 @@ class _Stretch:
         return search.at[None], self._lacking(rows, search.at[None])[1]
 
     def _lacking(self, rows: slice, driven: Floats) -> tuple[Floats, tuple[State, ...]]:
-        """Return the shortfall of driven lengths for wanted poses, shape (k, 6) [mm], and the states."""
+        """Return needed minus driven lengths for wanted poses, shape (k, 6) [mm], and the states after them."""
         target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
         motion = self._driven_to(driven, rows, target)
         effect, states = self._known.rows(rows) + self._own.together(self._others, motion), []

@@ -1,4 +1,4 @@
-"""Expected centre and mean reading of a circle before its fit."""
+"""Predict a circle's centre, mean reading and form before its fit."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource, Motion
 
 SECTORS = 72
-"""Places of the turn at which a circle is predicted: centre and mean of a smooth form need no more."""
+"""Number of angles at which a circle is predicted, enough for centre and mean of a smooth form."""
 
 
 def expected_circle(
     observation: Observation, known_by: MachineModel | IdentifiedModel, causes: Iterable[ErrorSource]
 ) -> Expected:
-    """Return a run's expected circle.
+    """Return a run's expected circle with its covariance.
 
-    Without identification every pose-dependent cause has its usual or stated size. An identified model contributes its
+    Pose-dependent causes have their usual or stated sizes. An identified model replaces the machine's causes by its
     covariance and residual.
 
     Args:
@@ -42,7 +42,7 @@ def expected_circle(
     Raises:
         KinematicsError: the machine cannot take the circle.
     """
-    # A ball that was put up under the spindle has no place of its own; its circle has a radius like any other.
+    # A ball set up under the spindle has no independent place, but its circle has a radius.
     setup = replace(observation.setup, place_known=True, set_up_errors=None)
     sparse = replace(observation, raw=averaged(observation.raw, SECTORS), commanded=None, setup=setup)
     motion = sparse.motion()
@@ -71,7 +71,7 @@ def expected_circle(
             local[cause.key] = to_local @ cause.columns_mm
         if cause.at_a_pose:
             covariance += (fit @ cause.columns_mm) @ (fit @ cause.columns_mm).T
-    # A raised bar sees cos e of a horizontal shift.
+    # A raised bar measures cos e times a horizontal shift.
     along = sparse.raw.circle.radius_mm / sparse.raw.circle.bar_mm
     scale = np.diag([1.0 / along, 1.0 / along, 1.0])
     mounting_mm = float(np.max(observation.setup.mounting_repeatability_mm))
@@ -93,13 +93,13 @@ def expected_circle(
 
 @dataclass(frozen=True, eq=False)
 class _Acting:
-    """One cause along a run.
+    """One cause with its effect along a run.
 
     Attributes:
-        key: name and sharing set.
-        columns_mm: reading by one standard deviation of each parameter, shape (n, p).
-        at_a_pose: independent of way and time.
-        scatters: variances in the difference of two runs: two per mounting, one if growing with time.
+        key: name, and label of the runs that share its values.
+        columns_mm: change of the reading by one standard deviation of each parameter, shape (n, p).
+        at_a_pose: whether it depends on the pose alone.
+        scatters: number of its variances in the difference of two runs: two if it varies with the mounting, one if it varies with time.
     """
 
     key: tuple[str, str]
@@ -118,18 +118,18 @@ def _acting(
     shapes: Floats,
     test: str,
 ) -> Iterator[_Acting]:
-    """Return causes along a run; `shapes` are undulations beyond shift and length, shape (n, 4)."""
+    """Yield causes along a run; `shapes` are the second and third undulations, shape (n, 4)."""
     if identified is not None:
         yield from _of_model(reading, motion, model, identified)
         left_mm = 1e-3 * float(identified.report.get("residual_rms_um", 0.0))
-        # What is left of a circle is its form, the same in all its runs.
+        # The model's residual is part of the circle's form, equal in all its runs.
         yield _Acting(("left by the model", test), left_mm * np.column_stack(_as_circle(motion)), at_a_pose=True)
         yield _Acting(("left of the form by the model", test), left_mm * shapes, at_a_pose=False)
     for source in causes:
         of_machine = source.belongs_to is Owner.MACHINE
-        # A model says where the machine goes; how that differs between directions and days has its usual size.
+        # A model predicts the machine's place. Differences between directions and days keep their usual size.
         known = of_machine and identified is not None and source.needs <= {Need.POSE}
-        # What happens once is what a verdict is there to find. A sound run has none of it.
+        # Single events are faults to be found; a sound run has no such event.
         if source.happens_once or source.of_currents or known or not source.needs <= {Need.POSE, Need.PATH, Need.TIME}:
             continue
         try:
@@ -139,11 +139,11 @@ def _acting(
             usual = np.array([parameter.plausible for parameter in parameters])
             size = usual if stated is None else np.asarray(stated, dtype=np.float64)
             at_a_pose = source.needs <= {Need.POSE}
-            # Amplitudes are zero as long as nothing is known; what says when, such as a time constant, has its usual value.
+            # Unknown amplitudes are zero; parameters of timing, such as time constants, have their usual value.
             about = np.where([bool(parameter.grid) and not at_a_pose for parameter in parameters], usual, 0.0)
             columns = reading.by_source(source, model.machine, about) * size
         except ModelError:
-            continue  # the machine file does not have what it acts on
+            continue  # the machine file lacks an input of this cause
         if np.all(np.isfinite(columns)):
             scatters = 2.0 if source.belongs_to is Owner.MOUNTING else float(source.varies_with == "time")
             key = source.name, source.shared_by(motion)
@@ -151,7 +151,7 @@ def _acting(
 
 
 def _as_circle(motion: Motion) -> tuple[Floats, Floats, Floats]:
-    """Return the readings of shifts along X and Y and of a longer bar, shape (n,) each."""
+    """Return changes of the reading by unit shifts along X and Y and by a longer bar, shape (n,) each."""
     assert motion.setup is not None  # noqa: S101 - observations have one
     off = motion.poses[motion.kept, :3] - motion.setup.fixed_ball_mm
     towards = off / np.linalg.norm(off, axis=1)[:, None]
@@ -175,7 +175,7 @@ def _of_model(
         yield _Acting(("model", ""), by_parameter @ root[rows], at_a_pose=True)
         if (
             identified.unseen is not None
-        ):  # what was held at nominal has its usual size, as of a machine that nobody calibrated
+        ):  # parameters held at nominal have their usual size, as on an uncalibrated machine
             yield _Acting(("held by the model", ""), by_parameter @ identified.unseen[:, rows].T, at_a_pose=True)
 
 

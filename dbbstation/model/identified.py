@@ -1,4 +1,4 @@
-"""A machine model with uncertainty and provenance of its numbers."""
+"""A machine model with the uncertainty and origin of its parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import MachineModel
 
 Row = tuple[str, str, str]
-"""Source, set and parameter of a row of the covariance."""
+"""Source, sharing set and parameter of a row of the covariance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +22,13 @@ class IdentifiedModel:
     """The outcome of a calibration or diagnosis.
 
     Attributes:
-        model: nominal machine, its own sources, and the measurement's by owner.
+        model: nominal machine with error sources of the machine and of the measurement.
         covariance_rows: (source, set, parameter) of every row.
-        covariance: in products of units, shape (k, k), formula errors included; zero along held directions.
-        directions_lost: undetermined by the recordings, in words.
+        covariance: in products of units, shape (k, k), with formula errors; zero in directions held at nominal.
+        directions_lost: descriptions of directions that the recordings do not determine.
         sessions: SHA-256 of its session files, by folder.
-        null_space: undetermined combinations of rows at plausible sizes, shape (h, k); None in old files.
-        formula_variance: each row's variance by its formula, equal in all sessions, shape (k,); None for none.
+        null_space: undetermined combinations of rows, scaled to prior standard deviations, shape (h, k); None in old files.
+        formula_variance: part of each row's variance due to its formula, equal in all sessions, shape (k,); None if zero.
     """
 
     model: MachineModel
@@ -51,7 +51,7 @@ class IdentifiedModel:
     def uncertainties(self) -> dict[Row, float | None]:
         """Return each parameter's standard uncertainty; None if unknown.
 
-        Prescribed parameters define coordinates, in which all are known.
+        Prescribed parameters define the coordinates, so all parameters are known.
         """
         variance = np.maximum(np.diag(self.covariance), 0.0)
         along = np.where(variance > 0.0, 0.0, np.inf if self.directions_lost else 0.0)
@@ -64,9 +64,9 @@ class IdentifiedModel:
 
     @property
     def uncertainties_between_sessions(self) -> dict[Row, float]:
-        """Return each parameter's standard uncertainty of change between sessions.
+        """Return the standard uncertainty of each parameter for comparing two sessions.
 
-        Formula errors and held values are common to both.
+        Formula errors and held values are common to both sessions and do not count.
         """
         variance = np.diag(self.covariance) - (0.0 if self.formula_variance is None else self.formula_variance)
         return dict(zip(self.covariance_rows, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
@@ -83,7 +83,7 @@ class IdentifiedModel:
 
 
 def known_u(variance: Floats, along: Floats) -> Floats:
-    """Return standard uncertainties; NaN if mostly guessed."""
+    """Return standard uncertainties; NaN if the prior mostly determines them."""
     return np.sqrt(np.where(along > variance, np.nan, variance + along))
 
 

@@ -1,4 +1,4 @@
-"""From commands to the tool's actual place and a bar's reading."""
+"""Predict the tool's actual place and a bar's reading from commands."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 AGREED_MM = 1e-9
 MOST_ROUNDS = 30
-"""Four or five bring weights and pose together; a machine that needs more is about to fold."""
+"""Most iterations of weights and pose: four or five converge; a machine that needs more is nearly loose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,26 +39,26 @@ class MachineModel:
     """Nominal geometry plus error sources.
 
     Attributes:
-        sources: of every owner; each acts on motions of its set.
+        sources: error sources of machine and measurement; each acts on the motions that share its values.
     """
 
     machine: Machine
     sources: tuple[Fitted, ...] = ()
 
     def of_the_machine(self) -> MachineModel:
-        """Return the model with the machine's own sources."""
+        """Return the model with only the machine's sources."""
         return replace(self, sources=tuple(f for f in self.sources if f.source.belongs_to is Owner.MACHINE))
 
     def anywhere(self) -> MachineModel:
-        """Return the model with sources that depend only on the pose."""
+        """Return the model with only sources that depend on the pose alone."""
         own = self.of_the_machine()
         return replace(own, sources=tuple(f for f in own.sources if f.source.needs <= {Need.POSE}))
 
     def effect(self, motion: Motion, there: Actual | None = None) -> Effect:
-        """Return the effect of all sources but motor currents'.
+        """Return the effect of all sources, without sources of motor currents.
 
         Args:
-            there: where weights act; None: commanded poses of the nominal machine.
+            there: actual machine on which weights act; None for commanded poses of the nominal machine.
 
         Raises:
             ModelError: a source needs missing data.
@@ -66,7 +66,7 @@ class MachineModel:
         return self.together(self.acting(motion), motion, there)
 
     def together(self, several: Iterable[Fitted], motion: Motion, there: Actual | None = None) -> Effect:
-        """Return the effect of some sources, as `effect`."""
+        """Return the joint effect of given sources; arguments as for `effect`."""
         total = Effect()
         for fitted in several:
             fitted.source.require(motion)
@@ -77,12 +77,12 @@ class MachineModel:
         return total
 
     def acting(self, motion: Motion) -> tuple[Fitted, ...]:
-        """Return sources that move machine or reading."""
+        """Return the sources that change pose or reading of this motion."""
         return tuple(f for f in self.sources if f.shared == f.source.shared_by(motion) and not f.source.of_currents)
 
     @cached_property
     def as_found(self) -> Machine:
-        """Return the machine file with the identified compliance."""
+        """Return the machine with the identified compliance."""
         found = [f.source.found_compliance(self.machine, f.values) for f in self.sources]
         return next((replace(self.machine, compliance=one) for one in found if one is not None), self.machine)
 
@@ -97,13 +97,13 @@ class MachineModel:
         return strut_lengths(self.machine.hexapod, frames) - self.machine.reference_length_error_mm
 
     def actual(self, motion: Motion) -> Actual:
-        """Return the platform's actual place: F^-1(driven + strut errors; actual joints) [CAL eq 2].
+        """Return the platform's actual frames: F^-1(driven + strut errors; actual joints) [CAL eq 2].
 
-        Weights bend the machine at its actual place. Their effect is iterated from the commanded pose to a picometre;
-        each round leaves a thousandth of the change, near loose poses a hundredth.
+        Weights act on the machine at its actual place. Their effect is iterated from the commanded pose to a picometre;
+        each iteration reduces the change to a thousandth, near loose poses to a hundredth.
 
         Raises:
-            KinematicsError: names the first impossible pose, also by weights.
+            KinematicsError: the machine or its weights make a pose impossible; names the first.
             ModelError: a source needs missing data.
         """
         commanded = motion.frames(self.machine)
@@ -137,16 +137,16 @@ class MachineModel:
         return self.actual(motion).tool_frames().to_poses(self.machine.hexapod.rotation)[motion.kept]
 
     def bar(self, motion: Motion) -> BarReading:
-        """Return a bar's reading about the motion's fixed ball and its sensitivities, kept rows.
+        """Return the bar's predicted readings about the fixed ball, with sensitivities, for kept rows.
 
-        A ball under the spindle has the tip's actual place at set-up. Micrometer readings and the bar's calibration are
-        included.
+        A ball set up under the spindle is at the tool tip's actual place at that time. Micrometer readings and the
+        bar's calibration are included.
         """
         setup = motion.setup
         if setup is None:
             raise ValueError("a motion without a set-up has no bar")
         if motion.reading_mm is None and any(Need.READING in f.source.needs for f in self.sources):
-            # Nobody measured: the encoder stands where all other sources put it.
+            # Without measured positions, the encoder is at the place that all other sources predict.
             others = replace(self, sources=tuple(f for f in self.sources if Need.READING not in f.source.needs))
             motion = replace(motion, reading_mm=others.bar(replace(motion, kept=slice(None))).length_mm)
         actual = self.actual(motion)
@@ -190,7 +190,7 @@ class Actual:
         return replace(self.model.as_found, hexapod=self.hexapod)
 
     def seen_by(self, source: ErrorSource, machine: Machine) -> tuple[Motion, Machine]:
-        """Return motion and machine for a source: actual poses for weights, commanded poses for others."""
+        """Return the motion and machine on which a source acts: actual poses for weights, commanded poses for others."""
         return (self.placed, replace(machine, hexapod=self.hexapod)) if source.weighs else (self.motion, machine)
 
     def by(self, fitted: Fitted) -> Effect:
@@ -200,8 +200,8 @@ class Actual:
     def derivative(self, fitted: Fitted) -> Effect:
         """Return the effect's derivative by one source's parameters, shape (..., p).
 
-        Stretch of other sources is proportional to a fitted compliance. Resulting motion of weights is omitted: a
-        thousandth, near loose poses a hundredth, which costs a fit only rounds.
+        The stretch by other sources is proportional to a fitted compliance. The resulting motion of weights is omitted:
+        a thousandth, near loose poses a hundredth. The omission costs a fit only iterations.
 
         Raises:
             ModelError: the source needs missing data.
@@ -235,8 +235,8 @@ class BarReading:
     Attributes:
         length_mm: kept rows, shape (n,).
         sensitivity: all rows.
-        standing: machine while a ball was set under the spindle; else None.
-        ball_response: sensitivity of that ball's X, Y and Z.
+        standing: machine while a ball was set up under the spindle; else None.
+        ball_response: sensitivities of this ball's X, Y and Z.
     """
 
     actual: Actual
@@ -253,7 +253,7 @@ class BarReading:
         return self._by(lambda actual: source.derivative(*actual.seen_by(source, machine), values))
 
     def by_fitted(self, fitted: Fitted) -> Floats:
-        """Return the derivative by a model source's parameters, with its effect through others, (n, p)."""
+        """Return the derivative by a model source's parameters, including its effect on other sources, shape (n, p)."""
         return self._by(lambda actual: actual.derivative(fitted))
 
     def _by(self, derivative: Callable[[Actual], Effect]) -> Floats:
@@ -266,7 +266,7 @@ class BarReading:
         return total - self.sensitivity.direction[self.actual.motion.kept] @ np.vstack(moved)
 
     def by_parameters(self, derivative: Effect) -> Floats:
-        """Return the reading's derivative, shape (n, p), from an effect's; kept rows."""
+        """Return the reading's derivative, shape (n, p), from the derivative of an effect; kept rows."""
         kept = self.actual.motion.kept
         total = by_parameters(derivative, self.sensitivity.response, kept)
         if derivative.fixed_ball_mm is not None:
@@ -278,7 +278,7 @@ class BarReading:
 
 
 def by_parameters(derivative: Effect, response: Response, kept: slice) -> Floats | float:
-    """Return any quantity's derivative through struts, joints and tool, shape (n, p); 0.0 if none."""
+    """Return a quantity's derivative by parameters that act on struts, joints or tool, shape (n, p); 0.0 without effect."""
     total: Floats | float = 0.0
     if derivative.strut_mm is not None:
         total = total + _contract(response.per_strut[kept], _rows(derivative.strut_mm, 1, kept), 1)
@@ -300,7 +300,7 @@ def _contract(gain: Floats, array: Floats, axes: int) -> Floats:
     flat = gain.reshape(count, -1)
     if array.ndim == axes + 1:
         matrix = array.reshape(-1, parameters)
-        if np.array_equal(matrix, np.eye(parameters)):  # joints and struts: each coordinate its own parameter
+        if np.array_equal(matrix, np.eye(parameters)):  # joints and struts, with one parameter per coordinate
             return flat
         return flat @ matrix
     per_sample: Floats = np.einsum("ni,nip->np", flat, array.reshape(count, -1, parameters))

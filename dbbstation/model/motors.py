@@ -1,4 +1,4 @@
-"""Motor forces and currents along a motion."""
+"""Predict motor forces and currents along a motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class MotorCurrents:
     """Predicted currents of one run.
 
     Attributes:
-        there: actual machine.
+        there: the actual machine along the run.
         current_a: kept rows, shape (n, 6).
     """
 
@@ -51,7 +51,7 @@ class MotorCurrents:
 def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
     """Predict a run's currents from loads at actual poses.
 
-    Strut masses are ignored if a source fits them.
+    Strut masses of the machine file are ignored if a source fits them.
 
     Raises:
         KinematicsError: a pose is impossible or loose.
@@ -75,5 +75,5 @@ def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
 
 
 def drives(model: MachineModel) -> tuple[Fitted, ...]:
-    """Return sources of motor currents."""
+    """Return the model's sources of motor currents."""
     return tuple(f for f in model.sources if f.source.of_currents)

@@ -1,4 +1,4 @@
-"""One run with command and measurement, for calibration and diagnosis."""
+"""A run's commands and measurements, for calibration and diagnosis."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from dbbstation.trace.circle import RawCircle
 
 STANDING = 3
-"""Samples of a machine that stands still: as many as a speed is taken from."""
+"""Samples of a resting machine: the fewest from which a speed is computed."""
 
 LEAD_IN_STEP_DEG = 1.0
-"""Spacing of the poses before the turn, where history is made but nothing is compared [deg]."""
+"""Spacing of the poses before the turn [deg]; they only build up the memory of sources."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +29,8 @@ class Observation:
 
     Attributes:
         started_s: after the session's start; None if unknown.
-        commanded: poses at lead-in and raw samples; None for the plan's circle.
-        stood: pose while a ball was put up under the spindle, shape (6,); None for the ball's place.
+        commanded: commanded poses at lead-in and raw samples; None for the plan's circle.
+        stood: pose during the set-up of a ball under the spindle, shape (6,); None for the ball's place.
     """
 
     test: str
@@ -52,9 +52,9 @@ class Observation:
         return np.arange(-self.raw.circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
 
     def motion(self) -> Motion:
-        """Return the run for error sources: lead-in arc, then the turn's samples.
+        """Return the run's motion for error sources: the lead-in arc, then the turn's samples.
 
-        A ball under the spindle is taken as set up just before.
+        A ball under the spindle is assumed to be set up just before.
         """
         raw, circle = self.raw, self.raw.circle
         name = f"{self.setup.session}: {self.label}"
@@ -82,11 +82,11 @@ class Observation:
 
     @property
     def standing_pose(self) -> Floats:
-        """Return the commanded pose while the ball was put up, shape (6,) [mm, deg]."""
+        """Return the commanded pose during the ball's set-up, shape (6,) [mm, deg]."""
         return np.array([*self.setup.fixed_ball_mm, *self.raw.circle.tilt_deg]) if self.stood is None else self.stood
 
     def _standing(self, until_s: float | None) -> Motion:
-        """Return the machine standing at the set-up: three samples, a second apart."""
+        """Return the resting motion during the set-up: three samples, a second apart."""
         raw = self.raw
         pose = self.standing_pose
         return Motion(

@@ -1,4 +1,4 @@
-"""Roots of several one-variable functions between bounds."""
+"""Find roots of several one-variable functions between bounds."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 FIRST_STEP = 1.5
-"""Times what is missing: the first step to the other side of a zero."""
+"""First step towards the other side of a zero, in units of the missing length."""
 
 MOST_STEPS = 300
-"""A hundred halvings of a bound, and twice begun anew."""
+"""Most steps: a hundred halvings and two restarts."""
 
 NARROW = 1e-12
-"""Bounds this close hold a jump: no argument between them makes the function zero [mm]."""
+"""Bounds so close enclose a jump without a zero [mm]."""
 
 MOST_MM = 10.0
-"""How far from its first guess an argument is looked for: the largest error that any machine has [mm]."""
+"""Search range about the first guess: the largest error of any machine [mm]."""
 
 ANEW = 3
 
 
 class RootSearch:
-    """Finds x_i with f_i(x) = 0, f_i decreasing in x_i and nearly independent of others.
+    """Finds x with f_i(x) = 0, if f_i decreases in x_i and hardly depends on the other arguments.
 
     Args:
         guess: start, shape (k,).
         met: |f| that counts as zero.
 
     Attributes:
-        at: next argument; the answer when `done`, shape (k,).
-        lost: first function, from 1, without zero near the guess; 0 for none.
+        at: next argument; the root when `done`, shape (k,).
+        lost: number, from 1, of the first function without zero near the guess; 0 if all have one.
     """
 
     def __init__(self, guess: Floats, met: float) -> None:
@@ -44,7 +44,7 @@ class RootSearch:
         self._low, self._low_value, self._high, self._high_value, self._step = (nothing.copy() for _ in range(5))
 
     def tell(self, value: Floats) -> None:
-        """Take f at `at`, shape (k,), and set the next argument."""
+        """Record f at `at`, shape (k,), and set the next argument."""
         open_ = np.abs(value) > self._met
         if not open_.any():
             self.done = True
@@ -78,9 +78,9 @@ class RootSearch:
             self.done, self.lost = True, 1 + int(np.argmax(away if away.any() else open_))
 
     def _between(self, width: Floats) -> Floats:
-        """Return by turns the middle, limited by |f|, and false position.
+        """Return alternately the middle, limited by |f|, and the false position.
 
-        False position is exact at slope -1, as behind a play.
+        False position is exact for the slope -1, as after a play.
         """
         middle = self._low + 0.5 * width
         with np.errstate(invalid="ignore", divide="ignore"):

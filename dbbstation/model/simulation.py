@@ -1,4 +1,4 @@
-"""Predicted recordings: whole turns without noise, by the planned set-up."""
+"""Predict recordings of whole turns without noise, for the planned set-up."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def simulate_circle(
 
     Args:
         started_s: after the session's start; None if not needed.
-        command: from wanted motion to commands, shape (n, 6); None: the same.
+        command: function from wanted motion to commands, shape (n, 6); None if equal.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.

@@ -1,4 +1,4 @@
-"""A model's uncertainty of the tool's place in the workspace."""
+"""Uncertainty of the tool's predicted place in the workspace."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 def position_uncertainty_mm(identified: IdentifiedModel, motion: Motion, *, about_mean: bool = False) -> Floats:
     """Return standard uncertainties of predicted X, Y and Z, kept rows, shape (n, 3) [mm]; NaN if unknown.
 
-    First-order propagation. Unknown if an acting source has no uncertainty or undetermined combinations dominate
+    First-order propagation. It is unknown if an acting source has no uncertainty or undetermined combinations dominate
     (`known_u`).
 
     Args:
-        about_mean: of positions less their mean.
+        about_mean: return uncertainties of positions less their mean.
 
     Raises:
         KinematicsError: names the first impossible pose.
@@ -52,7 +52,7 @@ def position_uncertainty_mm(identified: IdentifiedModel, motion: Motion, *, abou
 
 @with_one_thread
 def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int) -> float | None:
-    """Return the standard uncertainty of the range along one axis [mm], to first order by its two poses; None if unknown.
+    """Return the standard uncertainty of the range along one axis [mm], to first order from its two extreme poses; None if unknown.
 
     Raises:
         KinematicsError: names the first impossible pose.
@@ -61,17 +61,17 @@ def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int)
     actual = identified.model.of_the_machine().actual_poses(motion)
     off = actual[:, axis] - motion.poses[motion.kept][:, axis]
     ends = motion.poses[motion.kept][[int(np.argmax(off)), int(np.argmin(off))]]
-    # Half of their difference is how far each is from their mean.
+    # Each extreme pose is half the range from their mean.
     half = position_uncertainty_mm(identified, Motion(ends), about_mean=True)[0, axis]
     return None if np.isnan(half) else 2.0 * float(half)
 
 
 ROUNDING_MM = 1e-9
-"""Movements of the tool per unit of a parameter that are rounding [mm]."""
+"""Smaller tool movements per unit of a parameter are rounding [mm]."""
 
 
 def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[Floats, Floats]:
-    """Return sensitivities of X, Y and Z to covariance rows, shape (3, n, k), and to unknown sources."""
+    """Return sensitivities of X, Y and Z to covariance rows, shape (3, n, k), and to sources without uncertainty."""
     model = identified.model.of_the_machine()
     actual = model.actual(motion)
     row_of = {row: k for k, row in enumerate(identified.covariance_rows)}
@@ -95,7 +95,7 @@ def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[Floats, F
 
 
 POSES_AT_ONCE = 5_000
-"""Poses that are predicted together: sensitivities of so many take some megabytes, and progress shows."""
+"""Poses predicted together: few enough for memory and for progress messages."""
 
 
 @with_one_thread
@@ -104,7 +104,7 @@ def predicted_poses(
     poses: ArrayLike,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[Floats, Floats]:
-    """Return actual poses for independent commanded ones, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm], NaN if unknown.
+    """Return actual poses for single commanded poses, shape (n, 6) [mm, deg], and standard uncertainties of X, Y, Z, shape (n, 3) [mm], NaN if unknown.
 
     Args:
         poses: shape (n, 6) [mm, deg], any numeric type.
@@ -123,7 +123,7 @@ def predicted_poses(
         try:
             actual[some] = model.actual_poses(motion)
         except KinematicsError:
-            model.actual_poses(Motion(commanded))  # fails as well, and counts the pose among all
+            model.actual_poses(Motion(commanded))  # raises again, with the pose's number among all poses
             raise
         known[some] = position_uncertainty_mm(identified, motion)
     progress(len(commanded), len(commanded))
@@ -131,7 +131,7 @@ def predicted_poses(
 
 
 def greatest_u_um(identified: IdentifiedModel, poses: ArrayLike) -> tuple[float | None, float | None, float | None]:
-    """Return the greatest standard uncertainties of X, Y and Z at poses [µm], by sources of the pose; None if one is unknown."""
+    """Return the greatest standard uncertainties of X, Y and Z over poses [µm], from pose-dependent sources; None if one is unknown."""
     anywhere = replace(identified, model=identified.model.anywhere())
     x, y, z = (None if np.isnan(u) else 1e3 * float(u) for u in predicted_poses(anywhere, poses)[1].max(axis=0))
     return x, y, z
@@ -139,11 +139,11 @@ def greatest_u_um(identified: IdentifiedModel, poses: ArrayLike) -> tuple[float 
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Position errors of predicted poses, with their uncertainty.
+    """Statistics of predicted position errors, with their uncertainty.
 
     Attributes:
         common_shift_um: mean error, X, Y, Z.
-        error_about_mean_rms_um: without common shift.
+        error_about_mean_rms_um: rms without the common shift.
         greatest_uncertainty_um: standard, over all axes; None if unknown.
     """
 

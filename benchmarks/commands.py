@@ -72,7 +72,7 @@ predict --model {MODEL} f/nowhere.csv
 simulate --model {MODEL} {PLAN} --out s --tests a
 export {SMALL} --out e.csv
 history f/sessions --table h.csv --json
-plot {SMALL} --tests a --out p.svg
+circles {SMALL} --tests a --figure p.svg
 check {SMALL} {MODEL} {PLAN}
 sources gravity
 sources --json
@@ -90,7 +90,7 @@ HELD = (
     "report",
     "predict",
 )
-LINES += [f"{name} --help" for name in (*HELD, "simulate", "compensate", "export", "history", "fleet", "plot")]
+LINES += [f"{name} --help" for name in (*HELD, "simulate", "compensate", "export", "history", "fleet")]
 OLD_WORDS: dict[str, str] = {}
 """Words of a line that the other checkout spells otherwise."""
 PASSING = re.compile(

@@ -50,7 +50,6 @@ COMMANDS = {
     "jig": "A jig file from a CMM sheet; how well holders repeat.",
     "measure": "Measure a plan, test by test, into a session folder.",
     "mismatch": "Where any simulation and any recording differ, and how.",
-    "plot": "One figure of measured circles, with a title block.",
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "report": "A session as one HTML file: verdict, figures with U.",

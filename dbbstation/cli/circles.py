@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.cli.declared import CommandOutput, command
+from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import echo
 from dbbstation.tasks.circles import circles as task
 from dbbstation.tasks.declare import Option
@@ -34,7 +34,9 @@ def show(
         _print_quick_looks(result.quick_look)
 
 
-circles = command(task, show, CommandOutput("table", table=True, field="csv"))
+circles = command(
+    task, show, CommandOutput("table", table=True, field="csv"), figure(said="figure written to {path}")
+)
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:

@@ -5,6 +5,7 @@ RENAMED = {
     "emulate": "`instrument emulate`",
     "instruments": "`instrument list`",
     "monitor": "`instrument monitor`",
+    "plot": "`circles --figure`",
     "ports": "`instrument ports`",
     "replay": "`instrument replay`",
     "study": "`python -m studies` in a checkout",

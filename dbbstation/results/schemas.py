@@ -21,7 +21,6 @@ from dbbstation.results.instruments import InstrumentsResult
 from dbbstation.results.jig import HoldersResult, SheetResult
 from dbbstation.results.measured import MeasuredSession
 from dbbstation.results.mismatch import MismatchResult
-from dbbstation.results.plotted import PlotResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
 from dbbstation.results.report import ReportResult
@@ -49,7 +48,6 @@ RESULTS: dict[str, type] = {
     "measure": MeasuredSession,
     "mismatch": MismatchResult,
     "mismatch-simulator": SimulatorResult,
-    "plot": PlotResult,
     "predict": PredictionResult,
     "program": ProgramsResult,
     "report": ReportResult,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from dbbstation.circles.path import Filter
     from dbbstation.results.circle_figures import CircleFiguresResult
     from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.tasks.telling import Progress
@@ -31,6 +32,7 @@ def circles(
     quick_look: Annotated[
         bool, Option("Fit the classical signatures of serial axes, which are only symptoms on a hexapod.")
     ] = False,
+    kind: Annotated[Literal["polar", "deviation", "spectrum", "map", "compare"], Option("Kind of figure.")] = "polar",
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     progress: Progress = silent,
@@ -44,6 +46,15 @@ def circles(
     minus the commanded centre; calibration keeps them. G(b), D and H combine both directions. U is 2 u; --budget shows
     its terms.
 
+    --figure draws both directions of a test in one picture, repeats as thin lines, with a title block:
+
+    \b
+    polar      deviation from the least-squares circle, rings one division apart
+    deviation  the same over the angle
+    spectrum   amplitude by undulations per revolution, beside what noise alone would show
+    map        centres of the circles where their balls stand
+    compare    the same tests in two sessions or more, to one scale
+
     \b
     Examples:
       dbbstation circles session
@@ -51,6 +62,8 @@ def circles(
       dbbstation circles session --findings --model model.yaml
       dbbstation circles session --tests a --budget --json
       dbbstation circles session --tests a --quick-look
+      dbbstation circles session --tests a,g --kind deviation --figure a-g.pdf
+      dbbstation circles before after --tests a --kind compare --figure a.png
 
     Args:
         stop: asked after each run.
@@ -78,14 +91,14 @@ def circles(
         progress=telling.counted("circles"),
     )
     telling.note(*found.warnings)
-    return replace(circles_result(found, chosen, quick_look=quick_look), drawing=partial(_drawn, found))
+    return replace(circles_result(found, chosen, quick_look=quick_look), drawing=partial(_drawn, found, chosen, kind))
 
 
-def _drawn(found: Circled, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.circles_figure import circles_figure
+def _drawn(found: Circled, chosen: Filter, kind: str, wanted: object) -> Any:  # noqa: ANN401 - as asked for
+    from dbbstation.report.circles_figure import PlotKind, Plotted, circles_figure
     from dbbstation.report.figure_format import figure_format
 
-    return circles_figure(found, figure_format(wanted))
+    return circles_figure(Plotted(PlotKind(kind), found, chosen), figure_format(wanted))
 
 
 @task("circle")

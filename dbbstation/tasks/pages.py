@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from dbbstation.files.atomic import write_bytes
 from dbbstation.report.figure_format import FigureFormat, Stamped
 from dbbstation.report.history_page import history_html
-from dbbstation.report.plot import PlotKind, Plotted, plot_figure
+from dbbstation.report.circles_figure import PlotKind, Plotted, circles_figure
+from dbbstation.results.circles import circles_result
 from dbbstation.results.tolerances import TOLERATED
 from dbbstation.tasks.circle_runs import load_circles
 from dbbstation.tasks.history import history
@@ -18,24 +19,23 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
+    from dbbstation.results.circles import CirclesResult
     from dbbstation.results.history import HistoryResult
-    from dbbstation.results.plotted import PlotResult
     from dbbstation.tasks.telling import Telling
 
 
 def draw_circles(
     session: Path, out: Path, provenance: Callable[[], Provenance], telling: Telling, *, force: bool
-) -> PlotResult:
+) -> CirclesResult:
     """Write a session's circles as PDF.
 
     Raises:
         StationError: as of `load_circles` and `write_bytes`; no run shows a circle.
     """
     found = load_circles([session], TOLERATED, progress=telling.counted("circles"))
-    made_by = provenance()
-    plotted = Plotted(PlotKind.POLAR, found, TOLERATED, made_by.program)
-    write_bytes(out, plot_figure(plotted, Stamped(FigureFormat.PDF, made_by)), force=force)
-    return plotted.result(str(out))
+    plotted = Plotted(PlotKind.POLAR, found, TOLERATED)
+    write_bytes(out, circles_figure(plotted, Stamped(FigureFormat.PDF, provenance())), force=force)
+    return circles_result(found, TOLERATED)
 
 
 def draw_history(

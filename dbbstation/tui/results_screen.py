@@ -89,7 +89,7 @@ def _accepted(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objec
 
 
 def _drawn(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects
-    yield texts.DRAWN.format(count=len(answer.drawn))
+    yield texts.DRAWN.format(count=sum(hasattr(run, "g_um") for run in answer.runs))
 
 
 def _over_time(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects

@@ -66,7 +66,6 @@ def lines_of(folder):
         "history": ["history", many],
         "export": ["export", SMALL, "--out", folder / "table.csv"],
         "import": ["import", folder / "table.csv", "--out", folder / "imported", *IMPORTED],
-        "plot": ["plot", SMALL, "--tests", "a", "--out", folder / "plot.svg"],
         "simulate": ["simulate", plan[1], "--model", model, "--out", folder / "simulated"],
         "check": ["check", SMALL, PLANS / "ten-minute-check.yaml", MACHINE, "--instrument", "heidenhain-nd281b"],
         "session-list": ["session", "list", SMALL],

@@ -43,7 +43,7 @@ OF_FILES = {
     "mismatch --table": ["mismatch", TABLE, "--measured", "measured_um", "--simulated", "simulated_um", "--table"],
     "mismatch --out": ["mismatch", PENDULUM / "pendulum.csv", "--simulator", PENDULUM / "pendulum.yaml", "--out"],
     "mismatch --figure": ["mismatch", TABLE, "--measured", "measured_um", "--simulated", "simulated_um", "--figure"],
-    "plot --out": ["plot", "{h}/one", "--out"],
+    "circles --figure": ["circles", "{h}/one", "--figure"],
     "predict --table": ["predict", "--model", MODEL, TABLE, "--table"],
     "report --page": ["report", "{h}/one", "--page"],
     "report --pdf": ["report", "{h}/one", "--page", "{h}/report.html", "--pdf"],
@@ -100,7 +100,7 @@ def test_every_option_that_names_an_output_is_in_the_table():
 
 @pytest.mark.parametrize("option", OF_FILES)
 def test_nothing_is_written_into_a_session(shop: Path, option: str) -> None:
-    target = "new.svg" if option.endswith("--figure") or option == "plot --out" else RUN
+    target = "new.svg" if option.endswith("--figure") else RUN
     before = content(shop / "one")
     words = [str(word).replace("{h}", str(shop)) for word in OF_FILES[option]]
     outcome = call(*words, shop / "one" / target, "--force")

@@ -33,7 +33,6 @@ HAS_BAR = [
     "report",
     "history",
     "export",
-    "plot",
     "check",
     "identify",
     "mismatch",

@@ -37,7 +37,6 @@ LONGER = (
     "identify",
     "import",
     "mismatch",
-    "plot",
     "predict",
     "report",
     "simulate",

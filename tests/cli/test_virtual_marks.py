@@ -32,7 +32,7 @@ def test_what_comes_from_a_virtual_session_says_so(tmp_path: Path) -> None:
     assert json.loads(call("check", session, "--json").out)["files"][0]["virtual"] is True
     assert json.loads(call("session", "list", session, "--json").out)["virtual"] is True
     figure = tmp_path / "circle.svg"
-    assert call("plot", session, "--out", figure).code == 0
+    assert call("circles", session, "--figure", figure).code == 0
     assert figure.read_text("utf-8").count("VIRTUAL MACHINE") >= 1
     # A model remembers what it was made of, and so does what is made with it.
     data = yaml.safe_load((shipped_folder("fixtures") / "models" / "small.yaml").read_text("utf-8"))
@@ -73,7 +73,7 @@ def test_every_command_on_a_virtual_session_marks_what_it_makes(tmp_path: Path) 
         ("report", session, "--page", here / "report.html"),
         ("program", "--plan", plan, "--machine", machine, "--model", model, "--out", here / "programs"),
         ("simulate", "--model", model, plan, "--tests", "a", "--samples", 60, "--out", here / "predicted"),
-        *(("plot", session, "--out", here / f"circles.{ending}") for ending in ("svg", "png", "pdf")),
+        *(("circles", session, "--figure", here / f"circles.{ending}") for ending in ("svg", "png", "pdf")),
     )
     for words in commands:
         done = python("-m", "dbbstation", *map(str, words))

@@ -1,4 +1,4 @@
-"""`dbbstation plot`: files of each format, what the title block says, what is refused."""
+"""`dbbstation circles --figure`: files of each format, what the title block says, what is refused."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def edited(folder, pattern, replacement, name="session.yaml"):
 @pytest.mark.parametrize("kind", ["polar", "deviation", "spectrum", "map"])
 def test_the_title_block_says_what_the_session_says(kind, tmp_path):
     out = tmp_path / "figure.svg"
-    outcome = call("plot", SMALL, "--tests", "a,g", "--kind", kind, "--filter", "50", "--out", out)
-    assert (outcome.code, outcome.out) == (DONE, ""), outcome.err
+    outcome = call("circles", SMALL, "--tests", "a,g", "--kind", kind, "--filter", "50", "--figure", out)
+    assert outcome.code == DONE, outcome.err
     said = " ".join(words_of(out))
     for told in ("PM600-0007", "first shift", "DBB-0042", "2026-11-20 08:00", "Gaussian, 50 UPR", __version__):
         assert told in said
@@ -56,31 +56,22 @@ def test_the_title_block_says_what_the_session_says(kind, tmp_path):
     ],
 )
 def test_dates_are_those_of_the_runs_that_are_drawn(tests, kind, dates, tmp_path):
-    outcome = call("plot", SMALL, "--tests", tests, "--kind", kind, "--out", tmp_path / "figure.svg")
+    outcome = call("circles", SMALL, "--tests", tests, "--kind", kind, "--figure", tmp_path / "figure.svg")
     assert outcome.code == DONE, outcome.err
     assert f"measured {dates}" in " ".join(words_of(tmp_path / "figure.svg"))
 
 
 def test_a_single_run_has_one_date(small, tmp_path):
     edited(small, r"(test: g, direction: cw.*state: )accepted", r"\1rejected")
-    outcome = call("plot", small, "--tests", "g", "--out", tmp_path / "figure.svg")
+    outcome = call("circles", small, "--tests", "g", "--figure", tmp_path / "figure.svg")
     assert outcome.code == DONE, outcome.err
     assert "measured 2026-11-20 08:09 UTC bar" in " ".join(words_of(tmp_path / "figure.svg"))
-
-
-def test_the_numbers_are_those_of_circles(tmp_path):
-    told = call("plot", SMALL, "--tests", "a", "--out", tmp_path / "a.svg", "--json").data
-    circles = call("circles", SMALL, "--tests", "a", "--json").data["runs"]
-    assert [(one["direction"], one["g_um"], one["centre_um"]) for one in told["drawn"]] == [
-        (run["direction"], run["g_um"], run["centre_um"]) for run in circles
-    ]
-    assert [one["u_g_um"] for one in told["drawn"]] == [run["uncertainty"]["G"]["u_um"] for run in circles]
 
 
 @pytest.mark.parametrize("ending", [".png", ".pdf", ".PDF"])
 def test_the_ending_says_the_format(tmp_path, ending):
     out = tmp_path / f"figure{ending}"
-    arguments = ("plot", SMALL, "--tests", "a", "--out", out)
+    arguments = ("circles", SMALL, "--tests", "a", "--figure", out)
     assert call(*arguments).code == DONE
     first = out.read_bytes()
     assert first.startswith(BEGINS[ending.lower()])
@@ -89,22 +80,22 @@ def test_the_ending_says_the_format(tmp_path, ending):
     assert "--force" in refused.err
     assert call(*arguments, "--force").code == DONE
     assert out.read_bytes() == first
-    assert call("plot", SMALL, "--out", tmp_path / "figure.jpg").code == USAGE
+    assert call("circles", SMALL, "--figure", tmp_path / "figure.jpg").code == USAGE
 
 
 def test_sessions_are_compared(small, tmp_path):
     out = tmp_path / "both.svg"
     other = small.rename(tmp_path / "other")
-    assert call("plot", SMALL, other, "--tests", "a", "--kind", "compare", "--out", out).code == DONE
+    assert call("circles", SMALL, other, "--tests", "a", "--kind", "compare", "--figure", out).code == DONE
     said = words_of(out)
     assert {"small: test a", "other: test a"} <= set(said)
-    alone = call("plot", SMALL, "--kind", "compare", "--out", tmp_path / "one.svg")
+    alone = call("circles", SMALL, "--kind", "compare", "--figure", tmp_path / "one.svg")
     assert alone.code == FAILED
     assert "name two sessions or more" in alone.err
 
 
 def test_a_test_that_is_not_there_is_refused_with_those_that_are(tmp_path):
-    outcome = call("plot", SMALL, "--tests", "z", "--out", tmp_path / "z.svg")
+    outcome = call("circles", SMALL, "--tests", "z", "--figure", tmp_path / "z.svg")
     assert outcome.code == FAILED
     assert "no session has a test z" in outcome.err
     assert "tests are a, g, l" in outcome.err
@@ -114,9 +105,9 @@ def test_a_test_that_is_not_there_is_refused_with_those_that_are(tmp_path):
 def test_one_direction_is_drawn_and_said(small, tmp_path):
     edited(small, r"(test: g, direction: cw.*state: )accepted", r"\1rejected")
     out = tmp_path / "g.svg"
-    outcome = call("plot", small, "--tests", "g", "--out", out, "--json")
+    outcome = call("circles", small, "--tests", "g", "--figure", out, "--json")
     assert outcome.code == DONE
-    assert outcome.data["one_direction_only"] == ["small: g"]
+    assert outcome.data["pairs"] == []
     said = words_of(out)
     assert "test g: CCW only" in said
     assert "clockwise (CW)" not in said
@@ -130,7 +121,7 @@ def test_a_run_of_few_samples_is_refused_with_its_reason(small, tmp_path, kept):
         head = next(k for k, line in enumerate(lines) if line.startswith("t_s"))
         path.write_text("\n".join(lines[: head + 1 + kept]) + "\n", "utf-8")
     edited(small, r"(test: g, .*), sha256: [0-9a-f]{64}", r"\1")
-    outcome = call("plot", small, "--tests", "g", "--out", tmp_path / "g.svg")
+    outcome = call("circles", small, "--tests", "g", "--figure", tmp_path / "g.svg")
     assert outcome.code == FAILED
     assert "g" in outcome.err
     assert "fault of dbbstation" not in outcome.err
@@ -142,7 +133,7 @@ def test_what_people_typed_is_text(small, tmp_path, ending):
     edited(small, r"^operator:.*$", f"operator: '{EVIL} 安'")
     edited(small, r"^name:.*$", f"name: '{EVIL}'", "plan.yaml")
     out = tmp_path / f"evil.{ending}"
-    outcome = call("plot", small, "--tests", "a", "--out", out)
+    outcome = call("circles", small, "--tests", "a", "--figure", out)
     assert outcome.code == DONE, outcome.err
     assert "Glyph" not in outcome.err
     if ending == "svg":

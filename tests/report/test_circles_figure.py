@@ -1,4 +1,4 @@
-"""Sheets of `plot`: labels keep off one another, title blocks say what the session says, both directions are drawn."""
+"""Sheets of `circles --figure`: labels keep off one another, title blocks say what the session says, both directions are drawn."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dbbstation.circles.path import Filter
 from dbbstation.circles.spectrum import spectrum_of
 from dbbstation.report.drawing import in_style
 from dbbstation.report.label_places import Box, place_labels
-from dbbstation.report.plot import PlotKind, Plotted, draw_plot
+from dbbstation.report.circles_figure import PlotKind, Plotted, draw_circles
 from dbbstation.report.sheet import width_of_in, wrapped
 from dbbstation.tasks.circle_runs import load_circles
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -40,7 +40,7 @@ def only(found, sessions, tests=None):
 
 def drawn(kind, found):
     with in_style():
-        figure = draw_plot(Plotted(kind, found, Filter.NONE, "dbbstation 0.0"))
+        figure = draw_circles(Plotted(kind, found, Filter.NONE))
         FigureCanvasAgg(figure).draw()
     return figure
 

@@ -34,9 +34,7 @@ def show(
         _print_quick_looks(result.quick_look)
 
 
-circles = command(
-    task, show, CommandOutput("table", table=True, field="csv"), figure(said="figure written to {path}")
-)
+circles = command(task, show, CommandOutput("table", table=True, field="csv"), figure(said="figure written to {path}"))
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:

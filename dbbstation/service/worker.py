@@ -166,7 +166,13 @@ def _drawn(job: SessionJob, settings: Settings) -> object:
 
     session, out, telling = _needed(job.session, "session"), Path(job.out), Telling(_stage, say=_note)
     if job.task is SessionTask.FIGURES:
-        return draw_circles(session, out, lambda: _provenance("circles", session, "--filter", "30", "--figure", out), telling, force=job.force)
+        return draw_circles(
+            session,
+            out,
+            lambda: _provenance("circles", session, "--filter", "30", "--figure", out),
+            telling,
+            force=job.force,
+        )
     words = ("history", job.beside, "--page", out)
     return draw_history(job.beside, out, settings, lambda: _provenance(*words), telling, force=job.force)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.files.atomic import write_bytes
+from dbbstation.report.circles_figure import PlotKind, Plotted, circles_figure
 from dbbstation.report.figure_format import FigureFormat, Stamped
 from dbbstation.report.history_page import history_html
-from dbbstation.report.circles_figure import PlotKind, Plotted, circles_figure
 from dbbstation.results.circles import circles_result
 from dbbstation.results.tolerances import TOLERATED
 from dbbstation.tasks.circle_runs import load_circles

@@ -12,9 +12,9 @@ from matplotlib.text import Text
 
 from dbbstation.circles.path import Filter
 from dbbstation.circles.spectrum import spectrum_of
+from dbbstation.report.circles_figure import PlotKind, Plotted, draw_circles
 from dbbstation.report.drawing import in_style
 from dbbstation.report.label_places import Box, place_labels
-from dbbstation.report.circles_figure import PlotKind, Plotted, draw_circles
 from dbbstation.report.sheet import width_of_in, wrapped
 from dbbstation.tasks.circle_runs import load_circles
 from tests.plant.mechanisms.kinematics import RandomKinematics

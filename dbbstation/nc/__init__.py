@@ -1,1 +1,1 @@
-"""NC programs: read, compensated, and written in a dialect, as text."""
+"""NC programs as text: reading, compensation, and writing in a control's dialect."""

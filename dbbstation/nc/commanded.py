@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
 
 LARGEST_CORRECTION_MM = 5.0
-"""A program that leaves the plan's circle by more than this is the program of something else."""
+"""A program that leaves the plan's circle by more than this belongs to another path."""
 
 LARGEST_TILT_DEG = 2.0
 """The same for the platform's tilt."""
 
 SLACK_DEG = 1.0
-"""How far beyond the ends of the arc its ends may stand in: a compensated arc is not exactly as long as the circle."""
+"""Largest difference of the arc's ends from the circle's ends: a compensated arc is not exactly as long as the circle."""
 
 
 def commanded_poses(text: str, file: str, observation: Observation) -> Floats:
-    """Return the commanded poses of the lead-in and the samples, shape (n, 6) [mm, deg].
+    """Return the commanded poses of lead-in and samples, shape (n, 6) [mm, deg].
 
     Args:
         file: name with the dialect's extension.

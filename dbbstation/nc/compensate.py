@@ -1,4 +1,4 @@
-"""Compensation of any toolpath: the model inverted along the path, in pieces that keep chord error and feed."""
+"""Compensate any toolpath: invert the model along the path, in pieces that keep chord error and feed."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 DENSELY = np.arange(1, 14) / 13.0
-"""Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some
-periods in a piece is met at its zeros."""
+"""Shares of a piece at which its distance from the curve is computed. The number of parts is prime, so that a wave is
+not sampled at its zeros only."""
 
 FEED_KEPT = 1e-3
-"""A feed stays as it is while the compensated move is as long as the wanted one within this share."""
+"""A feed stays unchanged if the lengths of compensated and wanted move differ by at most this share."""
 
 
 class Prefer(StrEnum):
@@ -48,7 +48,7 @@ class Prefer(StrEnum):
     ACCURACY = "accuracy"
     """All six axes. In short pieces a control may be slower than F."""
     POSITION_ONLY = "position-only"
-    """The tool tip: A, B and C stay as they are programmed, and their correction is left out."""
+    """The tool tip only: A, B and C stay as programmed, without correction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def compensate_toolpath(
     planner: Planner = LOOKS_AHEAD,
     prefer: Prefer = Prefer.ACCURACY,
 ) -> Compensation:
-    """Return the toolpath that takes the actual machine along the given one.
+    """Return the toolpath that moves the actual machine along the given one.
 
     Args:
         model: calibrated; only sources of the machine are inverted.
@@ -251,8 +251,8 @@ def _feeds(
 ) -> Floats:
     """Return the feeds of a compensated path, shape (n,) [mm/min]; of angles if the tip does not move [deg/min].
 
-    F is kept, because the compensated move has nearly the original length. A turn about a nearly stationary tip gets
-    the feed for the original time.
+    F is kept, because the compensated move has nearly the original length. If the tip hardly moves, the turn gets the
+    feed that keeps its original time.
     """
     # Controls take F for a turning speed only where X, Y and Z stand still to the last digit.
     way = np.where(path.tip_mm > 0.0, path.tip_mm, path.turn_deg)

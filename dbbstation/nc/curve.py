@@ -1,4 +1,4 @@
-"""The curve to command so that the tool follows a toolpath."""
+"""The command curve that makes the tool follow a toolpath."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 LEVER_MM = 100.0
-"""The tilt between points may be off by as much as moves a point this far from the tool tip by the chord error."""
+"""The tilt between points may err until a point this far from the tool tip moves by the chord error."""
 
 PLACES_AT_ONCE = 4096
-"""Places that are inverted together: enough for arrays to be quick, and few megabytes."""
+"""Number of places that are inverted together: enough for fast arrays, and few megabytes."""
 
 HOLDING = 3
-"""Rounds in which the wanted tilt is moved until the commanded one is what the program says; each leaves a thousandth."""
+"""Iterations that adjust the wanted tilt until the commanded tilt is as programmed. Each iteration reduces the difference to a thousandth."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpanBehind:
-    """State passed from one part of a toolpath to the next.
+    """State of the model's sources at the end of one part of a toolpath, for the next part.
 
     Attributes:
         command: pose commanded last, shape (6,) [mm, deg].
@@ -68,10 +68,10 @@ class CommandCurve:
         self.has_history = any(fitted.source.has_history for fitted in model.of_the_machine().sources)
         self._waits = ~self.leads_on & (toolpath.duration_s > 0.0) & self.has_history
         self.tilt_left_mm = 0.0
-        """Largest correction of the tilt that was left out so far, as felt at `LEVER_MM` [mm]."""
+        """Largest omitted correction of the tilt so far, as motion at `LEVER_MM` [mm]."""
         self._before = before
         self.behind = before
-        """What is left behind the last of the places that were looked at last."""
+        """State behind the last place that was computed."""
 
     def at(self, places: Floats) -> Floats:
         """Return poses to command at places in program order, shape (k, 6) [mm, deg].
@@ -131,13 +131,13 @@ class CommandCurve:
 
 
 def row_and_share(places: Floats) -> tuple[Integers, Floats]:
-    """Return rows and shares passed, shapes (k,); the end of a row belongs to it, its begin does not."""
+    """Return rows and completed shares of places, shapes (k,); a row includes its end, but not its begin."""
     row = np.maximum(np.ceil(places).astype(np.int64) - 1, 0)
     return row, places - row
 
 
 def felt_mm(off: Floats) -> Floats:
-    """Return the motion at the tip, or at the lever if larger, of pose differences (k, 6), shape (k,) [mm]."""
+    """Return the motion that pose differences, shape (k, 6), cause at the tip or the lever, shape (k,) [mm]: the larger one."""
     lengths = in_mm(off)
     moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
     felt: Floats = np.maximum(moved, tilted)

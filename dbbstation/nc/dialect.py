@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 COMPENSATED = "compensated, greatest correction"
-"""How a header says that a program is compensated."""
+"""Text in the header of a compensated program."""
 
 LONGEST_COMMENT = 200
 """LinuxCNC refuses lines of more than 252 characters; other controls have shorter comments, and cut them."""
@@ -39,7 +39,7 @@ def already_compensated(name: str, how: str) -> StationError:
 
 
 class Dialect(ABC):
-    """One control's language, without state; each has a file in `dialects/`."""
+    """The language of one control, without state. Each dialect has a file in `dialects/`."""
 
     name: ClassVar[str]
     extension: ClassVar[str]
@@ -49,30 +49,30 @@ class Dialect(ABC):
     what: ClassVar[str]
     """The control, in one line."""
     look_ahead: ClassVar[LookAhead | None] = None
-    """How far the control looks ahead in moves that turn A, B or C; None: not known, and feeds are not checked."""
+    """How far the control looks ahead in moves that turn A, B or C; None: unknown, so that feeds are not checked."""
     takes_setup: ClassVar[bool] = False
     decimals: ClassVar[Sequence[int]] = DECIMALS
-    """Of the numbers of X, Y, Z [mm], A, B, C [deg]: what compensated programs are marked and checked by."""
+    """Decimals of X, Y, Z [mm], A, B, C [deg] for the mark and the check of compensated programs."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program, with the header's lines as comments first.
 
-        The same toolpath and header give the same text. `numbers` are in the first line that is no comment.
+        The same toolpath and header give the same text. The first line without comment contains `numbers`.
         `toolpath.name` and `toolpath.run` identify the program, if a control needs a name or number.
         """
 
     def file_name(self, stem: str, run: int) -> str:  # noqa: ARG002
-        """Return the name of a program's file; `run` counts those that are written together, from 1."""
+        """Return the name of a program's file; `run` is its number among the programs that are written together, from 1."""
         return stem if stem.endswith(self.extension) else stem + self.extension
 
     def is_in(self, text: str) -> bool:  # noqa: ARG002
-        """Return whether a program may be in this language; asked if several dialects share an ending."""
+        """Return whether a program may be in this language. The program asks this if several dialects share a file ending."""
         return True
 
     @abstractmethod
     def read(self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
-        """Return what a program commands.
+        """Return the toolpath that a program commands.
 
         Args:
             start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all unknown.
@@ -85,7 +85,7 @@ class Dialect(ABC):
     def toolpath(
         self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
-        """Return the result of `read` for a program that moves something.
+        """Return the result of `read` for a program with moves.
 
         Raises:
             InputError: as `read`, or nothing moves.

@@ -149,7 +149,7 @@ def dry_run(
     approach: Approach | None = USUAL_APPROACH,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[int, list[StationError]]:
-    """Try the nominal programs of all runs of a plan, and write none."""
+    """Check the nominal programs of all runs of a plan without writing them."""
     runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
     faults: list[StationError] = []
     for done, (name, direction) in enumerate(runs):
@@ -173,7 +173,7 @@ def compensated_program(
     chord_mm: float = CHORD_MM,
     origin: Mapping[str, str] | None = None,
 ) -> Program:
-    """Return any program compensated, with its name.
+    """Return a program in compensated form, with its name.
 
     Raises:
         TravelError: the compensated path leaves the travel.
@@ -263,7 +263,7 @@ def _program(
 
 
 def planner_of(machine: Machine, dialect: Dialect) -> Planner:
-    """Return the control of a dialect on a machine."""
+    """Return the planner of a dialect's control on a machine."""
     return Planner(machine.planned_acceleration_mm_s2, dialect.look_ahead)
 
 
@@ -276,7 +276,7 @@ def _step_deg(circle: Circle, step_deg: float, chord_mm: float, planner: Planner
 
 
 UNCERTAIN_AT = 2000
-"""Poses at which the model's uncertainty is taken, spread over the path: it changes over decimetres."""
+"""Number of poses along the path at which the model's uncertainty is computed: it changes over decimetres."""
 
 
 def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tuple[float | None, ...], str]:

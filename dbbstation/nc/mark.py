@@ -1,8 +1,8 @@
-"""The mark of a compensated program: last decimals of its poses.
+"""The mark of a compensated program in the last decimals of its poses.
 
 Each pose is moved by the last decimal of its angles, or of X, Y and Z if the angles are constant, until a hash of its
 six numbers begins with `BITS` zero bits. The mark survives edits of comments, line numbers and feeds, and added or
-deleted lines. Fewer decimals or a shifted pose destroy the mark.
+deleted lines. Fewer decimals or shifted poses destroy it.
 """
 
 from __future__ import annotations
@@ -26,34 +26,31 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 BITS = {2: 16, 3: 11, 4: 7}
-"""Bits of the hash that are zero, by the number of poses that can carry the mark, 4 for four and more. One pose in 2 to this power has
-as many by chance. More bits move poses farther."""
+"""Number of zero bits of the hash, by the number of poses that can carry the mark; 4 means four and more. One pose in 2 to this power has the mark by chance. More bits move poses farther."""
 
 BY_CHANCE = 5e-9
-"""Probability with which a program that is not compensated is taken for one, for each number of bits: in all about as rare as its own
-checksum of eight digits. Two poses with the mark are enough."""
+"""Probability that an uncompensated program counts as compensated, for each number of bits: together about as rare as a program with its own checksum of eight digits. Two poses with the mark are enough."""
 
 LEAST_WAY_MM, LEAST_TURN_DEG, LEAST_ONLY_TURN_DEG = 1e-3, 1e-6, 1e-3
-"""An axis is moved by the mark only where it moves itself by more than this, before and after the pose: what stands still must go
-on standing still (an axis that a rapid leaves in another coordinate system, too), and F, which counts along the way, must go on taking its time within half a percent."""
+"""The mark moves an axis only if the axis itself moves by more than this, before and after the pose. A stationary axis must stay stationary, also if a rapid leaves it in another coordinate system. F applies along the path, so a move must keep its time within half a percent."""
 
 STEPS_APART, STEPS_TURNED, STEPS_ONLY_TURNED = 200.0, 1.0, 2000.0
-"""The same in last decimals, for dialects with few of them: one step of X, Y or Z, or nine of angles, are half a percent then."""
+"""The same in last decimals, for dialects with few decimals: one step of X, Y or Z, or nine steps of angles, are then half a percent."""
 
 COARSER = range(2, 8)
-"""Decimals of other dialects, which may have marked a program as well."""
+"""Decimals of other dialects, which may also have marked a program."""
 
 _SAME = 1e-9
-"""Numbers that differ by less are one: poses have fifteen digits."""
+"""Numbers that differ by less are equal: poses have fifteen digits."""
 
 _GROUPS = ((slice(0, 3), DECIMALS[0]), (slice(3, 6), DECIMALS[5]))
 
 FARTHEST_PLACE, FARTHEST_ANGLE, FARTHEST_ANGLE_OF_FEW = 1, 3, 9
 """Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre; half a nanometre, or three, at a point 100 mm from the
-tip. Where A, B and C stand still one pose in five has the mark; thirty poses are enough then."""
+tip. If A, B and C are constant, one pose in five has the mark; thirty poses are then enough."""
 
 _FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
-"""What the last decimal is worth, of an angle at a point 100 mm from the tip [nm]."""
+"""Motion by one last decimal, for an angle at a point 100 mm from the tip [nm]."""
 
 _ODD = np.array(
     [
@@ -66,15 +63,14 @@ _ODD = np.array(
     ],
     dtype=np.uint64,
 )
-"""Odd numbers of 64 bits with about as many ones as zeros, one for each axis. They are part of what compensated programs are
-known by: never change them."""
+"""Odd numbers of 64 bits with about as many ones as zeros, one for each axis. Compensated programs are recognised by them: never change them."""
 
 _SHIFTS, _MIXING = np.array([30, 27, 31], np.uint64), np.array([0xBF58476D1CE4E5B9, 0x94D049BB133111EB], np.uint64)
-"""Of the finaliser of SplitMix64 [Steele et al. 2014]."""
+"""Constants of the finaliser of SplitMix64 [Steele et al. 2014]."""
 
 
 def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
-    """Return a compensated toolpath with marked poses, rounded as they will be written."""
+    """Return a compensated toolpath with marked poses, rounded as in the written program."""
     moves = np.flatnonzero(toolpath.is_move & (toolpath.unknown == 0))
     if not len(moves):
         return toolpath
@@ -198,7 +194,7 @@ def _free(toolpath: Toolpath, moves: Integers, decimals: Sequence[int]) -> Flags
 
 @cache
 def _steps(angle: int, angle_and_place: int) -> Integers:
-    """Return steps of the six last decimals, shape (k, 6), the least felt first, beginning with none."""
+    """Return steps of the six last decimals, shape (k, 6), in order of the motion that they cause; the first step is zero."""
     alone, beside = np.arange(-angle, angle + 1), np.arange(-angle_and_place, angle_and_place + 1)
     place = np.arange(-FARTHEST_PLACE, FARTHEST_PLACE + 1)
     both = np.stack(np.meshgrid(*[place] * 3, *[beside] * 3, indexing="ij"), axis=-1).reshape(-1, 6)

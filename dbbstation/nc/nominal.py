@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 CHECKSUMS = 99_999_999
-"""Line numbers have eight digits at most in LinuxCNC's language: one program in fifty million has its own by chance."""
+"""Line numbers have at most eight digits in LinuxCNC's language: one program in fifty million has its own checksum by chance."""
 
 _MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
 
@@ -44,7 +44,7 @@ def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
 def check_nominal(toolpath: Toolpath) -> None:
     """Refuse a compensated program.
 
-    Three signs identify one: a comment, the mark in its poses, and the checksum as line number.
+    Three signs identify a compensated program: a comment, the mark in its poses, and the checksum as line number.
 
     Raises:
         StationError: it is compensated already.

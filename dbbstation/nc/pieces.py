@@ -1,4 +1,4 @@
-"""Choose the places of a curve to join by straight pieces."""
+"""Choose the points of a curve that straight pieces join."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The feed that a control keeps in pieces of a length.
+"""The feed that a control reaches in pieces of a given length.
 
 LinuxCNC 2.9 (`src/emc/tp`) does not look ahead if A, B or C move (`tcRotaryMotionCheck`). It plans such a piece from
-standstill to standstill with half the acceleration and overlaps it with the next. A piece of length L then reaches v² =
-a·L/2.
+standstill to standstill with half the acceleration, and overlaps successive pieces. A piece of length L then reaches v²
+= a·L/2.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 CYCLES = 1.5
-"""A piece must be longer than a·L/2 = v² asks for by the way of so many servo cycles, since the planner begins a piece with
-a cycle. Without it lines in pieces that fit exactly ran 0.5 % slow, circles at 5 m/s² 12 %."""
+"""A piece must be longer than a·L/2 = v² requires, by the distance of this many servo cycles, because the planner begins each piece with a cycle. Without this addition lines ran 0.5 % slow, and circles at 5 m/s² 12 %."""
 
 CYCLE_S = 0.001
 """Servo period that is usual [s]."""
 
 LEAST_MM_PER_DEG = 0.1
-"""A move that takes the tip less far for each degree is a turn."""
+"""A move that moves the tip less than this per degree is a turn."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Planner:
     look_ahead: LookAhead | None
 
     def needed_mm(self, mm_s: Floats) -> Floats:
-        """Return the length of a turning piece that reaches these speeds, same shape [mm]."""
+        """Return the lengths of turning pieces that reach these speeds, same shape [mm]."""
         if self.look_ahead is None:
             return np.zeros_like(mm_s)
         least = mm_s**2 / (self.look_ahead.share * self.acceleration_mm_s2)
@@ -85,10 +84,10 @@ def cuts(toolpath: Toolpath) -> Flags:
 
 
 def move_mm(toolpath: Toolpath) -> Floats:
-    """Return the length of each row's written move, shape (n,) [mm]: LinuxCNC runs an arc as one."""
+    """Return the length of each row's written move, shape (n,) [mm]. LinuxCNC runs an arc as one move."""
     number = moves_of(toolpath)
     return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)
 
 
 LOOKS_AHEAD = Planner(1000.0, None)
-"""A control that keeps the feed in pieces of any length."""
+"""Look-ahead of a control that keeps the feed in pieces of any length."""

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 STEP_MM = 2.0
 STEP_DEG = 0.5
-"""Spacing of the poses that are checked: struts are shortest somewhere in the middle of a move, where they change by
-less than a micrometre over half a step."""
+"""Spacing of checked poses. A strut may be shortest in the middle of a move; there its length changes by less than a micrometre over half a step."""
 
 DECLARED = "move the path into the travel; or state work offsets and tool lengths of the control: undeclared ones count as zero"
 
@@ -92,7 +91,7 @@ class _Poses:
         return inside
 
     def refuse(self, machine: Machine, toolpath: Toolpath, outside: int | None) -> None:
-        """Refuse a pose, naming its line."""
+        """Refuse a pose and name its line."""
         if outside is not None:
             where = toolpath.where(int(self.row[outside]))
             check_travel(machine, self.poses[outside : outside + 1], where=where, remedy=DECLARED)

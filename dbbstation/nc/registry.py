@@ -19,7 +19,7 @@ GROUP = "dbbstation.dialects"
 """Entry points of this group name classes that derive from `Dialect`."""
 
 HOW_TO_ADD = "one of your own is given as its file, FILE.py, or its package installed"
-"""What an unknown name may lack."""
+"""Advice for an unknown dialect name."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Requests that a compensated program misses; they are reported or refused."""
+"""Report or refuse a compensated program that exceeds the chord error or loses feed."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from dbbstation.nc.dialect import Dialect
 
 KEPT = 1.01
-"""A longer time at feed than this share of the time as written is said."""
+"""Ratio of computed to programmed time at feed above which the loss is reported."""
 
 
 def remarks_on(
     done: Compensation, asked_um: float, machine: Machine, dialect: Dialect, prefer: Prefer
 ) -> tuple[str, ...]:
-    """Return sentences on an exceeded chord error, time lost in short pieces, and an uncorrected tilt."""
+    """Return a sentence each on an exceeded chord error, on time lost in short pieces, and on an uncorrected tilt."""
     said = [*done.toolpath.notes]
     if done.chord_um > asked_um:
         said.append(
@@ -64,7 +64,7 @@ def check_kept(done: Compensation, asked_um: float, machine: Machine) -> None:
 
 
 def said_acceleration(machine: Machine) -> str:
-    """Return the acceleration, and whether the machine file states it."""
+    """Return the acceleration and its origin as text."""
     known = "of the machine file" if machine.acceleration_mm_s2 is not None else "assumed: the machine file has none"
     return f"the acceleration of {machine.planned_acceleration_mm_s2 / 1e3:g} m/s² ({known})"
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 PER_SYSTEM = 20
-"""Numbered parameters from one work system to the next."""
+"""Number of parameters of a work system."""
 
 FIRST_PARAMETERS = {
     "G28": 5161,
@@ -22,7 +22,7 @@ FIRST_PARAMETERS = {
 """First of six numbered parameters of each place [LinuxCNC, G-code overview, Numbered Parameters]."""
 
 ROTATION_BEHIND = 9
-"""The rotation of a work system about Z stands so many parameters behind its X."""
+"""Number of parameters from a work system's X to its rotation about Z."""
 
 G92_IN_FORCE = 5210
 
@@ -30,7 +30,7 @@ ZERO = (0.0,) * 6
 
 
 def offset_text(offset: Sequence[float]) -> str:
-    """Return an offset's nonzero words, from shape (6,) [mm, deg]."""
+    """Return the words of an offset's nonzero values; offset of shape (6,) [mm, deg]."""
     words = " ".join(f"{axis}{value:g}" for axis, value in zip("XYZABC", offset, strict=True) if value)
     return words or "zero"
 

@@ -1,4 +1,4 @@
-"""Moves in pieces that follow the commanded curve."""
+"""Split moves into pieces that follow the commanded curve."""
 
 from __future__ import annotations
 
@@ -24,52 +24,52 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 FIRST_CELL_MM, FIRST_CELL_DEG = 50.0, 5.0
-"""Moves are looked at in cells of at most this size before any is halved."""
+"""Largest first cells of a move, before any cell is halved."""
 
 OF_A_PERIOD = 0.25
-"""Before any is halved, cells are at most this share of the shortest period in the model: start, middle and end of a longer
-one can all lie on the zeros of a wave. On 150 lines with drawn screw errors the worst place was 2.0 µm off without this,
-0.11 µm with the whole period or half of it, 0.10 µm with a quarter or a tenth [docs/validation.md]."""
+"""First cells are at most this share of the shortest period in the model: start, middle and end of a longer cell can
+all be zeros of a wave. On 150 lines with random screw errors the largest error was 2.0 µm without this limit, 0.11 µm
+with the whole period or half of it, 0.10 µm with a quarter or a tenth [docs/validation.md]."""
 
 LOOKED_AT = np.array([0.19, 0.5, 0.73, 1.0])
-"""Shares of a cell at which the curve is taken: not evenly spaced, so that no wave is met at its zeros each time."""
+"""Shares of a cell at which the curve is computed: unevenly spaced, so that a wave is not sampled at its zeros only."""
 
 SHORT_MM, SHORT_DEG, SHORT_OF_A_PERIOD = 1.0, 0.1, 0.02
-"""Of shorter moves at feed the middle is enough: the curve is a parabola there."""
+"""In shorter moves at feed one middle point is enough: the curve is then a parabola."""
 
 MIDDLE = np.array([0.5, 1.0])
 
 FINER = 16.0
-"""Cells are halved until the curve leaves their chord by less than this part of the tolerance: pieces then begin and end
-within a fraction of their length of where they best would, and what lies between two places can be neglected."""
+"""Cells are halved until the curve leaves their chord by less than this share of the tolerance. The ends of pieces are
+then close to their best positions, and the curve between two points can be neglected."""
 
 OF_THE_TOLERANCE = 0.95
-"""Share of the tolerance that pieces may take at the places: between them the curve goes a little farther."""
+"""Share of the tolerance that pieces may use at the computed points; between them the curve deviates a little more."""
 
 SHORTEST_MM, SHORTEST_DEG = 0.05, 0.01
-"""Cells are not halved below this: a step of the correction (backlash at a strut's reversal) has no chord that fits,
-and is placed within this distance."""
+"""Least size of halved cells. No chord fits a step of the correction (backlash at a strut's reversal); it is placed
+within this distance."""
 
 HISTORY_MM, HISTORY_DEG = 5.0, 1.0
-"""Steps in which rapids are followed for the sake of backlash and friction; they are written as one move all the same,
-since nothing is cut on the way."""
+"""Steps in which rapids are computed, for backlash and friction. Each rapid is still written as one move, since it cuts
+nothing."""
 
 ALMOST = 0.999
-"""Moves that are shorter than needed by less are long enough."""
+"""Relative amount by which a move may be shorter than needed."""
 
 COSINE = 0.97
-"""Of the greatest angle at which a curve in short lines goes on, 14 degrees."""
+"""Cosine of the greatest angle between short lines of one curve, 14 degrees."""
 
 ROWS_AT_ONCE = 20_000
-"""Rows of a toolpath that are compensated together: thirty to a hundred megabytes, and long enough for arrays to be quick."""
+"""Number of rows that are compensated together: thirty to a hundred megabytes, and enough for fast arrays."""
 
 MOST_CELLS = 1_000_000
-"""As many as `rs274.moves.MOST_ROWS`: the path itself is held in memory."""
+"""Greatest number of cells, equal to `rs274.moves.MOST_ROWS`, because the path is held in memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Begins and ends of pieces as places of `CommandCurve`, shapes (k,)."""
+    """Begins and ends of pieces, as positions on `CommandCurve`, shapes (k,)."""
 
     begin: Floats
     end: Floats
@@ -86,7 +86,7 @@ class Pieces:
 
 
 def rows_as_pieces(toolpath: Toolpath) -> Pieces:
-    """Return one piece for each row, rapids in steps for sources with a history."""
+    """Return one piece for each row. For sources with a history, rapids are divided into steps."""
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     return _in(toolpath, np.where(toolpath.kind == RowKind.RAPID, history, 1.0))
 
@@ -102,7 +102,7 @@ def moves_of(toolpath: Toolpath) -> Integers:
 
 
 def parts_of(toolpath: Toolpath, runs: Integers) -> list[slice]:
-    """Return rows to compensate part by part, so that long programs take little memory."""
+    """Return the parts of a toolpath that are compensated one by one, so that long programs need little memory."""
     leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
     # The first move shows where the machine comes from.
     may = np.flatnonzero(leads_on)[1:]
@@ -121,9 +121,9 @@ def parts_of(toolpath: Toolpath, runs: Integers) -> list[slice]:
 
 
 def runs_of(toolpath: Toolpath, needed_mm: Floats) -> Integers:
-    """Return the run of each row, shape (n,): a written move, or several shorter than their feed needs.
+    """Return the number of each row's run, shape (n,). A run is a written move, or several moves that are too short for their feed.
 
-    Moves of a run share F and work system, may round their corners, and nearly keep one direction.
+    The moves of a run share F and work system, may round their corners, and nearly keep their direction.
 
     Args:
         needed_mm: length of a piece that keeps the feed, shape (n,).
@@ -150,10 +150,10 @@ def split(
     *,
     whole: Flags,
 ) -> tuple[Pieces, Floats, Floats]:
-    """Return the longest pieces in which a toolpath keeps the tolerance.
+    """Return the longest pieces of a toolpath that keep the tolerance.
 
-    Pieces, the poses to command at begin and end of each, shape (k, 2, 6) [mm, deg], and how far the curve leaves the chord of
-    each, shape (k,) [mm]; NaN for pieces of several cells.
+    Return pieces, the poses to command at their begins and ends, shape (k, 2, 6) [mm, deg], and the distance of the
+    curve from each chord, shape (k,) [mm]; NaN for pieces of several cells.
 
     Args:
         model: its shortest period determines the sampling.
@@ -189,7 +189,7 @@ def split(
 
 
 class _Nodes:
-    """Places of one move between which its pieces are chosen."""
+    """Points of one move that its pieces may join."""
 
     def __init__(
         self,
@@ -228,7 +228,7 @@ def looked_at(
     shares: Floats,
     bends: Flags | None = None,
 ) -> Floats:
-    """Return poses of the curve at begin and shares of each piece, shape (k, 1 + len(shares), 6).
+    """Return poses of the curve at the begin and at shares of each piece, shape (k, 1 + len(shares), 6).
 
     Args:
         bends: pieces in which the curve may be more than a parabola through begin, `MIDDLE` and end, shape (k,); None: all.
@@ -260,7 +260,7 @@ def _halved(curve: CommandCurve, cells: Pieces, shares: Floats, at: Floats, halv
 
 
 def along(toolpath: Toolpath, pieces: Pieces, shares: Floats) -> Floats:
-    """Return places at shares of the way of successive pieces, shape (k, len(shares))."""
+    """Return positions at shares of the length of successive pieces, shape (k, len(shares))."""
     places = pieces.places(shares)
     across = np.flatnonzero(np.floor(pieces.begin) < pieces.row)
     if len(across):
@@ -314,9 +314,9 @@ def _in(toolpath: Toolpath, number: Floats) -> Pieces:
 
 
 def _way_mm(toolpath: Toolpath, machine: Machine) -> Floats:
-    """Return a bound of the motion of tool tip and platform joints in each row, shape (n,) [mm].
+    """Return an upper bound of the motion of tool tip and platform joints in each row, shape (n,) [mm].
 
-    The platform turns by at most the sum of the three angles: √3 times the root of their squares.
+    The platform turns by at most the sum of the three angles, which is at most √3 times their root sum of squares.
     """
     reach_mm = float(np.linalg.norm(machine.hexapod.platform_joints_mm, axis=1).max())
     return toolpath.tip_mm + math.sqrt(3.0) * reach_mm * np.radians(toolpath.turn_deg)

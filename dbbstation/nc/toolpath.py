@@ -1,4 +1,4 @@
-"""A toolpath: the machine's actions in an NC program, independent of a control's language."""
+"""A toolpath: the machine's actions in an NC program, independent of the control's language."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
 DECIMALS = (6, 6, 6, 7, 7, 7)
-"""Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding costs at most 0.0009 µm in space, and as much a metre from the tip."""
+"""Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding shifts the tip, and a point a metre from it, by at most
+0.0009 µm."""
 
 LEAST_MM = LEAST_DEG = 1e-8
-"""An axis that moves by less stands still: LinuxCNC's limit, per axis [CART_FUZZ in libnml/posemath/posemath.h, applied by
-applyMinDisplacement in emc/task/emccanon.cc; mm and degrees]. Sums of increments end this near their mark."""
+"""An axis that moves by less is stationary: LinuxCNC's limit, per axis [CART_FUZZ in libnml/posemath/posemath.h,
+applied by applyMinDisplacement in emc/task/emccanon.cc; mm and degrees]. Sums of increments end within this distance of
+their target."""
 
 RAPID_MM_MIN = 5000.0
-"""Speed assumed for rapids: programs do not say it, and nothing is measured while they last."""
+"""Assumed speed of rapids: programs do not state it, and nothing is measured during rapids."""
 
 RAPID_DEG_MIN = 2000.0
 """The same for rapids that tilt the platform."""
@@ -41,17 +43,18 @@ class RowKind(IntEnum):
     """Stop until the operator goes on."""
     COMMENT = 4
     FUNCTION = 5
-    """Spindle, coolant: words that move nothing and mean the same to every control."""
+    """Words of spindle and coolant, which move no axis and mean the same to every control."""
     OPTIONAL_STOP = 6
     """Stop that the operator has switched on or off (M1)."""
     MESSAGE = 7
-    """What the control shows or writes to a file: its keyword, a comma, the text, as in `MSG, hello`."""
+    """Text that the control shows or writes to a file: keyword, comma, text, as in `MSG, hello`."""
     SYSTEM = 8
-    """From here on numbers count otherwise: `G54` to `G59.3`, `G10 L2 …`, `G43 H1`, `G49`; or `G28`, to a place the control alone knows."""
+    """Change of the offset of the following numbers: `G54` to `G59.3`, `G10 L2 …`, `G43 H1`, `G49`; or `G28`, a move to
+    a position that only the control knows."""
 
 
 MESSAGE = "MSG, "
-"""Begin of a message that the control shows."""
+"""First characters of a message that the control shows."""
 
 
 class Ending(StrEnum):
@@ -60,11 +63,11 @@ class Ending(StrEnum):
     STOP = "M2"
     REWIND = "M30"
     TEXT = "%"
-    """With its text, between percent signs: spindle and coolant stay as they are."""
+    """End of the text, between percent signs: spindle and coolant stay as they are."""
 
 
 IN_FORCE = "in force"
-"""In place of a work system: the one that the control has when the program begins."""
+"""Stands for the control's active work system at the begin of the program."""
 
 EXACT_STOP_MM = -1.0
 """Rounding of moves that stop at their ends (G61.1), beside 0 for the exact path (G61)."""
@@ -73,13 +76,13 @@ SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 """Work coordinate systems in order, from number 1."""
 
 PIECE_CORNER_MM = 1e-4
-"""How far corners between the pieces of one exact move may be rounded: 0.1 µm, below what a bar can see. An exact stop
-belongs to the ends of the move that was written; its pieces meet at angles that need far less."""
+"""Largest rounding of corners between the pieces of one exact move: 0.1 µm, less than a bar detects. An exact stop
+belongs to the end of the written move; the angles between its pieces need far less."""
 
 
 @dataclass(frozen=True, eq=False)
 class Toolpath:
-    """Rows in order; every move is straight in X, Y, Z, A, B and C at once.
+    """Rows in order; every move is straight in all of X, Y, Z, A, B and C.
 
     Attributes:
         name: for messages; the file if read from one.
@@ -134,11 +137,11 @@ class Toolpath:
         return len(self.kind)
 
     def where(self, row: int) -> str:
-        """Return the line of a row, for messages."""
+        """Return the line of a row as text for messages."""
         return self.place(int(self.line[row]))
 
     def place(self, line: int) -> str:
-        """Return a line, for messages; 0 is the program."""
+        """Return a line as text for messages; 0 is the program."""
         before, file = next((each for each in reversed(self.files) if 0 < each[0] < line), (0, self.name))
         return f"{file}:{line - before}" if line else file
 
@@ -149,7 +152,7 @@ class Toolpath:
         return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
 
     def divided(self, row: Integers, poses: Floats) -> Toolpath:
-        """Return the toolpath with some rows in several pieces."""
+        """Return the toolpath with some rows divided into pieces."""
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
         place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
         corners = self.corners_mm[row]
@@ -179,13 +182,13 @@ class Toolpath:
 
     @cached_property
     def before(self) -> Floats:
-        """Return the pose before each row, shape (n, 6) [mm, deg]; the pose after it if unknown."""
+        """Return the pose before each row, shape (n, 6) [mm, deg]. If unknown, it is the pose after the row."""
         first = self.poses[:1] if self.start is None else np.where(np.isnan(self.start), self.poses[:1], self.start)
         return np.vstack([first, self.poses])[: len(self)]
 
     @property
     def numbers_written(self) -> Floats:
-        """Return the written numbers of each pose, shape (n, 6): without work offsets and tool length."""
+        """Return the written numbers of each pose, shape (n, 6), without work offsets and tool length."""
         return self.poses - self.offsets[self.offset]
 
     def with_numbers(self, numbers: Floats) -> Toolpath:
@@ -194,17 +197,17 @@ class Toolpath:
 
     @cached_property
     def tip_mm(self) -> Floats:
-        """Return the distance of the tool tip in each row, shape (n,) [mm]; zero if only rounding."""
+        """Return the tool tip's travel in each row, shape (n,) [mm]; zero if it is only rounding."""
         return _norm(self.poses[:, :3] - self.before[:, :3], LEAST_MM)
 
     @cached_property
     def turn_deg(self) -> Floats:
-        """Return each row's root sum of squares of the three angles, shape (n,) [deg]; zero if only rounding."""
+        """Return the root sum of squares of each row's three turns, shape (n,) [deg]; zero if it is only rounding."""
         return _norm(self.poses[:, 3:] - self.before[:, 3:], LEAST_DEG)
 
     @property
     def only_turns(self) -> Flags:
-        """Return the rows that only turn, shape (n,)."""
+        """Return which rows turn the platform without moving the tip, shape (n,)."""
         return (self.tip_mm == 0.0) & (self.turn_deg > 0.0)
 
     @property
@@ -230,7 +233,7 @@ class Toolpath:
         return np.cumsum(self.duration_s)
 
     def at_time(self, time_s: Floats) -> Floats:
-        """Return commanded poses at times after the start, shape (n, 6); the ends hold beyond them."""
+        """Return commanded poses at times after the start, shape (n, 6); the first and last pose apply outside the program's time."""
         if not len(self):
             raise ValueError(f"{self.name} has no moves")
         nodes, ends_s = np.vstack([self.before[:1], self.poses]), np.concatenate([[0.0], self.end_s])
@@ -249,7 +252,7 @@ class Toolpath:
         return np.where(share[:, None] == 1.0, after, inside)
 
     def subdivided(self, step_mm: float, step_deg: float) -> tuple[Integers, Floats]:
-        """Divide rows into pieces no longer than the steps; return row and share of each end, shapes (k,)."""
+        """Divide rows into pieces that are no longer than the steps; return row and share of each piece's end, shapes (k,)."""
         return in_pieces(self.pieces(step_mm, step_deg))
 
     def pieces(self, step_mm: float, step_deg: float) -> Integers:
@@ -266,13 +269,14 @@ _ALIKE: dict[str, type] = {
     "in_machine": np.bool_,
 }
 _OF_ROWS = (*_ALIKE, "poses", "feed_mm_min", "feed_deg_min", "line", "corners_mm")
-"""Arrays of a toolpath with a value for each row; `_ALIKE` are those of which all rows added together have the same."""
+"""Arrays of a toolpath with a value for each row. In the arrays of `_ALIKE`, rows that are added together share one
+value."""
 
 _NO_FEED = (np.nan, np.nan)
 _STRAIGHT = (0.0, 0.0, 0.0, 0.0)
 
 PLANES = np.array([[0, 1], [2, 0], [1, 2]])
-"""First and second axis of G17, G18 and G19: counter-clockwise leads from the first to the second."""
+"""First and second axis of G17, G18 and G19: counter-clockwise turns the first towards the second."""
 
 ALL_AXES = 0b111111
 
@@ -327,7 +331,7 @@ class ToolpathBuilder:
         self._offset = self._offsets.setdefault(tuple(float(each) for each in offset), len(self._offsets))
 
     def lines(self, poses: Floats, feed: tuple[float, float] | None, *, line: int) -> None:
-        """Add a move of each of successive lines, poses of shape (k, 6) [mm, deg], at F by way and by angle; None: rapids."""
+        """Add the moves of successive lines, poses of shape (k, 6) [mm, deg], at feeds per distance and per angle; None: rapids."""
         kind = RowKind.RAPID if feed is None else RowKind.FEED
         self._add(kind, poses, feed or _NO_FEED, line=line, step=1)
         if feed is None:
@@ -364,12 +368,12 @@ class ToolpathBuilder:
 
     @property
     def pose(self) -> Floats:
-        """Return where the last row ends, shape (6,) [mm, deg]."""
+        """Return the pose at the end of the last row, shape (6,) [mm, deg]."""
         return self._pose.copy()
 
     @property
     def added(self) -> int:
-        """Return the number of the last rows, which were added together."""
+        """Return how many rows were added together last."""
         return len(self._rows) - 1
 
     def bend(
@@ -379,7 +383,7 @@ class ToolpathBuilder:
         arc: tuple[float, float, float, float],
         plane: Integers,
     ) -> None:
-        """Replace the poses of rows that were added together; all behind stand at their end in the axes of a plane."""
+        """Replace the poses of rows that were added together. All later rows get their end position in the axes of a plane."""
         self._rows[added].poses[:] = poses
         self._rows[added] = self._rows[added]._replace(arc=arc)
         for rows in self._rows[added + 1 :]:
@@ -412,7 +416,7 @@ class ToolpathBuilder:
         return self._text.get(self._count - 1, "")
 
     def built(self) -> Toolpath:
-        """Return the toolpath of all rows so far; an axis begins where it is first named, and an unknown one stays where it was."""
+        """Return the toolpath of all rows so far. An axis begins at its first named position; an unknown axis keeps its position."""
         count = np.array([len(rows.poses) for rows in self._rows], dtype=np.int64)
 
         def each(values: list[Any], kind: type) -> NDArray[Any]:
@@ -450,13 +454,13 @@ class ToolpathBuilder:
 
     @staticmethod
     def _within(count: Integers) -> Integers:
-        """Return the number of each row among those that were added together, from 0, shape (n,)."""
+        """Return the index of each row among the rows that were added together, from 0, shape (n,)."""
         behind = np.cumsum(count)
         numbers: Integers = np.arange(behind[-1] if len(count) else 0) - np.repeat(behind - count, count)
         return numbers
 
     def _corners_mm(self, count: Integers) -> Floats:
-        """Return the rounding of each row; an arc as chords stops only at its own ends."""
+        """Return the rounding of each row; an arc in chords stops only at the arc's ends."""
         corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
         last = np.repeat(np.array([rows.step > 0 for rows in self._rows], dtype=np.bool_), count)
         last[np.cumsum(count) - 1] = True
@@ -485,7 +489,7 @@ class ToolpathBuilder:
 
 
 def bits_of(axes: Flags) -> int:
-    """Return axes, shape (6,), as a bit each."""
+    """Return axes, shape (6,), as bits of a number."""
     return int(axes @ (1 << np.arange(6)))
 
 
@@ -505,18 +509,18 @@ def _on_arc(
 
 
 def in_pieces(pieces: Integers) -> tuple[Integers, Floats]:
-    """Return rows and end shares of pieces, shapes (k,), for the piece count of each row, shape (n,)."""
+    """Return row and end share of each piece, shapes (k,), from the number of pieces in each row, shape (n,)."""
     row = np.repeat(np.arange(len(pieces)), pieces)
     number = np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1
     return row, number / pieces[row]
 
 
 def rounded(poses: Floats, decimals: Sequence[int] = DECIMALS) -> Floats:
-    """Return poses, shape (n, 6), as programs write them, without -0."""
+    """Return poses, shape (n, 6), rounded to the decimals of programs, without -0."""
     return np.column_stack([np.round(poses[:, axis], places) for axis, places in enumerate(decimals)]) + 0.0
 
 
 def _norm(vectors: Floats, least: float) -> Floats:
-    """Return lengths of vectors, shape (n, 3), without components below `least`."""
+    """Return the lengths of vectors, shape (n, 3); components below `least` count as zero."""
     length: Floats = np.linalg.norm(np.where(np.abs(vectors) < least, 0.0, vectors), axis=1)
     return length

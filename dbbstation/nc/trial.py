@@ -1,4 +1,4 @@
-"""The trial of a dialect: whether it reads its own programs."""
+"""Trial of a dialect: it must read its own programs."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ FIRST = np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0])
 SECOND = np.array([10.5, -20.0, -1000.0, 1.0, -2.0, 3.5])
 
 POSE_WITHIN = 1e-3
-"""How far a pose may be read from where it was written: decimals are the dialect's own affair [mm, deg]."""
+"""Largest difference between a written and a read pose [mm, deg]; each dialect chooses its decimals."""
 
 SHARE_WITHIN = 1e-4
-"""The same for feeds and dwells, as a share."""
+"""Largest relative difference of feeds and dwells."""
 
 
 def faults_of(dialect: Dialect) -> list[str]:
-    """Return differences between written and read rows, a sentence each; empty if the dialect is usable.
+    """Return a sentence for each difference between written and read rows; empty if the dialect is usable.
 
     Raises:
         Exception: whatever the dialect raises while it writes moves, or reads what it wrote.
@@ -155,7 +155,7 @@ THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
     "an end without M2": _ends(Ending.TEXT),
     "M30": _ends(Ending.REWIND),
 }
-"""What a program may hold beside two moves."""
+"""Rows that a program may contain beside two moves."""
 
 
 class _Row(NamedTuple):
@@ -200,7 +200,7 @@ def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
 
 
 def _with_messages(path: Toolpath) -> dict[int, str | None]:
-    """Return texts by row, a message before a stop as the stop's own, since they may be one row or two; None: no row."""
+    """Return texts by row; None: no row. A message before a stop counts as the stop's text, because dialects write both in one row or two."""
     texts: dict[int, str | None] = dict(path.text)
     told = np.flatnonzero(path.kind != RowKind.COMMENT)
     for row, after in pairwise(told.tolist()):

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 SIGNIFICANT_DIGITS = 7
-"""Of a feed and a dwell: a ten-millionth."""
+"""Significant digits of feeds and dwells."""
 
 MOST_DECIMALS = 15
-"""No feed and no dwell needs more; a line has an end."""
+"""Greatest number of decimals of a feed or dwell: the length of a line is limited."""
 
 AT_ONCE = 20_000
-"""Rows whose words are made together: a long program is written in little memory."""
+"""Number of rows whose words are made together, so that long programs need little memory."""
 
 
 def digits(value: float) -> str:
@@ -40,7 +40,7 @@ def digits(value: float) -> str:
 
 
 def number(value: float) -> str:
-    """Return the shortest number without exponent that reads back the same."""
+    """Return the shortest text without exponent that reads back as the same number."""
     return str(np.format_float_positional(value, trim="-"))
 
 
@@ -54,26 +54,26 @@ class CannotSayError(StationError):
 
 
 class WordDialect(Dialect):
-    """A dialect of lines of words; axes and F are written when they change."""
+    """A dialect with lines of words; axes and F are written when they change."""
 
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Text of `begin`, `rapid` and `feed` ({words}), `in machine` ({move}), `exact`, `exact stop`, `continuous`, `within` ({mm}),
     `dwell` ({seconds}), `pause`, `pause with text` and `comment` and `message` ({text}), `optional stop`, and the ends `M2`, `M30`, `%`."""
 
     functions: ClassVar[str] = ""
-    """Pattern of words of spindle, coolant and tools."""
+    """Pattern of the words for spindle, coolant and tools."""
 
     systems: ClassVar[str] = ""
     """Pattern of work systems and tool lengths."""
 
     instead: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """Letters that end a message, and what is written for them."""
+    """Letters that would end a message, and their replacements."""
 
     longest_block: ClassVar[int] = 252
-    """Characters of a line."""
+    """Greatest number of characters in a line."""
 
     axis_words: ClassVar[Sequence[str]] = tuple("XYZABC")
-    """What is written before the number of each axis, X, Y, Z [mm], A, B, C [deg]."""
+    """Text before the number of each axis, X, Y, Z [mm], A, B, C [deg]."""
 
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program.
@@ -89,7 +89,7 @@ class WordDialect(Dialect):
         return text.getvalue()
 
     def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
-        """Yield lines of the program, made some thousand at a time."""
+        """Yield lines of the program; some thousand are made at a time."""
         # What does not move by the decimals that are written does not move.
         toolpath = toolpath.with_numbers(rounded(toolpath.numbers_written, self.decimals))
         yield from self.before_header(toolpath)
@@ -122,11 +122,11 @@ class WordDialect(Dialect):
         return f"N{line} "
 
     def rapid(self, words: str) -> str:
-        """Return a rapid to the words of changed axes."""
+        """Return a rapid with the words of the changed axes."""
         return self._from_table("rapid", "a rapid", words=words).rstrip()
 
     def feed(self, words: str, feed: float | None) -> str:
-        """Return a move at a feed [mm/min; deg/min if only angles move]; None if unchanged."""
+        """Return a move at a feed [mm/min; deg/min if only angles move]; feed None: unchanged."""
         line = self._from_table("feed", "a move at feed", words=words)
         return line if feed is None else f"{line} F{digits(feed)}"
 
@@ -135,7 +135,7 @@ class WordDialect(Dialect):
         return self._from_table("in machine", "a move in machine coordinates (G53)", move=move)
 
     def corner(self, corner_mm: float) -> str:
-        """Return the rounding from here on [mm]: 0 exact, infinite unlimited."""
+        """Return the words for the rounding of all following corners [mm]: 0 exact, infinite unlimited."""
         lacking = "how far corners may be rounded"
         if corner_mm <= 0.0:
             return self._from_table("exact" if corner_mm == 0.0 else "exact stop", lacking)
@@ -164,7 +164,7 @@ class WordDialect(Dialect):
         return self._from_table("message", "a message without a stop", text=text)
 
     def function(self, words: str) -> str:
-        """Return words of spindle and coolant that every control has: `S800 M3`."""
+        """Return words for spindle and coolant that every control has, such as `S800 M3`."""
         if not all(re.fullmatch(self.functions, word) for word in words.split()):
             raise self.cannot_say(words)
         return words
@@ -176,7 +176,7 @@ class WordDialect(Dialect):
         return text
 
     def said(self, text: str) -> str:
-        """Return a text in letters that a message may have."""
+        """Return a text with only the letters that a message may have."""
         return "".join(self.instead.get(letter, letter) for letter in plain(text))
 
     def _from_table(self, what: str, lacking: str, **values: str) -> str:
@@ -185,7 +185,7 @@ class WordDialect(Dialect):
         return self.words[what].format(**values)
 
     def guard(self, holds: Mapping[str, Sequence[float]]) -> Iterable[str]:  # noqa: ARG002
-        """Return lines that end the program if offsets differ from `Toolpath.holds`; none if the control cannot."""
+        """Return lines that end the program if offsets differ from `Toolpath.holds`; empty if it cannot."""
         return ()
 
     def length_guard(self, text: str, holds: Mapping[str, Sequence[float]], row: int) -> Iterable[str]:  # noqa: ARG002
@@ -273,7 +273,7 @@ class WordDialect(Dialect):
 
 
 def _ends_of_plain(toolpath: Toolpath, rows: slice) -> list[int]:
-    """Return where the stretch of moves ends that each row goes on with, counted in these rows; the row itself if it changes more than axes."""
+    """Return the end of the stretch of plain moves that each row begins, as an index among these rows; the row itself if it changes more than axes."""
     kind, feed, corner = toolpath.kind[rows], toolpath.feed[rows], toolpath.corners_mm[rows]
     plain = np.zeros(len(kind) + 1, dtype=np.bool_)
     same = (kind[1:] == RowKind.FEED) & (kind[:-1] == RowKind.FEED) & (feed[1:] == feed[:-1])
@@ -294,11 +294,11 @@ _MOVES = frozenset((int(RowKind.RAPID), int(RowKind.FEED)))
 
 
 SAME = 1e-9
-"""Places that differ by less are one: numbers and offsets have fifteen digits [mm, deg]."""
+"""Positions that differ by less are equal: numbers and offsets have fifteen digits [mm, deg]."""
 
 
 def changed_axes(toolpath: Toolpath) -> Flags:
-    """Return axes that each row must name, shape (n, 6); none in rows that are no moves."""
+    """Return the axes that each row must name, shape (n, 6); False in rows without a move."""
     moves = np.flatnonzero(toolpath.is_move)
     poses = toolpath.poses[moves]
     known = (toolpath.unknown[moves][:, None] >> np.arange(6)) & 1 == 0

@@ -1,1 +1,1 @@
-"""NC dialects: each file with a `Dialect` in it is found."""
+"""NC dialects: the program finds each file that contains a `Dialect`."""

@@ -1,4 +1,4 @@
-"""LinuxCNC: RS274/NGC as its interpreter reads it."""
+"""LinuxCNC's language: RS274/NGC as its interpreter reads it."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 MODES = "G21 G90 G94 G17 G40 G49"
-"""Millimetres, absolute, feed per minute, arcs in XY, no cutter compensation, no tool length: the model is about the
-tool tip. A program must not inherit any of these from the one before it."""
+"""Millimetres, absolute, feed per minute, arcs in XY, no cutter compensation, no tool length, because the model describes the tool tip. A program must not inherit any of these modes from an earlier program."""
 
 
 class LinuxCNC(WordDialect):
-    """Words of an axis are written when they change, the motion code in every line.
+    """An axis word is written when its value changes, the motion code in every line.
 
-    - F under G94 is the speed along X, Y and Z alone, which is the feed of the tool tip; tilting needs no correction.
-    - `G64 P Q0`: P bounds the rounding of corners, while exact path (G61) would stop at each of 3600 corners. Q0 keeps
-      LinuxCNC from merging short moves, which it does only while A, B and C are constant.
-    - G61 and G64 apply to the end of each following move, without a stop of their own. A move under G61 in pieces has G64
-      before the first and G61 before the last.
+    - F under G94 is the speed along X, Y and Z alone, which is the feed of the tool tip. So F needs no correction for
+    tilting.
+    - `G64 P Q0`: P bounds the rounding of corners; exact path (G61) would stop at each of 3600 corners. Q0 keeps
+    LinuxCNC from merging short moves, which it does only while A, B and C are constant.
+    - G61 and G64 apply to the end of each following move and cause no stop. A G61 move in pieces has G64 before its
+    first piece and G61 before its last.
     - Dwells (G4) end blending, so the machine stops at the corner between feed-in and arc.
     """
 

@@ -1,4 +1,4 @@
-"""Poses as a table for an external postprocessor: machine coordinates and F of each move, before and after."""
+"""Poses as a table for an external postprocessor: machine coordinates and F of each move."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 COLUMNS = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,feed"
-"""The feed of the tip in mm/min, of moves that only turn in deg/min; empty in rapids."""
+"""F is the feed of the tip [mm/min], or of the angles if only they move [deg/min]; empty in rapids."""
 
 
 class Poses(Dialect):

@@ -1,4 +1,4 @@
-"""The arc of a block, by its centre or its radius."""
+"""The arc of a block, from its centre or radius."""
 
 from __future__ import annotations
 

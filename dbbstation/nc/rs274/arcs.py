@@ -14,26 +14,27 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 CHORD_ERROR_MM = 5e-5
-"""How far a chord may lie inside its arc: 0.05 µm, which is 3800 chords for a full turn of 150 mm."""
+"""Largest distance of a chord from its arc: 0.05 µm, or 3800 chords for a full turn of 150 mm."""
 
 RADIUS_ABSOLUTE_MM = {1.0: 0.02 * math.sqrt(2.0), 25.4: 0.0508 * math.sqrt(2.0)}
 RADIUS_RELATIVE, RADIUS_WORST = 1e-3, 100.0
-"""Radii to start and end of an arc may differ: by less than the first, in the unit of the program, or by less than the second share of
-the radius while below the first times the third. Such an arc is a spiral. [LinuxCNC's own limits]"""
+"""Limits of the difference between the radii to start and end of an arc. It must be less than the first, in the
+program's unit, or less than the second share of the radius and less than the first times the third. Such an arc is a
+spiral. [LinuxCNC's own limits]"""
 
 LEAST_RADIUS_MM = 0.00127
-"""Arcs of a smaller radius are none. [LinuxCNC's own limit, RADIUS_TOLERANCE]"""
+"""Arcs with a smaller radius are invalid. [LinuxCNC's own limit, RADIUS_TOLERANCE]"""
 
 REACH_MM = 0.00127
-"""By how much the radius of an arc given by R may be too short for its ends. [LinuxCNC's own limit]"""
+"""Largest amount by which R may be too short for the ends of its arc. [LinuxCNC's own limit]"""
 
 FULL_TURN_RAD = 1e-6
-"""Below this angle between start and end an arc is a full turn. [LinuxCNC's own limit]"""
+"""An arc with a smaller angle between start and end is a full turn. [LinuxCNC's own limit]"""
 
 
 @dataclass(frozen=True)
 class Arc:
-    """An arc, with all axes beside its plane moving evenly along it.
+    """An arc in a plane; all other axes move evenly along it.
 
     Attributes:
         start: pose before it, shape (6,) [mm, deg].
@@ -68,7 +69,7 @@ class Arc:
 
     @property
     def swept_rad(self) -> float:
-        """Return the angle from start to end in the arc's direction, all turns."""
+        """Return the angle from start to end in the arc's direction, over all turns."""
         begin, end = (self._angle_rad(pose) for pose in (self.start, self.end))
         swept = math.fmod(end - begin if not self.clockwise else begin - end, math.tau)
         while swept <= FULL_TURN_RAD:
@@ -88,7 +89,7 @@ class Arc:
 
     @property
     def length_mm(self) -> float:
-        """Return the tip's distance along the arc with its rise."""
+        """Return the tip's path length along the arc, including its rise [mm]."""
         flat = self.swept_rad * sum(self.radii_mm()) / 2.0
         rise = 3 - int(PLANES[self.plane].sum())
         return math.hypot(flat, float(self.end[rise] - self.start[rise]))
@@ -117,7 +118,7 @@ def centre_by_radius(
     *,
     clockwise: bool,
 ) -> tuple[float, float] | None:
-    """Return the centre of the arc through two points of its plane, shapes (2,), or None.
+    """Return the centre of the arc through two points of its plane, shapes (2,); None if R is too short or both are equal.
 
     Args:
         radius_mm: positive for at most half a turn, negative for more.

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 BLANKS = " \t\r"
 
 LONGEST_BYTES = 252
-"""LinuxCNC's interpreter refuses lines of more bytes, the CR before the line feed counted [measured with rs274 2.9]."""
+"""LinuxCNC's interpreter refuses longer lines; a CR before the line feed counts as a byte [measured with rs274 2.9]."""
 
 _CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029]")
-"""All control characters but the tab, and the line separators of Unicode."""
+"""All control characters except the tab, and Unicode's line separators."""
 
 
 @dataclass(slots=True)
@@ -47,13 +47,13 @@ class ProgramBlock:
 
     @property
     def first_column(self) -> int:
-        """Return the column of the first word that is neither code nor line number, else of the first code."""
+        """Return the column of the first word that is neither code nor line number; if there is none, of the first code."""
         words = [word.column for word in self.words.values()]
         return min(words) if words else next((word.column for word in self.codes.values()), 1)
 
 
 def block_of(line: str, place: Place, value_of: Callable[[int | str], float | None] = unknown_value) -> ProgramBlock:
-    """Return a line as a block.
+    """Return the block of a line.
 
     Raises:
         BadLine: the first thing in it that cannot be read.
@@ -95,7 +95,7 @@ def _checked(line: str, place: Place) -> str:
 _ACTIVE = re.compile(
     r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE
 )
-"""Begins of comments that LinuxCNC acts on."""
+"""First words of the comments that LinuxCNC executes."""
 
 _PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)
 
@@ -133,4 +133,4 @@ def _take_code(block: ProgramBlock, word: Word) -> None:
 
 
 WITHIN = 1e-4
-"""A computed code may be off its number by this."""
+"""Largest difference of a computed code from its number."""

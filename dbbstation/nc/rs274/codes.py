@@ -8,7 +8,7 @@ from dbbstation.nc.toolpath import SYSTEMS
 
 
 class ModalGroup(StrEnum):
-    """Codes of one group exclude each other in a line."""
+    """Groups of codes: one line must not have two codes of one group."""
 
     MOTION = "motion"
     ONCE = "not modal"
@@ -37,7 +37,7 @@ class ModalGroup(StrEnum):
 
 
 TAPS = {74.0: "M4", 84.0: "M3"}
-"""Tapping cycles, and how the spindle turns before them."""
+"""Tapping cycles, and the spindle's direction before each."""
 
 CYCLES = (73, *TAPS, 81, 82, 83, 85, 86, 89)
 
@@ -82,7 +82,8 @@ STORED: dict[ModalGroup, str] = {
     ModalGroup.COOLANT: "M9",
     ModalGroup.OVERRIDE: "M48",
 }
-"""Groups that M70 to M73 store, in the order in which they come back, and what a program begins with; empty: not known."""
+"""Groups that M70 to M73 store, in the order of their restoration, with each group's code at the begin of a program;
+empty: unknown."""
 
 LETTERS = frozenset("ABCDEFGHIJKLMNPQRSTXYZ@^")
 

@@ -1,6 +1,6 @@
-"""The way of a tool's centre beside a programmed contour (G41, G42) in one plane [LinuxCNC, Cutter Compensation].
+"""Path of a tool's centre beside a programmed contour (G41, G42) in one plane [LinuxCNC, Cutter Compensation].
 
-Points and directions of the plane are complex numbers: its first axis is real, its second imaginary.
+Points and directions of the plane are complex numbers: the first axis is real, the second imaginary.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.nc.rs274.arcs import Arc
 
 TANGENT_RAD = 0.05
-"""Contours that turn by less have no corner. [LinuxCNC's own limit, TOLERANCE_CONCAVE_CORNER]"""
+"""A contour that turns by less has no corner. [LinuxCNC's own limit, TOLERANCE_CONCAVE_CORNER]"""
 
 
 class NoRoomError(Exception):
@@ -41,14 +41,14 @@ class Element:
     swept_rad: float = 0.0
 
     def direction(self, point: complex) -> complex:
-        """Return the direction of the contour in its begin or end, of length one."""
+        """Return the contour's unit direction at its begin or end."""
         way = self.turn * 1j * (point - self.centre) if self.turn else self.end - self.begin
         return way / abs(way)
 
 
 @dataclass(frozen=True)
 class Beside:
-    """The tool's way beside the last element, which a corner may still shorten.
+    """The tool's path beside the last element. The next corner may still shorten it.
 
     Attributes:
         added: number of its rows in the toolpath.
@@ -66,11 +66,11 @@ class Beside:
 
     @property
     def place(self) -> complex:
-        """Return the place where the element ends in the plane."""
+        """Return the end point of the element in the plane."""
         return complex(*self.end[self.plane])
 
     def bent(self, place: complex) -> tuple[Floats, tuple[float, float, float, float]]:
-        """Return its poses and the arc of its chords if it ends elsewhere in the plane.
+        """Return the poses of the path, and the arc of its chords, for another end point in the plane.
 
         Raises:
             NoRoomError: it would run backwards.
@@ -94,14 +94,14 @@ class Beside:
 
 
 def with_plane(pose: Floats, plane: Integers, place: complex) -> Floats:
-    """Return a pose, shape (6,), with another place in a plane."""
+    """Return a pose, shape (6,), with another position in a plane."""
     there = pose.copy()
     there[plane] = place.real, place.imag
     return there
 
 
 def element_of(begin: complex, end: complex, arc: Arc | None) -> Element:
-    """Return the element of a contour between two places."""
+    """Return the element of a contour between two points."""
     if arc is None:
         return Element(begin, end)
     return Element(begin, end, -1 if arc.clockwise else 1, complex(*arc.centre_mm), arc.swept_rad)
@@ -119,11 +119,11 @@ class Cutter:
     radius_mm: float
 
     def beside(self, element: Element, point: complex) -> complex:
-        """Return the tool's centre beside begin or end of an element."""
+        """Return the tool's centre beside the begin or end of an element."""
         return point + self.side * self.radius_mm * 1j * element.direction(point)
 
     def check_entry(self, begin: complex, end: complex) -> None:
-        """Check that a contour is entered by more than the radius.
+        """Check that the entry into a contour is longer than the radius.
 
         Raises:
             NoRoomError: it is not.
@@ -143,7 +143,7 @@ class Cutter:
         return radius
 
     def entered(self, arc: Element, begin: complex) -> Element:
-        """Return the arc from the tool's centre to the place beside the end of an arc, with the same tangent there."""
+        """Return the arc from the tool's centre to the point beside the end of an arc, tangent to that end."""
         end = self.beside(arc, arc.end)
         inwards = (arc.centre - arc.end) / abs(arc.centre - arc.end)
         chord = begin - end
@@ -157,7 +157,7 @@ class Cutter:
         return self.side * element.turn > 0
 
     def corner(self, last: Element, element: Element) -> tuple[complex, bool]:
-        """Return where the tool's centre leaves one element for the next, and whether it goes round the corner before.
+        """Return the point where the tool's centre passes to the next element, and whether it first goes round the corner.
 
         Raises:
             NoRoomError: the tool does not fit into the corner.

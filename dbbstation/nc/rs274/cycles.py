@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from dbbstation.nc.rs274.state import ControlState
 
 PECK_MM = 0.254
-"""By how much a peck stays clear of the bottom of the one before, and G73 lifts: 0.01 inch [LinuxCNC]."""
+"""Clearance of a peck from the bottom of the previous peck, and height by which G73 lifts: 0.01 inch [LinuxCNC]."""
 
 
 PECKS, MOST_PECKS = frozenset({73.0, 83.0}), 10_000
-"""Cycles that need Q, and how often they may peck in one hole."""
+"""Cycles that need Q, and their greatest number of pecks in one hole."""
 
 
 class Step(NamedTuple):
@@ -52,7 +52,7 @@ class Depths(NamedTuple):
 
 
 class ModalCycle:
-    """State of cycles from line to line.
+    """State of drilling cycles between lines.
 
     Attributes:
         numbers: Z, R and Q [mm] and P [s].
@@ -67,7 +67,7 @@ class ModalCycle:
         self.to_clear: bool | None = None
 
     def depths(self, code: float, block: ProgramBlock, state: ControlState, column: int, *, absolute: bool) -> Depths:
-        """Return the depths of a cycle, and remove its words from the block.
+        """Return the depths of a cycle, and remove the cycle's words from the block.
 
         Args:
             absolute: whether Z and R count from the origin (G90).
@@ -101,7 +101,7 @@ class ModalCycle:
 
 
 def cycle_steps(code: float, depths: Depths, turning: str) -> Iterator[Step]:
-    """Yield the steps of a cycle from the clear plane on; `turning` is M3, M4 or empty."""
+    """Yield the steps of a cycle after the clear plane; `turning` is M3, M4 or empty."""
     if code in TAPS:
         back = TAPS[158.0 - code]
         yield from (Step("M49"), Step("feed", depths.bottom), Step("M5"), Step(back), Step("dwell"))

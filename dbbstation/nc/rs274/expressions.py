@@ -13,17 +13,18 @@ if TYPE_CHECKING:
     from dbbstation.nc.rs274.tokens import Place
 
 NUMBER = re.compile(r"[+-]?+[ \t]*+(?:[0-9][0-9 \t]*+(?:\.[0-9 \t]*+)?+|\.[ \t]*+[0-9][0-9 \t]*+)")
-"""White space inside a number is legal: `X1 0` is X10 to LinuxCNC. Every repeat is possessive, so that no line is gone through twice."""
+"""Pattern of a number. White space inside it is legal: LinuxCNC reads `X1 0` as X10. Every repeat is possessive, so
+that no line is searched twice."""
 
 _BLANK = re.compile(r"[ \t]*+")
 _WORD = re.compile(r"[A-Za-z]+")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
 
 EQUAL = 1e-4
-"""Numbers that differ by less are equal to EQ and NE [LinuxCNC, TOLERANCE_EQUAL]."""
+"""EQ and NE treat numbers that differ by less as equal [LinuxCNC, TOLERANCE_EQUAL]."""
 
 DEEPEST = 50
-"""Brackets within brackets; a line of LinuxCNC has room for more, a program has not."""
+"""Greatest depth of nested brackets; LinuxCNC allows more, but programs need fewer."""
 
 
 def _power(base: float, exponent: float) -> float:
@@ -72,7 +73,7 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 
 
 class ValueReader:
-    """Reads values in one line, from a position on.
+    """Reads successive values of one line from a position.
 
     Args:
         value_of: value of a parameter by number or lower-case name; None if undefined. NaN stands for values that are
@@ -111,7 +112,7 @@ class ValueReader:
         return self._function(word)
 
     def expression(self) -> float:
-        """Return the value of an expression, which Fanuc's macros write without brackets behind =."""
+        """Return the value of an expression. Fanuc's macros write it without brackets behind =."""
         return self._level(0)
 
     def bracket(self) -> float:
@@ -129,7 +130,7 @@ class ValueReader:
         return value
 
     def parameter(self) -> int | str:
-        """Return number or lower-case name of the parameter that begins here."""
+        """Return the number or lower-case name of the parameter at this position."""
         at = self.position
         self._expect("#")
         self._skip()
@@ -150,7 +151,7 @@ class ValueReader:
         return round(number)
 
     def blanks(self) -> str:
-        """Skip blanks and return the character behind them, empty at the end."""
+        """Skip blanks and return the next character; empty at the end."""
         self._skip()
         return self._peek()
 
@@ -233,4 +234,4 @@ class ValueReader:
 
 
 MOST_PARAMETER = 5602
-"""Numbered parameters of LinuxCNC end there [RS274NGC_MAX_PARAMETERS]."""
+"""Greatest number of a parameter in LinuxCNC [RS274NGC_MAX_PARAMETERS]."""

@@ -1,4 +1,4 @@
-"""The lines of a program in execution order: O-words, subprograms, their parameters."""
+"""Lines of a program in execution order, with O-words, subprograms and parameters."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ if TYPE_CHECKING:
     from dbbstation.nc.rs274.plain import PlainLines
 
 MOST_AGAIN = 500_000
-"""Lines that loops and subprograms may run again: what does more is taken to run for ever."""
+"""Greatest number of repeated lines in loops and subprograms. A program that repeats more is assumed to run for
+ever."""
 
 DEEPEST = 10
-"""Subprograms within each other [LinuxCNC, INTERP_SUB_ROUTINE_LEVELS]."""
+"""Greatest depth of nested subprograms [LinuxCNC, INTERP_SUB_ROUTINE_LEVELS]."""
 
 MOST_NUMBER = 9999
-"""Number of a subprogram; the digits before it in P are how often it runs [Fanuc, M98]."""
+"""Greatest number of a subprogram. In P, the digits before it are the number of its repetitions [Fanuc, M98]."""
 
 LOCAL = 30
-"""Numbered parameters up to this belong to the subprogram that runs."""
+"""Parameters with numbers up to this belong to the running subprogram."""
 
 _O_LINE = re.compile(
     r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?[oO][ \t]*(?P<label><[^>\n]*>|[0-9]+)[ \t]*(?P<keyword>[A-Za-z]*)(?P<rest>[^\n]*)$"
@@ -129,7 +130,7 @@ class Flow:
         self._begins = list[int]()
 
     def _found(self, label: str, keyword: str) -> list[OLine]:
-        """Return where a subprogram begins, after a look for its file if it is not among the lines."""
+        """Return the begin of a subprogram; if no line has it, look for its file."""
         stem, begun = label.strip("<>"), {file for _, file in self.files}
         for name in (stem, f"o{stem}", f"{stem:0>4}", f"o{stem:0>4}"):
             if any(one.keyword == keyword for one in self._labels.get(label, [])):
@@ -180,20 +181,20 @@ class Flow:
                 yield line, place
 
     def plain_lines(self) -> PlainLines:
-        """Return what plain lines say from the line yielded last on."""
+        """Return the content of the plain lines from the last yielded line on."""
         if self._letters is None:
             self._letters = letters_of("\n".join(self._lines))
             self._begins = [0, *accumulate(len(line) + 1 for line in self._lines)]
         return plain_lines(self._letters, self._begins[self._next - 1])
 
     def skip(self, lines: int) -> None:
-        """Take the next lines as ran."""
+        """Mark the next lines as run."""
         self._next += lines
         self._ran += lines
 
     @property
     def runs(self) -> list[int]:
-        """Return the running subprograms, each call by a number of its own; 0 is the program."""
+        """Return the running subprograms, each call by a separate number; 0 is the program."""
         return [0, *(frame.number for frame in self._frames)]
 
     def ended(self) -> None:
@@ -224,7 +225,7 @@ class Flow:
         return self._outer(which)
 
     def set(self, which: int | str, value: float) -> None:
-        """Give a parameter its value."""
+        """Set a parameter's value."""
         (self._frames[-1].parameters if self._frames and _is_local(which) else self._globals)[which] = value
 
     def call(self, number: float, times: float, place: Place) -> None:
@@ -245,7 +246,7 @@ class Flow:
             self._enter(found[0].line, int(times) - 1, place, by_number=True, parameters=dict(self._own()))
 
     def back(self, place: Place) -> None:
-        """Return from such a subprogram (M99).
+        """Return from a subprogram that was called by its number (M99).
 
         Raises:
             BadLine: none runs.
@@ -261,7 +262,7 @@ class Flow:
     def _opening(self) -> tuple[bool, int]:
         """Return whether the first line with content is a percent sign, and the index of the first line to read.
 
-        Between percent signs a program needs no other end. Elsewhere LinuxCNC treats a percent sign as a fault.
+        A program between percent signs needs no other end. Elsewhere LinuxCNC treats a percent sign as a fault.
         """
         start = next((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), 0)
         return (True, start + 1) if is_percent(self._lines[start]) else (False, 0)
@@ -286,7 +287,7 @@ class Flow:
         made(word, place)
 
     def _run_macro(self, macro: OLine, place: Place) -> str:
-        """Run WHILE, IF, GOTO or END of Fanuc's macros; return the line behind a THEN that holds."""
+        """Run WHILE, IF, GOTO or END of Fanuc's macros; if an IF is true, return the line behind its THEN."""
         self._begun = True
         reader = self._reader(macro, place)
         holds = macro.keyword not in {"WHILE", "IF"} or reader.bracket() != 0.0
@@ -332,7 +333,7 @@ class Flow:
         return near[0 if keyword == "END" else -1]
 
     def _numbered(self, number: int, place: Place) -> int:
-        """Return the index of the next line with a number; the search goes on at the begin [Fanuc, GOTO]."""
+        """Return the index of the next line with this number; after the last line the search continues at the first [Fanuc, GOTO]."""
         found = ((line, _NUMBERED.match(self._lines[line - 1])) for line in self._program())
         lines = [line - 1 for line, match in found if match and int(match[1]) == number]
         if not lines:
@@ -340,7 +341,7 @@ class Flow:
         return next((at for at in lines if at >= self._next), lines[0])
 
     def _number(self, word: OLine, place: Place) -> None:
-        """Handle the program's number; a later one begins a subprogram, which runs only when called."""
+        """Handle the program's number. A later number begins a subprogram, which runs only when called."""
         if word.rest:
             raise place.fault(
                 word.column + 1,
@@ -422,7 +423,7 @@ class Flow:
         self._next = self._must_be_opened(word, place, ("while",)).line - 1
 
     def _do(self, _word: OLine, _place: Place) -> None:
-        """Begin a loop; its `while` leads back."""
+        """Begin a loop; its `while` jumps back."""
 
     def _repeat(self, word: OLine, place: Place) -> None:
         times = self._reader(word, place).value()
@@ -453,7 +454,7 @@ class Flow:
         raise place.fault(1, f"O{word.label} {word.keyword} has no {' or '.join(keywords)}", "add it")
 
     def _opened(self, word: OLine, keywords: tuple[str, ...]) -> OLine | None:
-        """Return the preceding O-word of this label, if it has one of the keywords; breaks and continues are skipped."""
+        """Return the preceding O-word of this label if it has one of the keywords; skip breaks and continues."""
         before = [each for each in self._labels[word.label] if each.line < word.line]
         before = [each for each in before if each.keyword not in {"break", "continue"}]
         return before[-1] if before and before[-1].keyword in keywords else None

@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 FIRST_LABEL, FIRST_LENGTH_LABEL = 100, 1000
 
 WITHIN = 5e-4
-"""How far offsets may be off the declared ones, the sum of all [mm, deg]."""
+"""Largest sum of all differences between actual and declared offsets [mm, deg]."""
 
 _IN_FORCE = FIRST_PARAMETERS[SYSTEMS[0]] - PER_SYSTEM
-"""Parameter of X to which the number of the work system in force is added, 20 for each."""
+"""Parameter of X in work system 0; each work system adds 20."""
 
 _AXES = 9
 _TERMS = 5
-"""In one line; a line of LinuxCNC has an end."""
+"""Number of terms in one line, since the length of LinuxCNC's lines is limited."""
 
 _WORK = "work system {} is not {}: this program is right for that only. Set it, or compensate anew"
 _OTHER = "G92 is not {}. Clear it with G92.1, or compensate anew"

@@ -37,20 +37,20 @@ RAPID, LINEAR, CLOCKWISE, COUNTER_CLOCKWISE = 0.0, 1.0, 2.0, 3.0
 ARCS = frozenset({CLOCKWISE, COUNTER_CLOCKWISE})
 DWELL, MACHINE, SET_TOOL = 4.0, 53.0, 61.0
 TAKES_AXES = frozenset({10.0, 28.0, 30.0, 52.0, 92.0})
-"""Codes of one line that take its axis words for themselves."""
+"""Codes that use the axis words of their line."""
 
 POLAR = "@^"
-"""Letters of a radius and an angle in degrees, in place of X and Y."""
+"""Letters of radius and angle in degrees, which replace X and Y."""
 
 TURNS = 0b111000
-"""A, B and C, which no tool changer is taken to move where they were declared."""
+"""A, B and C. If they were declared, the program assumes that no tool changer moves them."""
 
 
 LONG_S = 99.0
-"""Longer dwells are stated: they may be meant in milliseconds."""
+"""Longer dwells are reported: they may be meant in milliseconds."""
 
 LAST_OWN = 5000
-"""Parameters behind this are the control's own."""
+"""Parameters with greater numbers belong to the control."""
 
 _SHOWS_VALUES = re.compile(r"(?:debug|print|log),", re.IGNORECASE)
 _SHOWN = re.compile(r"#(?:(\d+)|<([^<>]*)>)")
@@ -69,7 +69,7 @@ _NOT_BESIDE = frozenset(
         ModalGroup.ONCE,
     }
 )
-"""Codes that no line may have beside a contour."""
+"""Codes that are refused while a contour is compensated."""
 
 
 class Feed(NamedTuple):
@@ -95,7 +95,7 @@ class Stored(NamedTuple):
 
 
 class Modes:
-    """Modal state; begins as LinuxCNC does, in millimetres."""
+    """Modal state; initially as in LinuxCNC, in millimetres."""
 
     def __init__(self, text: str, file: str, start: Floats | None, setup: ControlSetup) -> None:
         self.path = ToolpathBuilder(file, start)
@@ -248,7 +248,7 @@ class Modes:
         return name("G", value) if value in values and value is not None else ""
 
     def _modal_arc(self, block: ProgramBlock) -> str:
-        """Return the arc of a line without its own code; empty if it makes none."""
+        """Return the arc code of a line without motion code; empty if the line is no arc."""
         is_arc = self._motion in ARCS and ModalGroup.MOTION not in block.codes
         return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + CENTRES + POLAR) else ""
 
@@ -333,7 +333,7 @@ class Modes:
         self.path.corner_mm = corner
 
     def _smoothing(self, block: ProgramBlock) -> None:
-        """Leave out high-speed modes of other controls (G5 P, G5.1 Q, G187); with axes G5 and G5.1 are curves."""
+        """Remove high-speed modes of other controls (G5 P, G5.1 Q, G187). With axis words, G5 and G5.1 are curves."""
         word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQR"]
         if block.words.keys() & set(AXES + CENTRES):
             raise block.place.fault(word.column, f"{name('G', word.value)} with axes is not read", CURVES)

@@ -31,16 +31,16 @@ if TYPE_CHECKING:
 from dbbstation.nc.rs274.modes import ARCS, CLOCKWISE, LINEAR, MACHINE, POLAR, RAPID, TAKES_AXES, Feed, Modes
 
 MOST_ROWS = 1_000_000
-"""Moves and stops that a program may have once its arcs are chords: 260 full turns of 150 mm, or a path of 50 m in steps
-of 0.05 mm. All of it is inverted at once, for the sake of sources with a history; it takes some gigabytes then."""
+"""Greatest number of moves and stops after arcs are divided into chords: 260 full turns of 150 mm, or a path of 50 m in
+steps of 0.05 mm. For sources with a history, all rows are inverted at once, which needs some gigabytes."""
 
 FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
-"""No increment may lead farther than this, as no number may be larger."""
+"""Largest coordinates that increments may reach, equal to the largest numbers of a program."""
 
 FLOATING = "G74 and G84 tap with a floating chuck, as in LinuxCNC: the spindle turns back at the bottom, and F is kept"
 
 LEAST_F = 1e-3
-"""A move of no way under G93 has a feed all the same."""
+"""Feed of a move of zero length under G93."""
 
 
 class Moves(Modes):
@@ -153,7 +153,7 @@ class Moves(Modes):
         self._motion, self._since_cycle = motion, False
 
     def _goes_nowhere(self, block: ProgramBlock, motion: float | None, once: float | None) -> bool:
-        """Return whether a line without axes is a move: an arc by its centre; for LinuxCNC also a motion code alone."""
+        """Return whether a line without axes is a move: an arc with a centre, or for LinuxCNC a motion code alone."""
         if self._motion in ARCS and (motion is not None or any(each in block.words for each in CENTRES)):
             return True
         return motion in {RAPID, LINEAR} and not np.isnan(self._state.pose).any() and once not in TAKES_AXES
@@ -203,7 +203,7 @@ class Moves(Modes):
             )
 
     def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> Floats:
-        """Return the pose that a block leads to in machine coordinates, shape (6,)."""
+        """Return the pose at the end of a block in machine coordinates, shape (6,)."""
         target: list[float] = self._state.pose.tolist()  # six numbers are sooner done without arrays
         offset = (0.0,) * 6 if in_machine else self._state.offset
         for axis, letter in enumerate(AXES):
@@ -229,7 +229,7 @@ class Moves(Modes):
         return np.array(target)
 
     def _cut_somewhere(self, block: ProgramBlock, unknown: list[str]) -> None:
-        """Let a straight move at feed pass before the program first names all axes; it must name them later."""
+        """Allow a straight move at feed before the program first names all axes. The program must name them later."""
         fault = unknown_place(block, unknown)
         left = any(AXES.index(letter) in self._away for letter in unknown)
         if left or self._motion != LINEAR or self._per_move or self._cutter is not None:
@@ -316,7 +316,7 @@ class Moves(Modes):
 
 
 def named_axes(block: ProgramBlock) -> list[str]:
-    """Return the axes that a block names, X and Y by polar coordinates too."""
+    """Return the axes that a block names; polar coordinates name X and Y."""
     polar = "" if block.words.keys().isdisjoint(POLAR) else "XY"
     return [letter for letter in AXES if letter in block.words or letter in polar]
 

@@ -1,4 +1,4 @@
-"""Lines of axes with G0, G1, F and N at most, read many at once: most of what CAM systems write is of this kind."""
+"""Read many plain lines at once: lines with axes, G0, G1, F and N only. Most lines of CAM systems are plain."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 LEAST_LINES, MOST_LINES = 4, 20_000
-"""Lines that are read at once: fewer are sooner read one by one."""
+"""Least and greatest number of lines that are read at once; fewer lines are read faster one by one."""
 
 MOST_DIGITS = 15
-"""A number with more is read by itself: its digits are no exact floating-point number."""
+"""A number with more digits is read separately: floating point cannot hold its digits exactly."""
 
 MOST_WHOLE = 8
-"""Digits of a line number or F; what has more is looked at by itself."""
+"""Greatest number of digits of a line number or F; longer ones are read separately."""
 
 _LETTERS = np.frombuffer(b"XYZABCF", dtype=np.uint8)
 _F = 6
@@ -30,7 +30,7 @@ _LF, _CR = b"\n\r"
 
 
 class PlainLines(NamedTuple):
-    """What successive lines say, row by row.
+    """The content of successive lines, one row each.
 
     Attributes:
         numbers: line number, -1 if there is none, shape (n,).
@@ -46,12 +46,12 @@ class PlainLines(NamedTuple):
 
 
 def letters_of(text: str) -> NDArray[np.uint8]:
-    """Return a text for `plain_lines`, a byte for each letter and one behind."""
+    """Return a text for `plain_lines`: one byte for each letter, and one byte at the end."""
     return np.frombuffer(text.encode("latin-1", "replace") + b"\0", dtype=np.uint8)
 
 
 def plain_lines(letters: NDArray[np.uint8], at: int) -> PlainLines:
-    """Return what the plain lines from a place on say, up to the first other line."""
+    """Return the content of plain lines from a position up to the first other line."""
     for most in (LEAST_LINES, MOST_LINES):
         head, digits = np.full((most, 2), -1, dtype=np.int64), np.zeros((most, 7), dtype=np.int64)
         decimals = np.full((most, 7), -1, dtype=np.int64)
@@ -124,7 +124,7 @@ def _after_axes(
 
 @inlined
 def _number(letters: NDArray[np.uint8], at: int) -> tuple[int, int, int]:
-    """Return where a number ends, its digits and its decimals; -1 if it is none."""
+    """Return the end of a number, its digits and its decimals; -1 if there is no number."""
     sign = -1 if letters[at] == _MINUS else 1
     at += letters[at] == _MINUS or letters[at] == _PLUS
     value, count, places, behind = 0, 0, 0, False
@@ -140,7 +140,7 @@ def _number(letters: NDArray[np.uint8], at: int) -> tuple[int, int, int]:
 
 
 def going_on(values: Floats, before: Floats) -> Floats:
-    """Return modal values, shape (n, k), each NaN as the value above it; `before`, shape (k,), stands above the first."""
+    """Return modal values, shape (n, k): each NaN gets the value of the row above. `before`, shape (k,), is the row above the first."""
     known = np.vstack([before, values])
     at = np.where(np.isnan(known), 0, np.arange(len(known))[:, None])
     filled: Floats = np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]

@@ -1,4 +1,4 @@
-"""From blocks to a toolpath through the modal state of a control."""
+"""Convert blocks to a toolpath by the modal state of a control."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from dbbstation.nc.rs274.modes import DWELL, LINEAR, MACHINE, RAPID, TAKES_AXES,
 from dbbstation.nc.rs274.moves import FARTHEST_DEG, MOST_ROWS, Moves, named_axes, too_long
 
 MOST_FAULTS = 20
-"""A program of another language has a fault in every line; the first ones tell."""
+"""Greatest number of reported faults: a program of another language has a fault in every line."""
 
 NO_END = "the program ends without M2, M30 or %: check that it is whole"
 
@@ -42,7 +42,7 @@ ENDS = frozenset({2.0, 30.0})
 
 
 def read_program(text: str, file: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
-    """Return what a program commands.
+    """Return the toolpath that a program commands.
 
     Args:
         start: pose before the program, shape (6,) [mm, deg], NaN for unknown axes; None: all unknown.
@@ -124,7 +124,7 @@ class _Interpreter(Moves):
                 self._bring_back(stored, place)
 
     def _store(self, block: ProgramBlock) -> None:
-        """Run M70 to M73, which store modes and bring them back [LinuxCNC, M70 to M73]."""
+        """Run M70 to M73, which store and restore modes [LinuxCNC, M70 to M73]."""
         code, level = block.code(ModalGroup.STATE), self.flow.runs[-1]
         if code in {70.0, 73.0}:
             modes = self._speed, self.path.corner_mm, self._cycle.to_clear, self._state.length
@@ -150,7 +150,7 @@ class _Interpreter(Moves):
         self._speed, self.path.corner_mm, self._cycle.to_clear = speed, corner_mm, to_clear
 
     def _ran_lines(self, first: int) -> bool:
-        """Run lines of axes together, this one and those that follow it; return False if it is to run by itself."""
+        """Run this line of axes together with those that follow; return False if it must run alone."""
         ready = self._moved and self._absolute and self._motion in {RAPID, LINEAR}
         if (
             not ready
@@ -258,7 +258,7 @@ class _Interpreter(Moves):
             del block.words[letter]
 
     def _somewhere(self, code: str, axes: list[int], block: ProgramBlock) -> None:
-        """Leave the way to a reference point whose place is not declared to the control."""
+        """Write a move to a reference point of undeclared position as it is: only the control knows the path."""
         axes = axes or [axis for axis in range(6) if not self._fixed >> axis & 1]
         self._system(f"G91 {code} {' '.join(f'{AXES[axis]}0' for axis in axes)}\nG90", block)
         self._state.pose = self._state.pose.copy()

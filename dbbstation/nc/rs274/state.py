@@ -1,4 +1,4 @@
-"""Position and coordinates of a control: pose, work offsets, G92, tool lengths, their parameters."""
+"""Position and coordinates of a control: pose, work offsets, G92, tool lengths, and their parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ POSITION, SYSTEM, TOOL, LENGTH = 5420, 5220, 5400, 5401
 
 
 class ControlState:
-    """Pose in machine coordinates, and offsets added to numbers.
+    """Pose in machine coordinates, and the offsets that are added to programmed numbers.
 
     Attributes:
         system: number of the work system, from 1.
@@ -55,7 +55,7 @@ class ControlState:
         return self._systems.get(system) or self.setup.place(SYSTEMS[system - 1]) or ZERO
 
     def use_system(self, system: str, block: ProgramBlock) -> None:
-        """Count in a work system."""
+        """Use a work system for the following numbers."""
         turned = self.setup.rotation_deg(system)
         if turned:
             what = f"{system} is turned by {turned:g} degrees about Z in the parameter file"
@@ -64,7 +64,7 @@ class ControlState:
         self._counted()
 
     def set_system(self, block: ProgramBlock) -> tuple[str, str, tuple[float, ...]]:
-        """Run G10 L2 or L20; return the equivalent, the system and its earlier offset."""
+        """Run G10 L2 or L20. Return the equivalent G10 L2, the system and its former offset."""
         word = block.codes[ModalGroup.ONCE]
         if block.words.get("L", word).value == 1.0:
             return self._set_tool(block), "", ()
@@ -121,7 +121,7 @@ class ControlState:
         self._counted()
 
     def use_length(self, tool: Word | None, block: ProgramBlock, code: Word) -> int:
-        """Use the length of a tool, or none for G49; return its number."""
+        """Use the length of a tool, or zero for G49; return the tool's number."""
         if code.value == 49.0:  # noqa: PLR2004
             self.length, self.length_said = ZERO, False
             self._counted()
@@ -151,7 +151,7 @@ class ControlState:
         return None if self.setup.parameters is None else self.setup.parameters.get(which, 0.0)
 
     def _rows(self) -> list[tuple[int, tuple[float, ...]]]:
-        """Return the values of successive parameters; U, V, W and a rotation follow as zero."""
+        """Return the values of successive parameters. U, V, W and the rotation are zero."""
         rows = [(FIRST_PARAMETERS[each], self.offset_of(number)) for number, each in enumerate(SYSTEMS, 1)]
         rows += [(FIRST_PARAMETERS["G92"], self.g92), (LENGTH, self.length)]
         known = ((FIRST_PARAMETERS[each], self.setup.place(each)) for each in ("G28", "G30"))
@@ -191,7 +191,7 @@ class ControlState:
 
 
 def unknown_place(block: ProgramBlock, axes: list[str], when: str = " before this move") -> BadLine:
-    """Return the fault of a block that needs a known place of axes."""
+    """Return the fault of a block that needs the unknown position of axes."""
     what = f"the program does not state the place of {', '.join(axes)}{when}"
     remedy = (
         "--angles A,B,C states at which a program without them runs"

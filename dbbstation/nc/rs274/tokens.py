@@ -1,4 +1,4 @@
-"""Words, settings of parameters and comments of one line of RS274/NGC, each with its column."""
+"""Words, parameter settings and comments of one line of RS274/NGC, each with its column."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _TOKEN = re.compile(
 
 LARGEST = {"N": 99_999_999.0, "F": 1e9, "S": 1e6, **dict.fromkeys("ABC", 36_000.0)}
 LARGEST_OTHER = 100_000.0
-"""Greatest size of a number after each letter: a hundred metres, a hundred turns, a dwell of a day. What is beyond is a
-slip of the pen, and would be drawn out into millions of points before any limit of the machine is looked at."""
+"""Greatest number after each letter: a hundred metres, a hundred turns, a dwell of a day. A greater number is a typing
+error. It would become millions of points before the machine's limits are checked."""
 
 _NOT_READ = {
     "[": ("an expression ([ ]) without its letter", "write the letter before it"),
@@ -51,7 +51,7 @@ class Word(NamedTuple):
 
 
 class ParameterSetting(NamedTuple):
-    """A parameter by number or lower-case name, and its value after the line."""
+    """A parameter by number or lower-case name, and the value that it has after the line."""
 
     parameter: int | str
     value: float
@@ -96,12 +96,12 @@ class Place:
         return f"line {self.within} of {self.file}" if self.within else f"line {self.line}"
 
     def fault(self, column: int, what: str, remedy: str) -> BadLine:
-        """Return the exception for a fault in this place."""
+        """Return the exception for a fault at this place."""
         return BadLine(Problem(self.file, self.within or self.line, column, what, remedy))
 
 
 def unknown_value(_which: int | str) -> float:
-    """Return a stand-in value for any parameter while a line is only inspected."""
+    """Return a placeholder value of any parameter for a line that is inspected, but not run."""
     return math.nan
 
 

@@ -1,7 +1,8 @@
-"""Faults common to all runs: programs mirrored, turned or reversed, and another bar.
+"""Detect faults common to all runs: mirrored, turned or reversed programs, and a wrong bar length.
 
-Such a session is consistent, but no hexapod has mirrored forms in several tests, and a uniformly oversized machine has further errors. Ways to have run the session are compared by likelihood. Sound runs favour another way by f or
-more with a probability of at most 1 / f [Markov's inequality].
+The runs of such a session agree with each other, but no hexapod has mirrored forms in several tests, and a uniformly
+oversized machine has further errors. Likelihoods compare the possible ways of running the programs. Sound runs favour
+another way by a factor f or more with a probability of at most 1 / f [Markov's inequality].
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Seen
 
 PROBABILITY = 1e-6
-"""Probability that sound runs favour any other way so much: too small to count among what all findings share. Eight tests that were run
-otherwise favour it by e^70 and more, and by a bar of 50 µm more by e^60."""
+"""Probability that sound runs favour another way so much, negligible in the false alarms of all findings. Eight tests
+run another way favour it by e^70 and more; a bar longer by 50 µm is favoured by e^60."""
 
 FEWEST_TESTS = 2
-"""Tests that must be there where no model says what the machine is like: any form of one circle, mirrored or turned, is that of some machine."""
+"""Fewest tests without a machine model: any form of one circle, also mirrored or turned, fits some machine."""
 
 BAR_UM = 1e3
-"""Standard deviation of what another bar is longer by, a millimetre: one that is longer by the feed-in, usually 1.5 mm, shows no circle. Ten times as
-much takes 2.3 from the logarithm of the ratio."""
+"""Prior standard deviation of a wrong bar's length error, a millimetre: a bar longer by the feed-in, usually 1.5 mm,
+gives no circle. Ten times as much lowers the log ratio by 2.3."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """A way in which all programs may have run.
+    """One way in which the machine may have run all programs.
 
     Attributes:
         reverses: whether the machine turned against its programs.
-        begin_deg: angle from +X where a circle began instead of a given one.
+        begin_deg: the angle from +X at which a circle began, as a function of the planned angle.
     """
 
     label: str
@@ -62,7 +63,7 @@ WAYS = (
     Way("in axes turned by 180 degrees", reverses=False, begin_deg=lambda start: start + 180.0),
     Way("in axes turned by 270 degrees", reverses=False, begin_deg=lambda start: start + 270.0),
 )
-"""All ways to turn and mirror a plane that leave its axes along its axes, and the other sense of rotation."""
+"""All rotations and reflections of the plane that map axes to axes, and the reversed sense of rotation."""
 
 PLANNED = Way("as planned", reverses=False, begin_deg=lambda start: start)
 KEEPING, REVERSING = (tuple(way for way in WAYS if way.reverses is reverses) for reverses in (False, True))
@@ -72,8 +73,8 @@ class AllForms:
     """Forms of all runs of a session.
 
     Attributes:
-        planned: as planned, a column each for the plan and the ways of KEEPING, and one for a longer bar.
-        turned: each as if it had run as the other direction of its test, a column for each way of REVERSING.
+        planned: forms under the planned directions: columns for the plan, the ways of KEEPING, and a longer bar.
+        turned: forms judged as the other direction of their test: columns for the ways of REVERSING.
     """
 
     def __init__(self) -> None:
@@ -98,10 +99,10 @@ def _off(one: Seen, judged_as: Seen, ways: Sequence[Way]) -> Floats:
 
 
 def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Finding:
-    """Return whether all runs together fit programs run in another way better than the plan.
+    """Judge whether another way of running all programs fits all runs better than the plan.
 
     Args:
-        runs: all that count. Those with the other direction on the same mounting are used, if there are two tests.
+        runs: only runs with the other direction on the same mounting are compared; they must come from two tests.
     """
     pairs = _pairs(runs)
     if len({one.run.test for one, _ in pairs}) < FEWEST_TESTS:
@@ -113,7 +114,7 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
     kept = _Likelihood(forms.planned.part([(one,) for one, _ in pairs]), dimensions)
     turned = _Likelihood(forms.turned.part(pairs), dimensions)
     tried = np.concatenate([kept.logarithms[1 : len(KEEPING) + 1], turned.logarithms])
-    # No way is likelier than another before.
+    # All ways have equal prior probability.
     value = float(logsumexp(tried) - np.log(len(tried)) - kept.logarithms[0])
     best = int(np.argmax(tried))
     way = (*KEEPING, *REVERSING)[best]
@@ -139,7 +140,7 @@ def programs_of_all(runs: Sequence[Seen], forms: AllForms | None = None) -> Find
 
 
 def bar_of_all(runs: Sequence[Seen], forms: AllForms | None = None, *, by_model: bool) -> Finding:
-    """Return whether all runs together fit a bar of another length better."""
+    """Judge whether a bar of another length fits all runs better."""
     known = [one for one in runs if one.run.expected is not None and one.run.bar_stated]
     if not known:
         return undecided(Name.BAR, "no calibrated length of the bar is stated")
@@ -189,7 +190,7 @@ def _begun(read: Floats, circle: Circle, way: Way) -> Floats:
 
 
 class _Likelihood:
-    """Likelihood of readings by ways, for any size of machine errors.
+    """Likelihoods of the readings under the ways, summed over sizes of machine errors.
 
     Attributes:
         logarithms: by way, shape (k,).
@@ -211,7 +212,8 @@ class _Likelihood:
     def gained(self, sigma_um: float) -> tuple[float, float]:
         """Return the log likelihood gain of a longer bar, and its excess length [µm]."""
         off, column = self._part.white[:, :, 0], self._part.white[:, :, -1]
-        # Matrix determinant lemma, and the conditional mean of one normal amount [Rasmussen and Williams, eq. A.9, A.10].
+        # Matrix determinant lemma, and the conditional mean of one normal variable [Rasmussen and Williams, eq. A.9,
+        # A.10].
         weights = np.sum(column**2, axis=1) + sigma_um**-2
         amounts = np.sum(column * off, axis=1) / weights
         joint = self._by_size[:, 0] + 0.5 * (amounts**2 * weights - np.log(weights * sigma_um**2))

@@ -1,4 +1,4 @@
-"""One word on a run: GOOD, REPEAT or CANNOT TELL, with cause and remedy."""
+"""Decide GOOD, REPEAT or CANNOT TELL for a run, with cause and remedy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Advice(StrEnum):
-    """The word, as people read it."""
+    """The decision, as shown to users."""
 
     GOOD = "GOOD"
     REPEAT = "REPEAT"
@@ -26,9 +26,9 @@ class RunAssessment:
     """What to do with a run.
 
     Attributes:
-        causes: of REPEAT, the most explanatory first: finding and remedy, a sentence each.
-        unseen: of CANNOT TELL, possible faults that no measurement of the plan shows.
-        settled_by: of CANNOT TELL, measurements that would show them.
+        causes: for REPEAT: one sentence with finding and remedy per cause, the most explanatory first.
+        unseen: for CANNOT TELL: possible faults that no measurement of the plan shows.
+        settled_by: for CANNOT TELL: measurements that would show these faults.
         later: possible faults that later circles will show.
     """
 
@@ -40,13 +40,13 @@ class RunAssessment:
 
 
 def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> RunAssessment:
-    """Return the word on a run.
+    """Return the decision on a run.
 
-    REPEAT for any fault. CANNOT TELL without findings, or if some fault of `SHOWN_BY` is invisible here and in later
-    circles. Else GOOD.
+    Any fault gives REPEAT. Missing findings, or a fault of `SHOWN_BY` that neither this run nor later circles can show,
+    give CANNOT TELL. Otherwise the run is GOOD.
 
     Args:
-        to_come: circles of the plan that are still to be measured.
+        to_come: circles of the plan not yet measured.
     """
     wrong = [one for one in findings if one.wrong]
     if problem and not any(one.name is Name.CIRCLE for one in wrong):
@@ -65,13 +65,13 @@ def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> 
 
 
 def _doubted(finding: Finding) -> bool:
-    """Return whether a fault with prior probability 0.001 is undecided and likelier than not."""
+    """Return whether an undecided fault is likelier than not, with prior probability 0.001."""
     return (finding.value or 0.0) > LOG_ODDS_LIMIT and finding.verdict is FindingVerdict.CANNOT_TELL
 
 
 def cause_of(finding: Finding) -> str:
-    """Return a wrong finding in short, and its remedy."""
-    if finding.name is Name.CIRCLE:  # its text has what to do
+    """Return a wrong finding's short text and its remedy."""
+    if finding.name is Name.CIRCLE:  # its text contains the remedy
         return finding.text
     numbers = "" if finding.value is None else f" {finding.value:.2f}"
     numbers += "" if finding.limit is None else f" of {finding.limit:.2f}"
@@ -97,10 +97,10 @@ EXPLAINS = (
     (Name.FORM,),
     (Name.SINCE,),
 )
-"""Findings in the order in which one brings others about: a feed that is not the programmed one also moves the end of the turn and
-differs from the other direction, and neither of these changes the feed. A drift moves centre and mean. A ball that moved between both directions stands in the wrong
-place too; one that stood there from the beginning differs from no other direction. Those that stand together are ranked by how many times their
-limit they are: a limit is the same probability for all."""
+"""Findings in causal order. A wrong feed also moves the end of the turn and differs from the other direction, but
+neither of these changes the feed. A drift moves centre and mean. A ball that moved between both directions is also in
+the wrong place; a ball misplaced from the beginning does not differ between directions. Findings of one group are
+ranked by value over limit, because all limits have the same probability."""
 
 
 def rank(finding: Finding) -> tuple[int, float]:
@@ -113,7 +113,7 @@ def rank(finding: Finding) -> tuple[int, float]:
 
 
 CLEARLY = 2.0
-"""Times its limit from which a disturbance explains a circle of another form; below, the other form brings it about."""
+"""A disturbance above this multiple of its limit explains a wrong form; below, the wrong form explains the disturbance."""
 
 
 _TEST, _DIRECTION = "whether it is the circle of another test", "whether it ran the wrong way round"
@@ -125,15 +125,15 @@ SHOWN_BY = {
     _DIRECTION: frozenset({Name.DIRECTION}),
     _BALL: frozenset({Name.OTHER_DIRECTION, Name.REPEAT, Name.SINCE}),
 }
-"""Faults that leave a circle as smooth as a good one, and the findings of which each one shows the fault. Other faults show in every run.
-The finding `bore` is none of them: in the first test of a machine without a model its limit is the machine's own errors, millimetres,
-and would show neither."""
+"""Faults that leave a circle smooth, each with the findings that show it. Other faults are visible in every run. The
+finding `bore` is not listed: in the first test of a machine without model its limit is the machine's own errors,
+millimetres."""
 
 DOUBTED = {
     Name.PROGRAMS: _PROGRAMS,
     Name.BAR: "whether the bar is as long as stated (put it on its calibrator) or the machine makes all circles so",
 }
-"""Faults of all runs that other faults explain too: they are asked about only where the readings favour them."""
+"""Faults of all runs that other faults also explain: they count only if the readings favour them."""
 
 BY_PLAN = "an overlap in the plan"
 
@@ -143,7 +143,7 @@ SHOWN_LATER = {
     _BALL: "the other direction or a repeat",
     _PROGRAMS: "further tests in both directions, or a model",
 }
-"""Faults that later circles of the plan show, judged back on this one, and what shows them where the plan has no circle left."""
+"""Faults of this circle that later circles of the plan can show, with the measurements that show them if the plan has no circle left."""
 
 DO = {
     Name.HELD: "the plunger sticks or the stroke ends; free it, check the plug, run the circle again",
@@ -170,4 +170,4 @@ DO = {
     Name.REPEAT: "ball or holder moved since the run before: press them home, run it again",
     Name.SINCE: "look what was changed at the machine since",
 }
-"""What to do at the machine, in the shop's words."""
+"""Remedies at the machine, in the shop's words."""

@@ -1,8 +1,8 @@
-"""Which circle of the plan each run shows: all runs of a session together.
+"""Decide jointly which circle of the plan each run of a session shows.
 
-A run filed under another circle makes right runs look wrong. Assignments of runs to circles are compared by their
-marginal likelihood over the machine's errors, each mistake at its prior probability. A sound session favours another
-assignment by f with a probability of at most 1 / f [Markov's inequality].
+A run filed under a wrong circle makes correct runs look wrong. Assignments of runs to circles are compared by marginal
+likelihood over the machine's errors; each mistake has a prior probability. A sound session favours another assignment
+by a factor f with a probability of at most 1 / f [Markov's inequality].
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Planned, Seen
 
 MISTAKE = LOG_ODDS_LIMIT
-"""What a mistake costs, as a logarithm: an operator makes one in a thousand circles."""
+"""Negative log prior probability of a mistake: an operator makes one in a thousand circles."""
 
 SIZES = np.append(0.0, SHARES)
-"""Errors of a machine as shares of their usual size; a simulated machine may have none, and then every circle shows any other equally well."""
+"""Machine errors relative to their usual size. A simulated machine may have zero errors; every circle then fits any run equally well."""
 
 WIDE = 3
-"""Assignments that are followed at once."""
+"""Number of assignments that the search extends at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class FormerSitting:
-    """The last session of machine and plan.
+    """The previous session of the same machine and plan.
 
     Attributes:
         read_um: readings along the travel by test and direction, shape (7,) each [µm].
@@ -53,7 +53,7 @@ class FormerSitting:
     read_um: Mapping[tuple[str, str], Floats]
 
     def moved(self, circles: Sequence[Planned]) -> tuple[Planned, ...]:
-        """Return circles expected as this session read them."""
+        """Return the circles with this session's readings as expectation."""
         found = []
         for one in circles:
             more = along_travel(one.circle) * (self.read_um[key_of(one)] - expected_um(one))
@@ -62,21 +62,21 @@ class FormerSitting:
 
 
 _Changes = tuple[tuple[int, int], ...]
-"""Runs, ascending, with a label other than the planned one."""
+"""Pairs of run and label, for labels other than the planned one, in ascending order."""
 
 
 def effects_of(circles: Sequence[Planned], reference: FormerSitting | None = None) -> PlanEffects:
-    """Return what a plan's circles can show, about what the last session read of them."""
+    """Return the effects on a plan's circles, relative to the previous session's readings."""
     moved = circles if reference is None else reference.moved(circles)
     return PlanEffects(moved, owns=1 if reference is None else 2)
 
 
 class Assigned:
-    """Runs of a session and the circles that they may show.
+    """Joint decision on the circles that a session's runs show.
 
     Args:
-        effects: of the plan's circles, about the same reference.
-        before: what the same plan's first runs showed. What was improbable by far stays so, and is not asked again.
+        effects: on the plan's circles, relative to the same reference.
+        before: result for the first runs of the same plan; assignments that were very improbable are not computed again.
     """
 
     def __init__(
@@ -90,21 +90,21 @@ class Assigned:
         self.runs = [one for one in runs if one.analysis is not None]
         self.read = [self.effects.run(one) for one in self.runs]
         self._planned = [one.planned for one in self.read]
-        # Log densities, or what they are at most, by what differs from the plan.
+        # Log densities, or their upper bounds, by differences from the plan.
         self.most: dict[_Changes, float] = {}
         past = before if before is not None and before.runs == self.runs[: len(before.runs)] else None
         self._known_before = {} if past is None else past.most
         self._fresh = range(0 if past is None else len(past.runs), len(self.runs))
 
     def odds(self, one: Seen) -> float:
-        """Return the logarithm of the odds against a run's own circle."""
+        """Return the log odds against a run's planned circle."""
         at, known = self.runs.index(one), self._looked_up
         own = max(score for changes, score in known.items() if at not in dict(changes))
         others = (score for changes, score in known.items() if at in dict(changes))
         return max(others, default=-np.inf) - own
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
-        """Return a finding on the circle that a run shows, decided by all runs together."""
+        """Return the finding that a run shows its planned circle, or `undecided` if all runs together cannot decide."""
         against = self.odds(one) + self._cost
         if against > self._cost - 2.0 * LOG_ODDS_LIMIT:
             return undecided
@@ -112,7 +112,7 @@ class Assigned:
         return Finding(undecided.name, max(against, 0.0), limit, "", FindingVerdict.GOOD, text)
 
     def suspects(self) -> dict[Seen, Finding]:
-        """Return the runs that contradict the others, each with the circle that it shows instead."""
+        """Return the runs that contradict the others, with findings that name the circles shown instead."""
         known = self._looked_up
         floor, top = known[()], max(known.values())
         scored = [one for one in known.items() if one[1] > floor and one[1] >= top - LOG_ODDS_LIMIT]
@@ -121,7 +121,7 @@ class Assigned:
         for at, one in enumerate(self.runs):
             changed = [labels[at] for labels in likely if at in labels]
             if changed:
-                # A ball beside its place, where it is as likely, is what is looked after first.
+                # If a misplaced ball is equally likely, report it first.
                 label = min(changed, key=lambda one: one not in {BESIDE, LARGER})
                 found[one] = self._wrong(one, label, certain=len(changed) == len(likely))
         return found
@@ -145,7 +145,7 @@ class Assigned:
 
     @cached_property
     def _looked_up(self) -> Mapping[_Changes, float]:
-        """Log densities with their mistakes, of all assignments that an answer can depend on."""
+        """Log posterior densities of all assignments that can affect a decision."""
         known: dict[_Changes, float] = {(): self.score(())}
         least = known[()] - self._cost
         followed: set[_Changes] = set()
@@ -155,12 +155,12 @@ class Assigned:
                 followed.add(changes)
                 known.update(self._follow(changes, least))
             best = sorted(known, key=known.__getitem__, reverse=True)[:WIDE]
-            # One mistake more cannot bring more than it costs where one alone lost as much.
+            # If one mistake alone loses more than its cost, a further one cannot repay it.
             best = [changes for changes in best if known[changes] >= least]
         return known
 
     def _follow(self, base: _Changes, least: float) -> dict[_Changes, float]:
-        """Return assignments beside one, without those that are less probable than any answer asks for."""
+        """Return the neighbours of an assignment, except neighbours too improbable to affect a decision."""
         beside = _Beside(self, self._labels(base))
         found: dict[_Changes, float] = {}
         for runs, instead in self._changes:
@@ -178,16 +178,16 @@ class Assigned:
         return found
 
     def _is_asked(self, changes: _Changes, least: float) -> bool:
-        """Return whether an answer can depend on it: it may be followed, or leave a doubt about a new run."""
+        """Return whether an assignment can affect a decision: by extension, or by doubt about a new run."""
         if any(run in self._fresh for run, _ in changes):
             least -= 2.0 * LOG_ODDS_LIMIT - self._cost
         spare = self.most[changes] - least
         return spare >= self._cost and spare >= self._mistakes(changes)
 
     def _at_most(self, changes: _Changes) -> float:
-        """Return what a log density can be at most, by what it was before the last runs.
+        """Return an upper bound of a log density, from its value before the last runs.
 
-        However well a run is foretold, its readings scatter by their own part.
+        However well a run is predicted, its readings scatter by their own part.
         """
         count = self._fresh.start
         most = self._known_before.get(tuple(each for each in changes if each[0] < count), np.inf)
@@ -209,7 +209,7 @@ class Assigned:
         return tuple(self._all_changes())
 
     def _all_changes(self) -> Iterator[tuple[Sequence[int], Sequence[Sequence[int]]]]:
-        """Yield runs with other labels: one run, all runs of a mounting, or two exchanged mountings."""
+        """Yield possible relabellings: of one run, of all runs of a mounting, or of two exchanged mountings."""
         yield from (([run], [[label] for label in self._everything]) for run in range(len(self.runs)))
         groups = self._groups
         for group in groups:
@@ -239,13 +239,13 @@ class Assigned:
             return None
 
     def score(self, changes: _Changes) -> float:
-        """Return the log likelihood of an assignment with its mistakes."""
+        """Return the log posterior density of an assignment: likelihood less cost of mistakes."""
         if changes not in self.most:
             self.most[changes] = _Beside(self, self._labels(changes)).log
         return self.most[changes] - self._mistakes(changes)
 
     def _mistakes(self, changes: _Changes) -> float:
-        """Return the cost of mistakes; all runs of a mounting under another test count once, as do two exchanged mountings."""
+        """Return the cost of mistakes; a mounting filed under another test, or an exchange of two mountings, counts as one."""
         whole: set[frozenset[str]] = set()
         single, labels = 0, dict(changes)
         for group in {id(group): group for group in (self._group_of[run] for run in labels)}.values():
@@ -269,7 +269,7 @@ class Assigned:
         return np.sum([one.product(label) for one, label in zip(self.read, labels, strict=True)], axis=0)
 
     def since(self, one: Seen) -> Finding | None:
-        """Return the change since the session before; None without it."""
+        """Return the finding on changes since the previous session; None without one."""
         if self.reference is None:
             return None
         label = self._planned[self.runs.index(one)]
@@ -285,13 +285,13 @@ class Assigned:
 
 
 class _Beside:
-    """Assignments that differ in few runs from a given one.
+    """Log densities of assignments that differ in few runs from a given one.
 
-    The effects that all runs together leave possible serve all of them; runs are left out and put in by blocks
+    The posterior of the shared effects, given all runs, is computed once. Runs are removed and inserted by blocks
     [Rasmussen and Williams (2006), section 5.4.2].
 
     Attributes:
-        log: log density of all readings under the given labels, machine errors of all sizes alike probable.
+        log: log density of all readings under the given labels, with equal prior probability for all sizes of machine errors.
     """
 
     def __init__(self, sitting: Assigned, labels: Sequence[int]) -> None:
@@ -315,7 +315,7 @@ class _Beside:
         self.log = float(_mean_of(self._logs)[0])
 
     def changed(self, runs: Sequence[int], instead: Sequence[Sequence[int]]) -> Floats:
-        """Return the same with other labels of some runs, one by each of `instead`."""
+        """Return the log densities with other labels of some runs, one for each item of `instead`."""
         circles, off, scatter = self._of(runs, np.array([[self._labels[run] for run in runs]]))
         shared = self._between(circles, circles)
         root = np.linalg.cholesky(scatter - shared)

@@ -1,4 +1,4 @@
-"""Compare a run with others of its test: direction, opposite direction, repeat."""
+"""Compare a run with other runs of its test: direction, opposite direction, repeat."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 def direction(one: Seen, others: Others, expected: Expected | None = None) -> Finding:
     """Judge whether the circle ran in its named direction.
 
-    A bar does not measure the direction. A reversed circle shows its form mirrored about the axis through the start. It
-    is visible if the circle is off that axis and the expected centre, the other direction or a repeat shows the side.
-    Lag and friction change sign with direction too, but repeat after half a turn: they have only even undulations
-    [linear in the speed, or in its sign]. Odd ones are compared.
+    A bar does not measure the direction. A reversed circle has its form mirrored about the axis through the start. The
+    mirrored form is visible if the circle is off this axis and the expected centre, the other direction or a repeat
+    gives the side. Lag and friction change sign with direction too, but repeat after half a turn: linear in speed or
+    its sign, they have only even undulations. Only odd undulations are compared.
     """
     by_place = _by_place(one, expected)
     if by_place is not None:
@@ -81,19 +81,19 @@ def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
         why = f"{stated}: the circle was run the wrong way round; run it again"
         return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", FindingVerdict.WRONG, why)
     if abs(is_um - should) > limit:
-        return None  # neither way round: another finding's business
+        return None  # neither direction fits: other findings apply
     return Finding(Name.DIRECTION, abs(is_um - should), limit, "µm", FindingVerdict.GOOD, stated)
 
 
 def other_direction(one: Seen, others: Others) -> Finding:
-    """Compare form and place with the other direction."""
+    """Judge the difference in form and place from the other direction."""
     if others.opposite is None:
         return undecided(Name.OTHER_DIRECTION, "the other direction has not been measured", "µm")
     return _beside(Name.OTHER_DIRECTION, one, others.opposite, others.directions_um, others.directions_stated)
 
 
 def repeat(one: Seen, others: Others) -> Finding:
-    """Compare form and place with the repeat before."""
+    """Judge the difference in form and place from the previous repeat."""
     if others.earlier is None:
         return undecided(Name.REPEAT, "there is no earlier run of this test and direction", "µm")
     return _beside(Name.REPEAT, one, others.earlier, others.repeats_um, others.repeats_stated)
@@ -104,9 +104,9 @@ def _beside(
 ) -> Finding:
     """Compare a run with another of its test.
 
-    With few other pairs the limit is the difference allowed by plan, machine file and usual causes. Enough pairs limit
-    by their scatter, and raise the limit if they scatter more than stated. The limit is at least that of noise and
-    plan, and at most the largest stated allowance.
+    With few other pairs, plan, machine file and usual causes give the limit. With enough pairs, their scatter gives it,
+    and raises it if it exceeds stated uncertainties. The limit is at least the limit by noise and plan, and at most the
+    largest stated allowance.
     """
     off = one.coefficients_um - other.coefficients_um
     value = float(np.linalg.norm(off))
@@ -125,7 +125,7 @@ def _beside(
     )
     limit = float(np.hypot(limit, quantile(np.inf) * drifted_um(one, other)))
     if one.run.mounting != other.run.mounting and one.run.expected is not None:
-        # A shift d moves two coefficients, by d / sqrt 2 each; both mountings scatter.
+        # A shift d changes two coefficients by d / sqrt 2 each, and both mountings scatter.
         limit = float(np.hypot(limit, length_quantile(2) * 1e3 * one.run.expected.mounting_mm))
     if covariance is not None:
         more = max(float(np.median(sigmas)) / median_length(COEFFICIENTS), 1.0) if sigmas else 1.0

@@ -1,4 +1,4 @@
-"""A place where the path leaves its form: a knock, a chip, a pulling cable."""
+"""Detect a local departure from the path's form: a knock, a chip, a pulling cable."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 FORM_UPR = 30.0
-"""Undulations per revolution that count as form, as in `evaluate`: a bump is shorter, below 12 degrees."""
+"""Highest undulations per revolution that count as form, as in `evaluate`; bumps are shorter, below 12 degrees."""
 
 WIDTHS_DEG = (0.5, 1.0, 2.0, 4.0)
-"""Widths that are tried: each is seen by its neighbour at 9/10 of its height or more [deg]."""
+"""Tried widths [deg]; a bump of another width appears with 9/10 of its height or more."""
 
 REVERSAL_DEG = 6.0
-"""How far beside a strut's reversal its step shows in what the filter leaves: half of the shortest form [deg]."""
+"""Range about a strut's reversal in which its step appears after filtering: half of the shortest undulation [deg]."""
 
 FEWEST = 3
-"""Samples of a stretch, and reversals of a turn, of which a mean or a scatter is taken."""
+"""Fewest samples of a mean, and fewest reversals of a scatter."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class _Peak:
 
 
 def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
-    """Judge the most outstanding stretch of the path."""
+    """Judge the highest bump of the path, relative to its limit."""
     rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
     near = near_reversals(one.raw.theta_deg, reversals_deg)
     peaks = [peak for width in WIDTHS_DEG for peak in _peaks(one, rest, near, width)]
@@ -66,10 +66,10 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 
 
 def near_reversals(theta_deg: Floats, reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG) -> Integers:
-    """Return the reversal near each sample, -1 for none, shape (n,)."""
+    """Return the number of the reversal near each sample, shape (n,); -1 if no reversal is near."""
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
-        apart = np.abs(theta_deg - place % FULL_TURN_DEG)  # both within a turn: 0 to 360
+        apart = np.abs(theta_deg - place % FULL_TURN_DEG)  # both are within 0 to 360
         near[(apart <= reach_deg) | (apart >= FULL_TURN_DEG - reach_deg)] = number
     return near
 
@@ -82,15 +82,15 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) 
     means = (sums[samples - 1 :] - np.concatenate([[0.0], sums[:-samples]])) / samples
     middle = np.arange(len(means)) + samples // 2
     theta_deg, beside = one.raw.theta_deg[middle], near[middle]
-    # The two ends of the turn do not meet where anything drifted: the filter makes a step of that.
+    # Drift separates the two ends of the turn, and the filter turns the gap into a step.
     phi = one.raw.phi_deg[middle]
     inner = (phi > REVERSAL_DEG) & (phi < FULL_TURN_DEG - REVERSAL_DEG)
     found_peaks = []
     away = np.flatnonzero(inner & (beside < 0))
     usual = 0.0
     if len(away) >= FEWEST * samples:
-        # Not the noise of the spectrum, which a bump itself makes louder: the median of the stretches does not see one. They
-        # overlap, so that fewer are independent: half a width apart they are all but so.
+        # A bump raises the noise in the spectrum, but not the median of the stretches. Stretches overlap; half a width
+        # apart they are nearly independent.
         usual, _ = scale_of(list(means[away]))
         apart = len(away) / samples
         limit = largest_of(2.0 * apart * len(WIDTHS_DEG), ROBUST_SHARE * apart) * usual

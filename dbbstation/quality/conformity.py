@@ -1,4 +1,4 @@
-"""Decide about a limit with uncertainty."""
+"""Decide whether a figure keeps a limit, considering its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ class Conformity(StrEnum):
     """Decision about a limit by ISO 14253-1."""
 
     WITHIN = "within"
-    """The limit is kept, whatever the figure is within U."""
+    """The limit is kept for every value within U of the figure."""
     EXCEEDED = "exceeded"
-    """The limit is passed, whatever the figure is within U."""
+    """The limit is exceeded for every value within U of the figure."""
     UNDECIDED = "cannot tell"
-    """The limit lies within U of the figure, or U is unknown."""
+    """The limit is within U of the figure, or U is unknown."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Size:
     """A figure of one circle as measured.
 
     Attributes:
-        u_um: standard uncertainty; None if a cause of unknown size counts.
+        u_um: standard uncertainty; None if a contribution is unknown.
     """
 
     um: float

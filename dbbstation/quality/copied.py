@@ -1,7 +1,8 @@
-"""Readings that occur in two runs: a double file, a repeating player, a wrong name.
+"""Detect readings that occur in two runs: a file stored twice, a repeating player, a wrong name.
 
-Two runs of one circle share form, not noise. The next reading equals a given one with at most the probability of
-`quality.held`; k in a row at most that to the power k, times both numbers of places.
+Two runs of one circle share their form, but not their noise. `quality.held` bounds the probability p that a reading
+equals a given one. A common stretch of k readings has at most the probability p^k times the numbers of possible starts
+in both runs.
 """
 
 from __future__ import annotations
@@ -25,20 +26,20 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Seen
 
 PROBABILITY = 1e-9
-"""Probability that a sound run has any stretch of another by chance: too small to count among what all findings share. A copy has hundreds
-of equal readings where some tens are enough."""
+"""Probability that a sound run shares a stretch with another by chance, negligible in the false alarms of all findings.
+A copy has hundreds of equal readings; some tens suffice."""
 
 ROUGHLY = 0.1
-"""Quantile of the differences of neighbours that counts as the step in which readings come. Where the step is a fifth of the noise or more it
-is that step, where it is finer it is an eighth of the noise, which makes a row of equal readings longer, never too short; single odd readings
-do not matter."""
+"""Quantile of neighbours' differences that estimates the step of readings. Steps of a fifth of the noise or more are
+found exactly. For finer steps it gives an eighth of the noise, which requires longer stretches and is thus safe. Single
+odd readings do not matter."""
 
 BASE = 0x9E3779B97F4A7C15
-"""Odd factor by which a stretch of readings is made one number, modulo 2^64: the golden ratio, whose powers repeat late [Knuth 6.4]."""
+"""Odd factor for hashing a stretch of readings modulo 2^64, from the golden ratio [Knuth 6.4]."""
 
 
 def copied(one: Seen, others: Sequence[Seen]) -> Finding:
-    """Judge how many readings of the turn occur in order in another run."""
+    """Judge how many of the turn's readings occur in the same order in another run."""
     assert one.analysis is not None  # noqa: S101 - asked before
     raw = one.analysis.raw
     chance = _chance(one.analysis)
@@ -75,16 +76,16 @@ def _chance(analysis: CircleAnalysis) -> float:
     squares_mm2, count, _ = moving_noise(analysis.raw)
     differs = np.abs(np.diff(analysis.raw.length_mm))
     step_mm = float(np.quantile(differs[differs > 0.0], ROUGHLY))
-    # Few samples on a large form have second differences of their form.
+    # With few samples, second differences contain the form.
     known = max(1.0 - quantile(np.inf) / float(np.sqrt(2.0 * noise.reading_freedom)), 0.0)
     by_turn = chance_equal(squares_mm2, count, step_mm)
     return max(by_turn, chance_of((1e-3 * known * noise.reading_um) ** 2, step_mm))
 
 
 def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
-    """Return whether two neighbouring blocks of a run begin with readings that follow one another in another run.
+    """Return whether two neighbouring blocks of a run start with readings that another run contains in succession.
 
-    Otherwise `_shared` is zero. Stretches of the other run are sorted once for each length, a power of two.
+    If not, `_shared` is zero. Stretches of the other run are sorted once per length, a power of two.
     """
     assert other.analysis is not None  # noqa: S101 - asked before
     if length not in other.stretches:
@@ -95,16 +96,16 @@ def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
 
 
 def _shared(own_mm: Floats, other_mm: Floats, row: int) -> int:
-    """Return the number of readings in common stretches.
+    """Return the number of readings in stretches common to two runs.
 
-    Blocks have half the length that chance allows, so that every longer common stretch contains a whole block.
+    Blocks have half the length that chance allows, so every longer common stretch contains a whole block.
     """
     block = (row + 1) // 2
     if min(len(own_mm), len(other_mm)) < row:
         return 0
     hashed = _stretches(other_mm, block)
     at = np.isin(_stretches(own_mm, block)[::block], hashed)
-    # Two blocks in a row are a stretch of `row` readings.
+    # Two successive blocks form a stretch of `row` readings.
     both = at[1:] & at[:-1]
     counted = np.append(both, False) | np.insert(both, 0, False)
     return block * int(np.count_nonzero(counted))

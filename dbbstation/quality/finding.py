@@ -1,4 +1,4 @@
-"""One finding: a number, its limit by chance, and their meaning."""
+"""The result of one check: a number, the limit for chance, and a text."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from dbbstation.facts.serialise import Kept
 
 
 class Name(StrEnum):
-    """Kinds of findings in listing order."""
+    """Names of checks, in the order of lists."""
 
     CIRCLE = "circle"
-    """The recording shows no full circle: nothing else can be judged."""
+    """The recording contains no full circle, so other checks are impossible."""
     LOST = "lost samples"
     NOISE = "noise"
     CLOSURE = "closure"
@@ -51,8 +51,8 @@ class Finding:
     """Result of one check of a run.
 
     Attributes:
-        limit: of a sound run, or None.
-        text: finding, place and remedy; or why undecided.
+        limit: for sound runs, or None.
+        text: description with place and remedy, or the reason for no decision.
     """
 
     name: Name
@@ -65,12 +65,12 @@ class Finding:
 
     @property
     def wrong(self) -> bool:
-        """Return whether the run must not be used as it is."""
+        """Return whether the finding is a fault, so the run must not be used unchanged."""
         return self.verdict is FindingVerdict.WRONG
 
 
 def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str, short: str = "") -> Finding:
-    """Return a finding by value and limit."""
+    """Return the finding that follows from value and limit."""
     verdict = FindingVerdict.WRONG if value > limit else FindingVerdict.GOOD
     return Finding(name, value, limit, unit, verdict, wrong if verdict is FindingVerdict.WRONG else sound, short)
 
@@ -81,7 +81,7 @@ def undecided(name: Name, why: str, unit: str = "", value: float | None = None) 
 
 
 def against_limit(finding: Finding) -> str:
-    """Return number and limit with unit, if any."""
+    """Return number and limit with unit, as text."""
     if finding.value is None:
         return ""
     limit = "" if finding.limit is None else f" of {finding.limit:.2f}"
@@ -89,10 +89,10 @@ def against_limit(finding: Finding) -> str:
 
 
 def stricter(one: Finding, other: Finding) -> Finding:
-    """Return the finding with the stricter knowledge.
+    """Return the decisive one of two findings from different knowledge.
 
-    Wrong precedes good, which precedes undecided. Equal decisions rank by use of their limit. For better fitting
-    circles, the knowledge with more circles decides.
+    Wrong precedes good, and good precedes undecided. Equal decisions are ranked by value over limit. If another circle
+    fits better, the knowledge with more circles decides.
     """
     if one.wrong or other.wrong:
         return max((each for each in (one, other) if each.wrong), key=_share)

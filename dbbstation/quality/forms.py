@@ -1,9 +1,9 @@
-"""Forms of runs that share causes, as one normal variable; a further run adds only its own rows.
+"""Joint normal distribution of the forms of runs with shared causes, extended run by run.
 
-The covariance of forms is the sum of machine causes, causes shared by several runs, and each run's own. For each size
-of machine errors, a matrix whitens all forms. A further run adds rows to this matrix, as to a Cholesky factor [Golub and Van
-Loan, Matrix Computations, 4.2]. Runs are left out by a projection [Rasmussen and Williams, Gaussian Processes for
-Machine Learning (2006), section 5.4.2].
+The covariance of forms is a sum over machine causes, causes shared by several runs, and each run's own part. For each
+size of machine errors, a matrix whitens all forms. A further run adds rows to this matrix, as to a Cholesky factor
+[Golub and Van Loan, Matrix Computations, 4.2]. A projection removes runs [Rasmussen and Williams, Gaussian Processes
+for Machine Learning (2006), section 5.4.2].
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Seen
 
 SIZES = np.geomspace(0.03, 3.0, 9)
-"""Errors of a machine as shares of their usual or stated size: from one calibrated to hundredths of a millimetre to one put together
-without care."""
+"""Machine errors relative to their usual or stated size: from a machine calibrated to hundredths of a millimetre to a
+carelessly assembled one."""
 
 FIRST_COSINE, FIRST_SINE = 1, HIGHEST_HARMONIC + 1
-"""Coefficients of one undulation, which a shift of the circle makes."""
+"""Indices of the first harmonic's coefficients, which a shift of the circle changes."""
 
 ANYWHERE_UM = 1e4
-"""Standard deviation of the centre of a circle whose ball was put up under the spindle: it says nothing [µm]."""
+"""Standard deviation [µm] that removes the centre's influence for a ball set up under the spindle."""
 
 
 LEAST_UM2 = 1e-12
-"""Variance below which no coefficient is known, a picometre squared: recordings without noise are white, too [µm²]."""
+"""Least variance of a coefficient [µm²], a picometre squared, so forms without noise can be whitened too."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunForm:
-    """The form of one run along its travel, and effects of causes on it.
+    """The form of one run along its travel, with the effects of causes.
 
     Attributes:
-        effects_um: one standard deviation of each cause, shape (7, p) each, by cause and set of values shared with
-            other runs, empty for machine causes [µm].
-        own_um: standard deviation of its own part, shape (7,) [µm].
-        off_um: columns of forms minus expectation without other runs, shape (7, k) [µm].
-        started_s: when its run began [s].
-        drift_um_s: growth of one place's reading on its turn [µm/s].
+        effects_um: changes by one standard deviation of each cause, shape (7, p) each [µm]; keys are the cause and the
+            label of runs with shared values, empty for machine causes.
+        own_um: standard deviation of the run's own part, shape (7,) [µm].
+        off_um: columns of forms minus the expectation that uses no other runs, shape (7, k) [µm].
+        started_s: start of the run [s].
+        drift_um_s: drift of the reading at one place during its turn [µm/s].
     """
 
     effects_um: Mapping[tuple[str, str], Floats]
@@ -58,7 +58,7 @@ class RunForm:
 
 
 def form_of(one: Seen, off_um: Floats) -> RunForm:
-    """Return the form of a run with known expectation; columns as of `RunForm.off_um`."""
+    """Return a run's form and effects; `off_um` as in `RunForm.off_um`."""
     signs = along_travel(one.run.circle)[:, None]
     effects = {} if one.run.expected is None else one.run.expected.effects_um
     along = {key: signs * effect for key, effect in effects.items()}
@@ -66,7 +66,7 @@ def form_of(one: Seen, off_um: Floats) -> RunForm:
 
 
 def own_um2(one: Seen) -> Floats:
-    """Return each coefficient's own variance, shape (7,) [µm²]."""
+    """Return each coefficient's variance by the run's own part, shape (7,) [µm²]."""
     own = np.full(COEFFICIENTS, max(0.5 * unseen_um2(one, one), LEAST_UM2))
     if one.run.expected is not None and not one.run.expected.place_known:
         own[[FIRST_COSINE, FIRST_SINE]] += ANYWHERE_UM**2
@@ -74,11 +74,11 @@ def own_um2(one: Seen) -> Floats:
 
 
 Held = tuple["Seen", ...]
-"""What a form is made of: a run, or a run and the one as which it is looked at."""
+"""Key of a form: a run, or a run and the run as which it is judged."""
 
 
 class Forms:
-    """Forms of a session's runs; held runs stay computed, and further runs are added."""
+    """Forms of a session's runs; computed runs are kept, and further runs are added."""
 
     def __init__(self, form: Callable[[Held], RunForm]) -> None:
         self._form = form
@@ -89,7 +89,7 @@ class Forms:
         self._log_determinants: list[Floats] = []
 
     def hold(self, runs: Sequence[Held]) -> None:
-        """Hold these runs; those behind the first difference are discarded."""
+        """Compute these runs; stored runs after the first difference are discarded."""
         pairs = enumerate(zip(runs, self._held, strict=False))
         alike = next((k for k, (one, (held, _)) in pairs if _key(one) != _key(held)), min(len(runs), len(self._held)))
         del self._held[alike:], self._log_determinants[alike:]
@@ -109,7 +109,7 @@ class Forms:
         before = self._whitening[:, :n, :n]
         shared = covariance[:, :, :n] @ _turned(before)
         variance, axes = np.linalg.eigh(covariance[:, :, n:] + np.eye(COEFFICIENTS) - shared @ _turned(shared))
-        variance = np.maximum(variance, 1.0)  # what the run has alone; rounding may leave less
+        variance = np.maximum(variance, 1.0)  # the run's own part; rounding may give less
         white = _turned(axes) / np.sqrt(variance)[:, :, None]
         self._whitening[:, :n, n:behind] = 0.0
         self._whitening[:, n:behind, :n] = -white @ (shared @ before)
@@ -128,10 +128,10 @@ class Forms:
             self._whitening, self._white = wider, white
 
     def part(self, runs: Sequence[Held], beside: Held | None = None) -> FormsBesides:
-        """Return the forms of some held runs, and their prediction of the others.
+        """Return the distribution of some stored runs, which predicts the others.
 
         Args:
-            beside: run compared with them, whose overlap counts too.
+            beside: run to be compared, whose overlap also counts for the drift.
         """
         chosen = {_key(one) for one in runs}
         left_out = [k for k, (held, _) in enumerate(self._held) if _key(held) not in chosen]
@@ -140,24 +140,24 @@ class Forms:
         return FormsBesides(self, left_out, float(np.sqrt(np.mean(np.square(rates)))))
 
     def rows(self, runs: Sequence[Held]) -> Integers:
-        """Return the rows of held runs."""
+        """Return the row numbers of stored runs."""
         wanted = {_key(one) for one in runs}
         return rows_of([k for k, (held, _) in enumerate(self._held) if _key(held) in wanted])
 
     def all(self) -> tuple[Floats, Floats, Floats]:
-        """Return whitening of all forms, shape (9, n, n), their whitened columns and drift, (9, n, k + 1), and log determinants."""
+        """Return the whitening matrices of all forms, shape (9, n, n), their whitened columns with drift, (9, n, k + 1), and log determinants."""
         n = COEFFICIENTS * len(self._held)
         return self._whitening[:, :n, :n], self._white[:, :n], np.sum(self._log_determinants, axis=0)
 
     def place(self, one: Held) -> tuple[int, Floats]:
-        """Return the place of a run among all held runs, and its own part, shape (7,) [µm]."""
+        """Return the index of a stored run, and the standard deviation of its own part, shape (7,) [µm]."""
         return next((k, form.own_um) for k, (held, form) in enumerate(self._held) if _key(held) == _key(one))
 
 
 class FormsBesides:
-    """Forms of some held runs for each of SIZES, and their prediction of omitted runs.
+    """Distribution of some stored runs for each of SIZES, and their prediction of omitted runs.
 
-    A drift in overlaps changes all runs together: a change of rank one [Golub and Van Loan, 2.1.4].
+    The drift seen in overlaps adds a rank-one term to the covariance of all runs [Golub and Van Loan, 2.1.4].
 
     Attributes:
         white: whitened columns, shape (9, n, k).
@@ -181,14 +181,15 @@ class FormsBesides:
         self.log_determinant = log_determinant + 2.0 * np.sum(np.log(sizes), axis=1) + np.log(grown)
 
     def log_likelihoods(self) -> Floats:
-        """Return each column's log density, by each of SIZES, shape (9, k), without a constant."""
+        """Return each column's log density for each of SIZES, shape (9, k), up to a constant."""
         return -0.5 * (np.sum(self.white**2, axis=1) + self.log_determinant[:, None])
 
     def beside(self, one: Held) -> tuple[Floats, Floats]:
         """Return an omitted run's columns minus prediction, shape (9, 7, k) [µm], and their covariance, (9, 7, 7) [µm²]."""
         place, own_um = self._forms.place(one)
         rows = rows_of([self._left_out.index(place)])
-        # Of all runs left out: residual e = B^-1 p with covariance B^-1, where B is their block of the inverse and p its pull.
+        # For omitted runs, the residual is e = B^-1 p with covariance B^-1; B is their block of the inverse covariance,
+        # and p their rows of the inverse times the readings.
         root = np.linalg.inv(self._root)[:, rows]
         apart = root @ self._along
         drift, off = apart[:, :, -1:], apart[:, :, :-1]
@@ -196,7 +197,7 @@ class FormsBesides:
         return own_um[:, None] * (off - drift @ self._amount), own_um[:, None] * covariance * own_um
 
     def length_without(self, size: int, rows: Integers) -> float:
-        """Return distances of runs from their prediction by the others, in standard deviations."""
+        """Return the distance of some rows from their prediction by the others, in standard deviations."""
         basis, drift = self._basis[size], self._drift[size]
         seen = self._whitening[size][:, rows]
         seen = seen - basis @ (basis.T @ seen)
@@ -211,7 +212,7 @@ class _Columns:
         self._effects = np.zeros((0, 0))
 
     def add(self, n: int, effects: Mapping[tuple[str, str], Floats]) -> Floats:
-        """Add the rows of one form behind n others; return covariances with them and itself, shape (7, n + 7)."""
+        """Append one form's rows after n others; return its covariances with all rows, shape (7, n + 7)."""
         wide = max((place.stop for place in self._of.values()), default=0)
         for cause, effect in effects.items():
             if cause not in self._of:
@@ -232,7 +233,7 @@ class _Columns:
 
 
 def rows_of(places: Sequence[int]) -> Integers:
-    """Return the rows of forms by their places."""
+    """Return the row numbers of forms with these indices."""
     return (COEFFICIENTS * np.array(places, dtype=np.int64)[:, None] + np.arange(COEFFICIENTS)).ravel()
 
 

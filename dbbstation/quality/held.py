@@ -1,8 +1,8 @@
-"""A constant length: stuck plunger, stop, held display.
+"""Detect a constant length: a stuck plunger, a mechanical stop, a held display.
 
-With white noise sigma and step r, the next reading equals any value with at most r / (sigma sqrt(2 pi)), the greatest
-normal density times the step. So n equal readings have at most that to the power n - 1. A step coarser than the noise
-gives no bound.
+With white noise sigma and step r, the next reading equals any given value with a probability of at most p = r / (sigma
+sqrt(2 pi)), the greatest normal density times the step. So n equal readings have at most p^(n - 1). A step coarser than
+the noise gives no bound.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
     from dbbstation.trace.circle import RawCircle
 
 SHORTEST_S = 1.0
-"""Readings that are equal for less say nothing: displays that are asked more often than they are renewed repeat themselves, the slowest
-twice a second [s]."""
+"""Shorter standstills do not count [s]: a display polled faster than it is refreshed repeats readings; the slowest is
+refreshed twice a second."""
 
 SECOND_DIFFERENCE = 6.0
-"""Variance of x(k-1) - 2 x(k) + x(k+1) over that of white x: 1 + 4 + 1. Slow forms have next to none."""
+"""Variance of x(k-1) - 2 x(k) + x(k+1) over that of white x: 1 + 4 + 1. Slow forms contribute hardly anything."""
 
 INDEPENDENT_SHARE = 18.0 / 35.0
-"""Degrees of freedom of a mean square of second differences, as share of their number: 36 / (36 + 2 (16 + 1)), from their correlations of
--4/6 and 1/6."""
+"""Degrees of freedom per second difference of their mean square: 36 / (36 + 2 (16 + 1)), from their correlations -4/6
+and 1/6."""
 
 ROUNDED = 1.0 / 12.0
-"""Variance that rounding to a step adds to readings, in steps squared [GUM 4.3.7]."""
+"""Variance of rounding, in steps squared [GUM 4.3.7]."""
 
 
 def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
-    """Return a bound of the probability that a sound reading repeats the last; one if unknown.
+    """Return an upper bound of the probability that a sound reading repeats the last one; 1 if unknown.
 
     Args:
-        squares_mm2: sum of squared second differences while moving [mm²].
+        squares_mm2: sum of squared second differences of moving readings [mm²].
     """
     if not count or not 0.0 < step_mm < inf:
         return 1.0
@@ -47,13 +47,13 @@ def chance_equal(squares_mm2: float, count: int, step_mm: float) -> float:
 
 
 def chance_of(variance_mm2: float, step_mm: float) -> float:
-    """Return the same from a variance of readings, rounding included [mm²]."""
+    """Return the bound of `chance_equal` from the variance of readings, rounding included [mm²]."""
     finer = sqrt(max(variance_mm2 - ROUNDED * step_mm**2, 0.0) * 2.0 * pi) / step_mm
     return 1.0 / finer if finer > 1.0 else 1.0
 
 
 def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
-    """Return the inputs of `chance_equal` from moving readings of a turn: squares [mm²], their number, step [mm]."""
+    """Return the inputs of `chance_equal` from a turn's moving readings: sum of squares [mm²], number, step [mm]."""
     differs = np.abs(np.diff(raw.length_mm))
     ends = np.flatnonzero(differs)
     first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
@@ -63,18 +63,18 @@ def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
 
 
 def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
-    """Return the number of equal readings in a row that a sound turn has with probability SHARE at most; infinite for a coarse step."""
+    """Return the number of consecutive equal readings that a sound turn reaches with a probability of at most SHARE; infinite for a coarse step."""
     chance = chance_equal(squares_mm2, count, step_mm)
     return 1.0 + ceil(log(max(readings, 1.0) / SHARE) / -log(chance)) if chance < 1.0 else inf
 
 
 @dataclass
 class HeldLength:
-    """Takes readings of a turn and reports an unusually long standstill.
+    """Detects an unusually long standstill while readings arrive.
 
     Attributes:
-        since_s: first of the last equal readings.
-        step_mm: smallest difference so far; infinite before two differ.
+        since_s: time of the first of the last equal readings.
+        step_mm: smallest difference so far; infinite until two readings differ.
     """
 
     since_s: float = 0.0
@@ -88,14 +88,14 @@ class HeldLength:
     _pending: float = 0.0
 
     def restart(self) -> None:
-        """Begin another run; the noise is kept."""
+        """Begin another run, but keep the noise estimate."""
         self.equal, self._last, self._before, self._pending = 0, None, None, 0.0
 
     def add(self, t_s: float, length_mm: float, *, noise: bool = True) -> None:
-        """Take a reading; noise is measured at least once a second of motion.
+        """Add a reading; the noise is estimated at least once per second of motion.
 
         Args:
-            noise: whether differences are noise; False during feed-out.
+            noise: whether the reading's differences are noise; False during feed-out.
         """
         if self._last is None or length_mm != self._last:
             if self._last is not None and noise:
@@ -115,10 +115,10 @@ class HeldLength:
         return self._last_s - self.since_s if self.equal else 0.0
 
     def stands(self, readings: float) -> bool:
-        """Return whether the length is constant, unlike sound readings.
+        """Return whether the length is constant for longer than sound readings allow.
 
         Args:
-            readings: of a whole turn, approximately.
+            readings: approximate number on a whole turn.
         """
         if self.held_s < SHORTEST_S:
             return False
@@ -126,7 +126,7 @@ class HeldLength:
 
 
 def held(raw: RawCircle) -> Finding:
-    """Judge the longest stretch of equal readings."""
+    """Judge the longest sequence of equal readings."""
     ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
     if not len(ends):
         return undecided(Name.HELD, "all readings of the turn are the same: the step is not finer than the noise", "s")
@@ -145,4 +145,4 @@ def held(raw: RawCircle) -> Finding:
 
 
 AFTER_HELD = "look after plunger, stroke and plug of the gauge, and repeat the run"
-"""What to do about a length that stands still."""
+"""Remedy for a constant length."""

@@ -1,4 +1,4 @@
-"""All findings of a session's runs."""
+"""Compute all findings of a session's runs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Judgement:
 
 @with_one_thread
 def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _done, _of: None) -> tuple[Judgement, ...]:
-    """Judge a session's runs, each beside all others."""
+    """Judge each run of a session, using all others."""
     known = []
     for done, run in enumerate(runs):
         progress(done, len(runs))
@@ -70,12 +70,12 @@ class _Pair:
 
     @cached_property
     def apart_um(self) -> tuple[float, float]:
-        """Return `knowledge.apart_um` of the pair."""
+        """Return `knowledge.apart_um` of both runs."""
         return apart_um(self.one, self.other)
 
     @cached_property
     def sigmas(self) -> float | None:
-        """Return `stated.sigmas_apart` of the pair."""
+        """Return `stated.sigmas_apart` of both runs."""
         return sigmas_apart(self.one, self.other)
 
     @cached_property
@@ -86,10 +86,10 @@ class _Pair:
 
 
 class SessionRuns:
-    """A session's analysed runs with pairs; judges any of them or a new one.
+    """Analysed runs of a session and their pairs, to judge one of them or a new run.
 
     Args:
-        known: other runs of the same session with known pairs and forms.
+        known: results for other runs of the same session, whose pairs and forms are reused.
     """
 
     def __init__(self, runs: Sequence[Seen], known: SessionRuns | None = None) -> None:
@@ -104,7 +104,7 @@ class SessionRuns:
         self._directions, self._repeats = [], []
         for one in self._runs:
             match = self._opposite(one)
-            # Another mounting scatters, which says nothing of the machine's own reversal.
+            # Different mountings scatter, so they do not show the machine's own reversal.
             if match is not None and id(match) not in taken and match.run.mounting == one.run.mounting:
                 taken.add(id(one))
                 self._directions.append(self._pair(one, match))

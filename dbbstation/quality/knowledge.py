@@ -1,4 +1,4 @@
-"""Knowledge before a run is judged: expected circle and other runs."""
+"""Inputs for judging a run: the expected circle and other runs."""
 
 from __future__ import annotations
 
@@ -25,59 +25,59 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 HIGHEST_HARMONIC = 3
-"""Undulations per revolution up to which runs are compared: mean, centre, ellipse and triangle are what a wrong ball, bar, tilt
-or direction changes, and seven numbers of thousands of samples are known to hundredths of a micrometre."""
+"""Highest undulations per revolution in comparisons of runs. A wrong ball, bar, tilt or direction changes mean, centre,
+ellipse and triangle; thousands of samples determine these seven numbers to hundredths of a micrometre."""
 
 LOCAL_HARMONIC = 29
-"""Undulations per revolution up to which runs are compared for what happened at one place: below those that noise is read from."""
+"""Highest undulations per revolution for comparing local events; higher ones serve to estimate noise."""
 
 LOCAL_COEFFICIENTS = 2 * LOCAL_HARMONIC + 1
-"""Numbers of a form of so many undulations, as of `local_columns`."""
+"""Number of coefficients of `local_columns`."""
 
 
 def local_columns(theta_rad: Floats) -> Floats:
-    """Return readings per orthonormal coefficient with `LOCAL_HARMONIC` undulations, shape (n, 59)."""
+    """Return basis functions of an orthonormal form up to `LOCAL_HARMONIC` undulations, shape (n, 59)."""
     angles = np.outer(theta_rad, np.arange(1, LOCAL_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
 
 COEFFICIENTS = 2 * HIGHEST_HARMONIC + 1
-"""Numbers of a form: its mean, and a cosine and a sine of each harmonic."""
+"""Coefficients of a form: its mean, and a cosine and a sine of each harmonic."""
 
 HIGHER = (2, 3, 5, 6)
-"""Those of two and three undulations, which no shift of a ball and no length of a bar makes."""
+"""Indices of the second and third harmonics, which neither a ball's shift nor a bar's length changes."""
 
 
 def form_columns(theta_rad: Floats) -> Floats:
-    """Return readings per orthonormal coefficient of a form, shape (n, 7)."""
+    """Return basis functions of an orthonormal form, shape (n, 7)."""
     angles = np.outer(theta_rad, np.arange(1, HIGHEST_HARMONIC + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
 
 def along_travel(circle: Circle) -> Floats:
-    """Return the signs of coefficients counted along the travel, shape (7,)."""
+    """Return the signs that convert coefficients to angles along the travel, shape (7,)."""
     return np.concatenate([np.ones(HIGHEST_HARMONIC + 1), np.full(HIGHEST_HARMONIC, circle.direction.sign)])
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """An expected circle by nominal machine or model.
+    """A circle as expected from the nominal machine or a model.
 
     Attributes:
         centre_mm: X and Y minus commanded, shape (2,).
         radial_mm: mean reading less nominal bar length.
-        covariance_mm2: of these three, with ball, mounting and bar, shape (3, 3).
-        place_known: False under the spindle, where centres are meaningless.
+        covariance_mm2: of centre and mean reading, with ball, mounting and bar, shape (3, 3).
+        place_known: False for a ball set up under the spindle, whose centre is meaningless.
         mounting_mm: standard deviation of remounting, in X and Y.
-        reversals_deg: from +X, where a strut reverses.
+        reversals_deg: angles from +X at which a strut reverses.
         form_um: as `Seen.coefficients_um`, shape (7,).
-        effects_um: one standard deviation of each cause on these, shape (7, p) each, by cause and set of values shared with other
-            runs.
-        local_um: the same of causes along path or time, on `local_columns`, shape (59, p) each.
+        effects_um: changes of `form_um` by one standard deviation of each cause, shape (7, p) each; keys are the cause
+            and the label of runs with shared values.
+        local_um: the same for causes that depend on path or time, on `local_columns`, shape (59, p) each.
         moving: keys of causes that act only in motion.
         again_um2: covariance of the difference of two remounted runs, shape (7, 7).
         place_um: stated standard deviation of the ball's place, CMM and holder, per axis.
-        known_um2: covariance of a sound form with noise, given other tests, shape (7, 7); None without.
+        known_um2: covariance of a sound form with noise, given other tests, shape (7, 7); None without other tests.
     """
 
     centre_mm: Floats
@@ -97,7 +97,7 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A planned circle by a model."""
+    """A planned circle with its expectation."""
 
     test: str
     circle: Circle
@@ -111,12 +111,12 @@ class Planned:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run as it is judged.
+    """A run with the knowledge needed to judge it.
 
     Attributes:
-        mounting: its runs share the ball's place.
+        mounting: label; runs with equal labels share the ball's place.
         started_s: on the session's clock; None if not noted.
-        usual: expectation by usual causes if `expected` is by a model; else None.
+        usual: expectation from usual causes if `expected` comes from a model; else None.
         bar_stated: whether a calibrated bar length is stated.
     """
 
@@ -140,16 +140,16 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A run with what is computed once.
+    """A run with results that are computed once.
 
     Attributes:
         analysis: None without circle.
-        unusable: recorded, but unusable, of these.
-        feed_mm_min: by the overlap, with standard uncertainty; or None.
-        longer_s: excess over the programmed time from feed-in to feed-out; None without both edges or with recorded angles.
-        coefficients_um: orthonormal Fourier coefficients of readings less bar length, harmonics 0 to 3 by commanded angle from
-            the start towards +Y: mean, cosines, sines, shape (7,).
-        local_um: up to `LOCAL_HARMONIC`, as `local_columns`, shape (59,); zeros for too few samples.
+        unusable: samples of `lost` that were recorded but are unusable.
+        feed_mm_min: feed shown by the overlap, with standard uncertainty; or None.
+        longer_s: measured less programmed time from feed-in to feed-out; None without both edges or with recorded angles.
+        coefficients_um: orthonormal Fourier coefficients of readings less bar length, shape (7,): mean, cosines, sines
+            of harmonics 1 to 3, by commanded angle from the start towards +Y.
+        local_um: coefficients of `local_columns`, shape (59,); zeros for too few samples.
         ways: feed-in and feed-out; None if not recorded.
     """
 
@@ -166,33 +166,33 @@ class Seen:
 
     @cached_property
     def without_model(self) -> Seen:
-        """Return the run without a model's expectation."""
+        """Return the run with the expectation from usual causes instead of a model's."""
         if self.run.usual is None:
             return self
         return replace(self, run=replace(self.run, expected=self.run.usual, usual=None, planned=()))
 
     @cached_property
     def stretches(self) -> dict[int, NDArray[np.uint64]]:
-        """Return sorted stretches of readings by length, filled by `copied`."""
+        """Return a cache of sorted stretches of readings, by length, for `copied`."""
         return {}
 
     @cached_property
     def u_um(self) -> float:
-        """Return each coefficient's standard uncertainty by noise [µm]."""
+        """Return the standard uncertainty of each coefficient due to noise [µm]."""
         if self.analysis is None:
             return 0.0
         return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
 
     @cached_property
     def drift_um(self) -> tuple[float, float] | None:
-        """Return the drift over the turn by the overlap, with standard uncertainty by noise; None without overlap [µm]."""
+        """Return the overlap's drift over the turn, with standard uncertainty due to noise [µm]; None without overlap."""
         if self.analysis is None or self.analysis.passes is None:
             return None
         return self.analysis.passes.mean_um, self.analysis.passes.u_mean_um(self.analysis.noise.sigma_um)
 
     @cached_property
     def drift_um_s(self) -> float:
-        """Return the drift at one place by the overlap; zero without overlap [µm/s]."""
+        """Return the overlap's drift rate [µm/s]; zero without overlap."""
         passes = None if self.analysis is None else self.analysis.passes
         return 0.0 if passes is None else passes.mean_um / passes.turn_s
 
@@ -215,7 +215,7 @@ def seen(run: Run) -> Seen:
 
 
 def coefficients_um(raw: RawCircle) -> Floats:
-    """Return a circle's form as of `Seen.coefficients_um`."""
+    """Return a circle's form as in `Seen.coefficients_um`."""
     theta = np.radians(raw.theta_deg - raw.circle.start_deg)
     return _orthonormal(amplitudes(1e3 * (raw.length_mm - raw.circle.bar_mm), theta, HIGHEST_HARMONIC))
 
@@ -252,20 +252,20 @@ def _ways(run: Run) -> tuple[FeedingWay, FeedingWay] | None:
 
 
 def due_s(circle: Circle) -> float:
-    """Return the programmed time from the middle of feed-in to that of feed-out [s]."""
+    """Return the programmed time between the midpoints of feed-in and feed-out [s]."""
     return circle.swept_deg / circle.turning_deg_s + circle.feed_in_mm / (circle.feed_mm_min / 60.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Others:
-    """A session's other runs, and related ones.
+    """Figures of a session's other runs, and the runs to compare with.
 
     Attributes:
-        directions_um: rms difference of other circles' directions.
-        directions_stated: the same in stated standard deviations.
-        across_um: the same off the axis through the start.
-        local_um: local rms difference of other circles' directions.
-        opposite: same test, other direction, same mounting if possible; or None.
+        directions_um: rms differences between both directions of other circles.
+        directions_stated: the same differences in stated standard deviations.
+        across_um: differences in the coefficients of `ACROSS`.
+        local_um: rms local differences between both directions of other circles.
+        opposite: run of the same test in the other direction, on the same mounting if possible; or None.
     """
 
     noise_um: tuple[float, ...] = ()
@@ -284,14 +284,14 @@ class Others:
 
 
 def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
-    """Return the rms difference of two runs up to three undulations, and each coefficient's uncertainty [µm]."""
+    """Return two runs' rms difference up to three undulations, and the standard uncertainty of each coefficient [µm]."""
     return float(np.linalg.norm(one.coefficients_um - other.coefficients_um)), float(np.hypot(one.u_um, other.u_um))
 
 
 ACROSS = (HIGHEST_HARMONIC + 1, HIGHEST_HARMONIC + 3)
-"""Odd coefficients that change sign when a circle is mirrored about the axis through its start: sines of one and three undulations."""
+"""Indices of odd coefficients that change sign when a circle is mirrored about the axis through its start: sines of harmonics 1 and 3."""
 
 
 def across(one: Seen) -> Floats:
-    """Return the coefficients off the axis, shape (2,) [µm]."""
+    """Return the coefficients of `ACROSS`, shape (2,) [µm]."""
     return one.coefficients_um[list(ACROSS)]

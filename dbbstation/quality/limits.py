@@ -1,4 +1,4 @@
-"""Limits that chance passes with a stated probability."""
+"""Limits that sound values exceed by chance with a stated probability."""
 
 from __future__ import annotations
 
@@ -13,47 +13,48 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 FALSE_ALARMS_PER_RUN = 1e-3
-"""Probability that a sound run has any finding: one in a thousand runs, which is one in thirty-three sessions of thirty. A
-false alarm costs a repeated circle, two minutes; one that is missed may cost the calibration."""
+"""Probability that a sound run has any finding: one in a thousand runs, or one in thirty-three sessions of thirty runs.
+A false alarm costs a repeated circle, two minutes; a missed fault may cost the calibration."""
 
 LOG_ODDS_LIMIT = -float(np.log(FALSE_ALARMS_PER_RUN))
-"""Logarithm of the odds that outweigh a mistake which one sound run in a thousand has."""
+"""Log odds that outweigh the prior of a mistake made in one sound run of a thousand."""
 
 TESTED = len(Name) - 6
-"""Findings that share it: all but a recording without a circle and lost samples, which are counted and not estimated, readings of
-another run, all programs and the bar of all runs, which have probabilities of their own, and the session before, which is never wrong."""
+"""Number of findings that share it. A missing circle and lost samples are counted, not estimated. Copied readings, all
+programs and the bar of all runs have separate probabilities. The comparison with the previous session is never
+wrong."""
 
 SHARE = FALSE_ALARMS_PER_RUN / TESTED
-"""Probability of each [Bonferroni]: they may depend on one another."""
+"""Probability of each finding [Bonferroni], valid also for dependent findings."""
 
 
 FEWEST_OTHERS = 3
-"""Other runs, or pairs of runs, that must be there for their scatter to say what is usual: of two nobody knows which is spoilt."""
+"""Fewest other runs, or pairs, whose scatter gives a limit; among two, a faulty one cannot be recognised."""
 
 
 SCATTERING = 3
-"""Dimensions in which runs of one circle scatter at the least: where the ball came to lie in X and Y, and how long the bar is.
-The other four numbers scatter less; were they counted in full, a limit would be taken for better known than it is."""
+"""Dimensions in which runs of one circle scatter fully: the ball's X and Y, and the bar's length. The other four
+coefficients scatter less; counting them would overstate the freedom of a limit."""
 
 
 def quantile(freedom: float, share: float = SHARE) -> float:
-    """Return the size in standard deviations that a sound value passes with probability `share` [Student].
+    """Return the size, in standard deviations, that a sound value exceeds with probability `share` [Student].
 
     Args:
         freedom: of the standard deviation; infinite if known.
-        share: both sides together.
+        share: probability of both sides together.
     """
     freedom = min(max(freedom, 1.0), _MANY)
     return float(-stdtrit(freedom, 0.5 * share))
 
 
 def largest_of(count: float, freedom: float) -> float:
-    """Return the same for the largest of `count` independent values."""
+    """Return the same quantile for the largest of `count` independent values."""
     return quantile(freedom, SHARE / max(count, 1.0))
 
 
 def length_quantile(dimensions: int) -> float:
-    """Return the length in standard deviations that a sound vector passes with probability SHARE."""
+    """Return the length, in standard deviations, that a sound vector exceeds with probability SHARE."""
     return float(np.sqrt(chdtri(dimensions, SHARE)))
 
 
@@ -63,19 +64,19 @@ def scaled_length_quantile(freedom: float) -> float:
 
 
 def ratio_quantile(above: float, below: float) -> float:
-    """Return the ratio of two variance estimates that chance passes with probability SHARE [Fisher]."""
+    """Return the ratio of two variance estimates that is exceeded by chance with probability SHARE [Fisher]."""
     return float(fdtri(above, below, 1.0 - SHARE))
 
 
 _MANY = 1e6
-"""Degrees of freedom from which Student's distribution is the normal one."""
+"""Degrees of freedom above which the normal distribution replaces Student's."""
 
 
 def scale_of(values: Sequence[float]) -> tuple[float, float]:
-    """Return the robust standard deviation about zero, and its freedom.
+    """Return a robust standard deviation about zero, and its degrees of freedom.
 
-    The median absolute value over that of a normal value; as precise as 0.37 times as many sound values [Rousseeuw and
-    Croux, J. Am. Stat. Assoc. 88 (1993)].
+    The estimate is the median absolute value, divided by the median for a standard normal variable. It is as precise as
+    the standard deviation of 0.37 times as many sound values [Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993)].
     """
     if not values:
         return 0.0, 0.0
@@ -83,17 +84,17 @@ def scale_of(values: Sequence[float]) -> tuple[float, float]:
 
 
 _NORMAL_MEDIAN = 0.674490
-"""Median of the size of a normal value of standard deviation one."""
+"""Median absolute value of a standard normal variable."""
 
 ROBUST_SHARE = 0.37
-"""Share of values that a median of sizes knows a standard deviation as well as: 37 sound ones of 100 that may be spoilt."""
+"""Efficiency of the median absolute value: 100 values, some of them faulty, give the precision of 37 sound values."""
 
 
 def length_limit(lengths: Sequence[float], dimensions: int) -> float:
-    """Return the length that a sound vector passes with probability SHARE, given others [Fisher].
+    """Return the length that a sound vector exceeds with probability SHARE, given lengths of other vectors [Fisher].
 
     Args:
-        lengths: of others; their median square counts.
+        lengths: of the other vectors; only their median square counts.
     """
     median = float(chdtri(dimensions, 0.5)) / dimensions
     variance = float(np.median(np.square(lengths))) / median
@@ -107,7 +108,7 @@ def median_length(dimensions: int) -> float:
 
 
 def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the standard deviation and freedom of a sum of independent parts [Welch, Satterthwaite; GUM G.4.1]."""
+    """Return standard deviation and degrees of freedom of a sum of independent parts [Welch, Satterthwaite; GUM G.4.1]."""
     variance = sum(size**2 for size, _ in parts)
     if not variance > 0.0:
         return 0.0, _MANY

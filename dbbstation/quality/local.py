@@ -1,7 +1,7 @@
-"""Local differences from another run of a test: dirt, contact, a push.
+"""Detect local differences from another run of a test: dirt, contact, a push.
 
-A single run hides a wide bump in its form; two runs share the form. Repeats are compared in everything. Against the
-other direction only odd undulations are, since lag, play and friction nearly repeat after half a turn.
+In a single run the form hides a wide bump, but two runs share the form. All undulations of repeats are compared. With
+the other direction only odd undulations are compared, because lag, play and friction nearly repeat after half a turn.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Others, Seen
 
 LOWEST = 3
-"""Undulations from which runs are compared here: two are a shift's second order, and nearly all that reversals differ by; below lie
-place and length."""
+"""Lowest undulations per revolution compared here. The second contains a shift's second order and most differences by
+reversals; lower ones contain place and length."""
 
 OTHER_REVERSALS = 0.25
-"""Share of the even undulations by which odd ones may be there without a cause that is known: play and friction of kinds that nobody named
-come back after nearly half a turn. Of the causes that are known it is 0.22 on the fifteen circles of `table2` where all struts have 10 to
-30 µm of play. A bump of 10 µm and 60 degrees' width has four times as much."""
+"""Allowed ratio of odd to even undulations without a known cause: unmodelled play and friction repeat after nearly half
+a turn. Known causes give 0.22 on the fifteen circles of `table2` with 10 to 30 µm of play in all struts. A bump of 10
+µm and 60 degrees' width gives four times as much."""
 
 ORDERS = np.concatenate([[0], np.arange(1, LOCAL_HARMONIC + 1), np.arange(1, LOCAL_HARMONIC + 1)])
-"""Undulations of each coefficient of `local_columns`."""
+"""Undulations per revolution of each coefficient of `local_columns`."""
 
 
 def local_difference(one: Seen, others: Others) -> Finding:
-    """Judge local differences by 3 to 29 undulations.
+    """Judge local differences in 3 to 29 undulations.
 
-    The limit is the ellipsoid of noise and known causes along the difference, plus a share of what reversals show, and
-    what a drift leaves: D over a turn is a sawtooth whose k-th undulation is D / (pi k). Enough other pairs with larger
-    differences widen it.
+    The limit is the sum of three parts: the ellipsoid of noise and known causes along the difference, a share of the
+    reversals' even undulations, and drift. A drift D over a turn is a sawtooth whose k-th undulation is D / (pi k).
+    Enough other pairs with larger differences widen the limit.
     """
     against = others.opposite or others.earlier
     if against is None or one.analysis is None or against.analysis is None:
@@ -74,7 +74,7 @@ def local_difference(one: Seen, others: Others) -> Finding:
 
 
 def locally_apart_um(one: Seen, against: Seen) -> float:
-    """Return the rms of the compared undulations [µm]."""
+    """Return the rms difference in the compared undulations [µm]."""
     return float(np.linalg.norm((one.local_um - against.local_um)[_compared(one, against)]))
 
 

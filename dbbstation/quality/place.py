@@ -1,4 +1,4 @@
-"""Radius, bore and form of a circle against expectation."""
+"""Compare a circle's radius, place and form with expectation."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Expected, Seen
 
 BY_OTHERS = " by the other tests"
-"""What texts say of an expectation that other tests of the session give."""
+"""Words in texts for an expectation from other tests of the session."""
 
 
 def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
     """Judge the mean reading.
 
-    A larger circle at the programmed feed turns slower. An overlap that shows this decides without expectation.
+    At the programmed feed a larger circle takes longer. If the overlap shows this, no expectation is needed.
     """
     if (larger := _turns_slower(one)) is not None:
         return larger
@@ -69,7 +69,7 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
     covariance = 1e6 * expected.covariance_mm2[:2, :2] + noise * np.eye(2)
     size = float(np.linalg.norm(off_um))
     along = off_um / size if size > 0.0 else np.array([1.0, 0.0])
-    # The ellipse that a sound centre stays in, in the direction in which this one is off.
+    # The sound centre's ellipse, in the direction of this deviation.
     limit = length_quantile(2) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"the centre is {size:.1f} µm from where it is {where}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
@@ -91,7 +91,7 @@ def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Fi
     if covariance is None:
         effects = np.hstack([np.zeros((len(expected.form_um), 1)), *expected.effects_um.values()])
         covariance = effects @ effects.T + np.diag(own_um2(one))
-    # The centre of a ball that was put up under the spindle says nothing.
+    # The centre of a ball set up under the spindle contains no information.
     rows = list(range(len(expected.form_um))) if expected.place_known else [0, *HIGHER]
     off = (one.coefficients_um - expected.form_um)[rows]
     value, limit = float(np.linalg.norm(off)), limit_along(covariance[np.ix_(rows, rows)], off)

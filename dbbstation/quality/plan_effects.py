@@ -1,4 +1,4 @@
-"""What the circles of a plan share, and a run beside each of them."""
+"""Effects of shared causes on a plan's circles, and a run compared with each circle."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from dbbstation.quality.knowledge import Planned, Seen
 
 ELSEWHERE_UM = 1e3
-"""Standard deviation of a run that is no circle of the plan, per coefficient: a bar's travel is millimetres [µm]."""
+"""Standard deviation per coefficient of a run that is no circle of the plan: a bar's travel is millimetres [µm]."""
 
 ELSEWHERE, BESIDE, LARGER = -1, -2, -3
-"""Labels of such a run, of its own circle about another place, and of its own circle with another radius."""
+"""Labels: no circle of the plan, the planned circle about another place, and the planned circle with another radius."""
 
 ANYWHERE_UM = 1e4
-"""Standard deviation of a centre that says nothing [µm]."""
+"""Standard deviation of a centre without information [µm]."""
 
 
 class PlanEffects:
-    """The circles of a plan with their shared causes; kept for a whole session.
+    """The circles of a plan with the effects of shared causes, cached for a session.
 
     Args:
-        owns: how often a circle's own part acts: in this session, and in one before if readings are compared with it.
+        owns: how many times a circle's own variance counts: 1 in this session, 2 if compared with a previous session.
     """
 
     def __init__(self, circles: Sequence[Planned], owns: int = 1) -> None:
@@ -42,13 +42,13 @@ class PlanEffects:
         self._runs: dict[Seen, RunEffects] = {}
 
     def run(self, one: Seen) -> RunEffects:
-        """Return a run beside each circle."""
+        """Return a run compared with each circle, cached."""
         if one not in self._runs:
             self._runs[one] = RunEffects(self, one)
         return self._runs[one]
 
     def label(self, test: str, direction: str) -> int:
-        """Return the place of a circle in the plan.
+        """Return the index of a circle in the plan.
 
         Raises:
             StopIteration: the plan has no such circle.
@@ -57,22 +57,22 @@ class PlanEffects:
 
     @cached_property
     def shared(self) -> Floats:
-        """Return effects of shared causes on all circles and on none, shape (l + 1, 7, p) [µm]."""
+        """Return effects of shared causes on all circles, then zeros for no circle, shape (l + 1, 7, p) [µm]."""
         columns = np.concatenate([self.of_machine, self.of_session], axis=2)
         return np.concatenate([columns, np.zeros_like(columns[:1])])
 
     def scale(self, size: float) -> Floats:
-        """Return the standard deviations of shared causes with machine errors of a size, shape (p,)."""
+        """Return the standard deviations of shared causes for one size of machine errors, shape (p,)."""
         return np.repeat([size, 1.0], [self.of_machine.shape[2], self.of_session.shape[2]])
 
     @cached_property
     def of_machine(self) -> Floats:
-        """Return effects of the machine's causes on all circles, shape (l, 7, p) [µm]."""
+        """Return effects of machine causes on all circles, shape (l, 7, p) [µm]."""
         return self._effects({key for key in self._keys if not key[1]})
 
     @cached_property
     def of_session(self) -> Floats:
-        """Return the same of causes common to all circles: the bar, the tool's ball, the plate."""
+        """Return effects of other causes common to all circles: bar, tool ball, plate."""
         return self._effects({key for key in self._of_all if key[1]})
 
     @cached_property
@@ -95,14 +95,14 @@ class PlanEffects:
             blocks = [blank if e is None else sign * e for sign, e in zip(signs, effects, strict=True)]
             columns.append(np.vstack(blocks))
         stacked = np.hstack(columns)
-        # As many numbers as the circles have: rotated so that the rest is zero.
+        # Rotate the parameters to as few as needed; the others have no effect.
         u, sizes, _ = np.linalg.svd(stacked, full_matrices=False)
         kept = sizes > 1e-6 * max(float(sizes.max(initial=0.0)), 1e-9)
         return (u[:, kept] * sizes[kept]).reshape(len(self.circles), COEFFICIENTS, -1)
 
     @cached_property
     def own(self) -> list[Floats]:
-        """Return the covariance of a circle's own part, ball and mounting, shape (7, 7) each [µm²]."""
+        """Return the covariance of each circle's own part (ball and mounting), shape (7, 7) each [µm²]."""
         found = []
         for one in self.circles:
             effects = [e for key, e in one.expected.effects_um.items() if key[1] and key not in self._of_all]
@@ -117,10 +117,10 @@ class PlanEffects:
 
 
 class RunEffects:
-    """A run beside each circle of the plan, and as no circle of it.
+    """A run compared with each circle of the plan, and with none of them.
 
     Attributes:
-        planned: label of the circle that the run was filed under.
+        planned: label of the circle under which the run was filed.
     """
 
     def __init__(self, plan: PlanEffects, one: Seen) -> None:
@@ -129,13 +129,13 @@ class RunEffects:
         self._products: dict[int, Floats] = {}
 
     def shows(self, labels: ArrayLike) -> Integers:
-        """Return the circles whose effects a run has under labels, the last for no circle."""
+        """Return, for labels, the circles whose effects the run has; the last index means no circle."""
         labels = np.asarray(labels)
         own = np.where(labels == ELSEWHERE, len(self._plan.circles), self.planned)
         return np.where(labels >= 0, labels, own)
 
     def product(self, label: int) -> Floats:
-        """Return products of whitened effects and readings, shape (p + 1, p + 1)."""
+        """Return inner products of whitened effects and readings, shape (p + 1, p + 1)."""
         if label not in self._products:
             root = np.linalg.cholesky(self.scatter[label])
             read = np.column_stack([self._plan.shared[self.shows(label)], self.off[label]])
@@ -168,7 +168,7 @@ class RunEffects:
 
 
 def log_diagonal(roots: NDArray[np.floating]) -> Floats:
-    """Return half the log determinants of matrices with these Cholesky factors."""
+    """Return half the log determinants of matrices, from their Cholesky factors."""
     return np.asarray(np.sum(np.log(np.diagonal(roots, axis1=-2, axis2=-1)), axis=-1))
 
 

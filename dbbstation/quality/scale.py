@@ -1,4 +1,4 @@
-"""The gauge's scale along feed-in and feed-out."""
+"""Check the gauge's scale by feed-in and feed-out."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ if TYPE_CHECKING:
 
 
 def scale(one: Seen, others: Others) -> Finding:
-    """Judge the gauge's excess along feed-in and feed-out.
+    """Judge the excess of measured over programmed feed-in and feed-out.
 
-    Effects along them follow from those on the circle: a cause by pose or time changes over a distance w by w / R of
-    itself; a cause along a path acts only in motion, at the corner. Lag and play change sign with direction, so both
-    directions together have a limit in which these cancel. The lesser of both results counts.
+    Effects on the feed-in follow from effects on the circle. Over a distance w, a cause that depends on pose or time
+    changes by the share w / R. A cause that depends on the path acts fully, because it acts only in motion, at the
+    corner. Lag and play change sign with direction and cancel in the mean of both directions. The smaller of both
+    results counts.
     """
     expected, feed_in_um = one.run.expected, 1e3 * one.run.circle.feed_in_mm
     if one.ways is None:
@@ -35,7 +36,7 @@ def scale(one: Seen, others: Others) -> Finding:
         both_um = 0.5 * (own_um + _excess_um(other))
         together = quantile(np.inf) * _u_um([(one, expected), (other, other.run.expected)])
         least = min(abs(both_um), abs(own_um))
-        # Nearer its limit of the two: what both directions show, and what this one shows by itself.
+        # Choose the result nearer its limit: the mean of both directions or this direction alone.
         if least * limit > size * together:
             size, limit, counted = least, together, both_um
     percent = 100.0 * counted / feed_in_um

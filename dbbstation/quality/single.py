@@ -1,4 +1,4 @@
-"""Findings of a run by itself, with limits widened by other runs."""
+"""Findings from a single run; other runs can only widen their limits."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 
 HARMLESS = 0.19
-"""Share of readings that may be repeated without harm: of n readings 0.81 n are new, and U of slow figures is too small by a tenth, as
-1 / sqrt(0.81); U is stated to two digits."""
+"""Harmless share of repeated readings: with 0.81 n new readings of n, U of slow figures is too small by a tenth, 1 /
+sqrt(0.81); U is stated to two digits."""
 
 
 def repeated(raw: RawCircle) -> Finding:
-    """Judge how many readings repeat the last, apart from long standstills."""
+    """Judge how many readings repeat the previous reading, except in long standstills."""
     ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
     if not len(ends):
         return undecided(
@@ -60,7 +60,7 @@ def repeated(raw: RawCircle) -> Finding:
 
 
 def lost_samples(one: Seen) -> Finding:
-    """Judge the share of lost samples against the plan."""
+    """Judge the share of lost samples by the plan's limit."""
     lost, kept = one.lost
     percent = 100.0 * lost / max(lost + kept, 1)
     stated = share_lost(lost, kept, one.unusable) if lost else "no sample is missing on the turn"
@@ -68,7 +68,7 @@ def lost_samples(one: Seen) -> Finding:
 
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
-    """Judge noise against other runs."""
+    """Judge the noise by the noise of other runs."""
     value = max(one.noise.reading_um, LEAST_UM)
     if not one.noise.known:
         return undecided(Name.NOISE, "too few samples to separate noise from form", "µm")
@@ -80,7 +80,7 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
     logs = np.log(known)
     middle = float(np.median(logs))
     own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
-    # The median of n values is off by sqrt(pi / 2n) of their scatter.
+    # The median of n values has the standard error sqrt(pi / 2n) times their scatter.
     u = own * float(np.sqrt(1.0 + 0.5 * np.pi / len(known)))
     log_limit = middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])
     if log_limit > LARGEST_LOG:
@@ -99,11 +99,11 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
 
 
 LARGEST_LOG = float(np.log(1e4))
-"""Logarithm of a limit in micrometres that no bar's noise would pass: the travel of its gauge."""
+"""Logarithm of the greatest limit in micrometres, the travel of a gauge."""
 
 
 def closure(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
-    """Judge the end of the turn minus its beginning against noise and other runs."""
+    """Judge the difference between end and beginning of the turn by noise and other runs."""
     if one.closure is None or not one.noise.known:
         return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form", "µm")
     u = one.closure.u_um
@@ -121,7 +121,7 @@ def closure(one: CircleAnalysis, others: Others, expected: Expected | None = Non
 
 
 def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
-    """Judge the overlap's second pass minus the first against noise, feed and other runs."""
+    """Judge the difference between both passes of the overlap by noise, feed and other runs."""
     if one.passes is None:
         return undecided(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
     if not one.noise.known:
@@ -142,9 +142,9 @@ def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None)
 
 
 def _left_open_um(expected: Expected | None) -> float:
-    """Return the drift that moves the centre no more than the ball's stated uncertainty [µm].
+    """Return the drift that moves the centre by the ball's stated uncertainty [µm].
 
-    A steady drift D is a sawtooth, whose first harmonic is D / pi.
+    A linear drift D over the turn is a sawtooth with the first harmonic D / pi.
     """
     return 0.0 if expected is None else np.pi * expected.place_um
 
@@ -165,7 +165,7 @@ def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> 
     parts = [(u, freedom)]
     if len(others) >= FEWEST_OTHERS:
         scale, known = scale_of([value / own for value, own in others])
-        # Few runs scatter by more than their noise by chance alone.
+        # A few runs may scatter by more than their noise by chance.
         if scale > 1.0 + CHANCE_SIGMAS / np.sqrt(2.0 * known):
             usual = float(np.median([own for _, own in others]))
             parts.append((usual * float(np.sqrt(scale**2 - 1.0)), known))
@@ -174,15 +174,15 @@ def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> 
 
 
 CHANCE_SIGMAS = 1.645
-"""By so much more than by chance, one time in twenty, other runs must scatter to widen a limit: without it a few runs, whose
-scatter is hardly known, would let pass whatever comes."""
+"""Other runs widen a limit only if their scatter exceeds chance at the 5 % level. Otherwise a few runs with uncertain
+scatter would make the limit useless."""
 
 
 def feed(one: Seen, others: Others) -> Finding:
-    """Judge the feed of the overlap by the limits of cutting.
+    """Judge the overlap's feed by the same limits as `cut`.
 
-    If the overlap is too round, the duration counts: stops at corners take as long as in other runs, or at most
-    `LONGEST_STOP_S`.
+    If the overlap has too little shape, the duration decides. Stops at corners are assumed as long as in other runs, or
+    at most `LONGEST_STOP_S`.
     """
     if one.feed_mm_min is None:
         return _feed_by_duration(one, others)
@@ -229,16 +229,16 @@ def _feed_by_duration(one: Seen, others: Others) -> Finding:
 
 
 LONGEST_STOP_S = 4.0
-"""Time that a control stops at the two corners of the path, together, where no other runs show it: programs of the station wait there for
-0.3 s each, and none is known that waits for two seconds [s]."""
+"""Longest total stop at both corners if other runs do not show it [s]. The station's programs wait 0.3 s at each
+corner; no known program waits two seconds."""
 
 UNEVEN_STOP_S = 0.6
-"""By how much the stops at both corners may differ from run to run: passed without a stop, or stopped at for 0.3 s each [s]."""
+"""Possible variation of the total stop between runs [s]: none, or 0.3 s at each corner."""
 
 AFTER_OTHER_FEED = (
     "set the override on the control to 100 % and run it again; if this feed is intended, state it in the plan"
 )
-"""What to do about a feed that is not the programmed one."""
+"""Remedy for a wrong feed."""
 
 
 def no_circle(one: Seen) -> tuple[Finding, ...]:
@@ -249,7 +249,7 @@ def no_circle(one: Seen) -> tuple[Finding, ...]:
 
 
 def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
-    """Return all findings that need no knowledge of place or counterpart."""
+    """Return all findings that need neither an expected place nor a counterpart."""
     if one.analysis is None:
         return no_circle(one)
     expected = one.run.expected
@@ -270,7 +270,7 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
 
 
 def _slower(one: Seen, others: Others) -> Finding | None:
-    """Return that a turn took longer by a lower feed and not by stops, which would leave it open; or None."""
+    """Return a finding if a lower feed, not stops, made the turn longer; else None."""
     circle, recording = one.run.circle, one.run.recording
     if one.feed_mm_min is not None or one.longer_s is None:
         return None
@@ -293,4 +293,4 @@ def _slower(one: Seen, others: Others) -> Finding | None:
 
 
 LEAST_SLOWER = 0.08
-"""Share of the time by which a turn must be longer for that: overrides step by tenths, stops at corners come to a second."""
+"""Least relative excess of the turn's time for this finding: overrides have steps of a tenth, and corner stops total a second."""

@@ -1,4 +1,4 @@
-"""Single readings off their neighbours: bad contact, cable, short knock."""
+"""Detect single readings that differ from their neighbours: bad contact, cable, short knock."""
 
 from __future__ import annotations
 
@@ -19,30 +19,31 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
 BESIDE = 2
-"""Readings on either side whose median a reading is held against: a spike of one or two readings does not move it, and what is
-straight over five readings leaves nothing."""
+"""Readings on each side whose median is compared with a reading. A spike of one or two readings does not change the
+median; a straight line over five readings gives zero difference."""
 
 SMALLEST_BLOCK, LARGEST_BLOCK, BLOCKS = 20, 100, 36
-"""Readings of a stretch whose scatter is its own, and about how many stretches a turn has: where the machine shakes for a while,
-readings are held against that."""
+"""Limits of a block's readings, and the approximate number of blocks per turn. The scatter is estimated by blocks,
+because the machine may shake for a while."""
 
 TAIL, TAIL_SIGMAS = 0.99, 2.575829
-"""Share of the readings whose differences are looked at, too, and how many sigmas normal ones have there: readings in coarse steps
-have more differences of nothing than normal ones have small ones, and fewer than one in a hundred is a spike."""
+"""A quantile that also estimates the scatter, and its value for a standard normal variable. Readings in coarse steps
+have many zero differences, which lower the median; fewer than one reading in a hundred is a spike."""
 
 REVERSAL_DEG = 1.0
-"""How far beside a strut's reversal its own spike may stand: nothing is filtered here, so that only lag and clock move it [deg]."""
+"""Range about a strut's reversal in which its spike may appear [deg]. Without filtering, only lag and clock shift it."""
 
 UNEVEN = 1.5
-"""Readings that lie further apart than this many usual steps have lost others between them: their neighbours say nothing."""
+"""If readings are farther apart than this many usual steps, samples between them are lost, and neighbours are not compared."""
 
 
 def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
-    """Judge the reading farthest from its neighbours against chance.
+    """Judge the reading that differs most from its neighbours.
 
-    Each reading is compared with the median of two before and two behind. Their scatter is the larger of the whole
-    turn's and the local one; single spikes do not raise it. The reading step is added to the limit. Near reversals the
-    limit follows from the turn's other reversals. A sound normal run has a finding with probability `limits.SHARE`.
+    Each reading is compared with the median of two readings before and two after. The scatter of differences is the
+    larger of the turn's scatter and the local scatter; single spikes do not raise it. The reading step is added to the
+    limit. Near reversals the limit follows from the turn's other reversals. A sound normal run has a finding with
+    probability `limits.SHARE`.
     """
     apart, sound = _apart(one.residual_um, one.raw.phi_deg)
     if int(sound.sum()) < LARGEST_BLOCK:
@@ -97,7 +98,7 @@ def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, Flags]:
 
 
 def _scales(apart: Floats, among: Flags) -> tuple[Floats, float]:
-    """Return the standard deviation about each reading, shape (n,) [µm], and its freedom."""
+    """Return the standard deviation of differences at each reading, shape (n,) [µm], and its degrees of freedom."""
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))
     if among.any():
@@ -112,7 +113,7 @@ def _scales(apart: Floats, among: Flags) -> tuple[Floats, float]:
             own[k], _ = scale_of(list(there))
     beside = np.maximum(own, np.maximum(np.append(own[1:], own[-1]), np.insert(own[:-1], 0, own[0])))
     each = np.repeat(np.maximum(beside, whole), np.diff(edges))
-    # Neighbours share readings: about every second difference is independent.
+    # Neighbouring differences share readings, so about half of them are independent.
     return np.maximum(each, LEAST_UM), ROBUST_SHARE * float(among.sum()) / 2.0
 
 

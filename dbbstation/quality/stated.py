@@ -1,6 +1,6 @@
-"""Allowed difference of two runs by plan, machine file and session, or usual errors.
+"""Compute the allowed difference of two runs from plan, machine file and session, or usual errors.
 
-Shared causes cancel as far as they act alike; the covariance of the difference follows [GUM 5.2.2].
+Shared causes cancel if their effects are equal; the difference has the covariance of [GUM 5.2.2].
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ def apart_by(one_um: Effects, other_um: Effects, count: int) -> Floats:
 
 
 def covariance_apart(one: Seen, other: Seen) -> Floats | None:
-    """Return the covariance of the difference of two runs of one circle with noise, shape (7, 7) [µm²]; None if one is unknown.
+    """Return the covariance of the difference of two runs of one circle, noise included, shape (7, 7) [µm²]; None without expectation.
 
-    Moves below the ball's stated uncertainty do not count.
+    Movements below the ball's stated uncertainty do not count.
     """
     if one.run.expected is None or other.run.expected is None:
         return None
@@ -63,7 +63,7 @@ def sigmas_apart(one: Seen, other: Seen) -> float | None:
 
 
 def drifted_um(one: Seen, other: Seen) -> float:
-    """Return the drift of the mean reading between two runs, extrapolated from their turns, one standard deviation [µm]."""
+    """Return the standard deviation of the mean reading's drift between two runs, extrapolated from their turns [µm]."""
     if one.run.started_s is None or other.run.started_s is None:
         return 0.0
     rate = float(np.sqrt(0.5 * (one.drift_um_s**2 + other.drift_um_s**2)))
@@ -71,15 +71,15 @@ def drifted_um(one: Seen, other: Seen) -> float:
 
 
 def unseen_um2(one: Seen, other: Seen) -> float:
-    """Return each coefficient's variance by noise and the ball's stated uncertainty [µm²]."""
+    """Return each coefficient's variance due to noise and the ball's stated uncertainty [µm²]."""
     expected = one.run.expected
     place_um = 0.0 if expected is None else expected.place_um
-    # A shift d moves two coefficients, by d / sqrt 2 each.
+    # A shift d changes two coefficients by d / sqrt 2 each.
     return one.u_um**2 + other.u_um**2 + 0.5 * place_um**2
 
 
 def limit_along(covariance: Floats, off: Floats) -> float:
-    """Return the limit of a sound vector in the direction of `off`: its ellipsoid with probability SHARE."""
+    """Return a sound vector's limit in the direction of `off`, from the ellipsoid exceeded with probability SHARE."""
     size = float(np.linalg.norm(off))
     along = off / size if size > 0.0 else np.eye(len(off))[0]
     return length_quantile(len(off)) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
@@ -88,7 +88,7 @@ def limit_along(covariance: Floats, off: Floats) -> float:
 def limit_of_length(covariance: Floats) -> float:
     """Return the limit of a sound vector's length [Box, Ann. Math. Stat. 25 (1954) 290].
 
-    Its square is taken as a scaled chi-square variable of equal mean and variance.
+    The squared length is approximated by a scaled chi-square variable of equal mean and variance.
     """
     trace, squares = float(np.trace(covariance)), float(np.sum(covariance**2))
     return scaled_length_quantile(trace**2 / squares) * float(np.sqrt(squares / trace)) if trace > 0.0 else 0.0

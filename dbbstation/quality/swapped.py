@@ -1,8 +1,8 @@
-"""Whether a run shows another test's circle: wrong bore, height, tilt, start or direction.
+"""Detect runs that show another test's circle: wrong bore, height, tilt, start or direction.
 
-A bar measures no place. Likelihoods compare two normal explanations: the own circle with all uncertainties, or another
-test's, by its run or a model. A sound run favours another by f with a probability of at most 1 / f [Markov's
-inequality], in any dimension and usually far less.
+A bar does not measure its place. Likelihoods compare two normal distributions: of the run's own circle, and of another
+test's circle, by this test's run or a model. A sound run favours another circle by a factor f with a probability of at
+most 1 / f [Markov's inequality], in any dimension and usually far less.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Explained:
-    """Likelihood gain of another circle for a run."""
+    """The likelihood gain of another circle as explanation of a run."""
 
     ratio: float
     fits: bool
@@ -69,7 +69,7 @@ def _measured(one: Seen, both: Together | None) -> Iterator[_Explained]:
     if both is None:
         return
     as_own, without = both.log_likelihoods()
-    # How large this machine's errors are nobody knows: the size that suits the run's own circle best, against the mean of all.
+    # The size of machine errors is unknown: the own circle uses its best size, other circles the mean over sizes.
     common = float(logsumexp(without)) - float(np.log(len(SIZES))) - float(as_own.max())
     others = both.runs[1:]
     noise = np.array([[unseen_um2(one, other), drifted_um(one, other) ** 2] for other in others])
@@ -92,7 +92,7 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
     if own is None:
         return
     noise = unseen_um2(one, one) * np.eye(len(own.form_um))
-    # A model knows nothing of this day's drift, which may have gone on since the session began as it does on this turn.
+    # A model does not contain today's drift, which may have continued at this turn's rate since the session began.
     noise[0, 0] += (one.drift_um_s * (one.run.started_s or 0.0)) ** 2
     as_own = read_um(one) - expected_um(one.run)
     likelihood, _ = _density(as_own, _whole(own, one.run.circle) + noise)
@@ -106,7 +106,7 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
 
 
 def _density(off: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Return log normal densities without the common constant, and squared distances."""
+    """Return logarithms of normal densities, up to a constant, and squared distances."""
     squares: Floats = np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1)
     return -0.5 * (np.linalg.slogdet(covariance)[1] + squares), squares
 

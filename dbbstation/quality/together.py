@@ -1,7 +1,7 @@
-"""A run and those of other tests as one normal variable, and this circle's expectation.
+"""Joint normal distribution of a run and the runs of other tests, and the circle's expectation from them.
 
-Circles share the machine's causes. The others' readings therefore condition this one [Rasmussen and Williams, Gaussian
-Processes for Machine Learning (2006), eq. 2.23 and 2.24]. They also show the size of this machine's errors.
+Circles share the machine's causes, so the others' readings condition this circle [Rasmussen and Williams, Gaussian
+Processes for Machine Learning (2006), eq. 2.23 and 2.24]. They also determine the size of this machine's errors.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Runs of different tests; the first is judged.
+    """Runs of different tests, of which the first is judged.
 
     Attributes:
-        rows: rows of each other test among held ones.
-        apart_um: form of the first minus prediction by the others, for each of SIZES, shape (9, 7) [µm].
+        rows: row numbers of each other test among the stored forms.
+        apart_um: form of the first run minus its prediction by the others, for each of SIZES, shape (9, 7) [µm].
         covariance_um2: of that difference, shape (9, 7, 7) [µm²].
     """
 
@@ -43,7 +43,7 @@ class Together:
     covariance_um2: Floats
 
     def log_likelihoods(self) -> tuple[Floats, Floats]:
-        """Return the log likelihoods of all runs, and of all but the first, for each of SIZES, shape (9,) each."""
+        """Return log likelihoods of all runs, and of all runs but the first, for each of SIZES, shape (9,) each."""
         of_others = self.others.log_likelihoods()[:, 0]
         pulls = np.linalg.solve(self.covariance_um2, self.apart_um[:, :, None])[:, :, 0]
         squares = np.sum(self.apart_um * pulls, axis=1)
@@ -51,10 +51,10 @@ class Together:
 
 
 def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
-    """Return a run beside other tests; None without knowledge or others.
+    """Return a run with the runs of other tests; None without expectation or other tests.
 
     Args:
-        forms: of runs of this session; the first column is that of forms as planned.
+        forms: of this session's runs; the first column contains the forms as planned.
     """
     known = [other for other in runs if other.run.expected is not None]
     them = [other for other in known if other.run.test != one.run.test]
@@ -73,11 +73,11 @@ def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
 def expected_beside(both: Together | None) -> Expected | None:
     """Return the first run's expected circle given the others.
 
-    Sizes of machine errors are weighed by likelihood. If the others disagree, each test against the rest [R. and W.,
-    section 5.4.2], the covariance grows, since causes may be missing.
+    Sizes of machine errors are weighted by likelihood. Each other test is compared with its prediction by the remaining
+    tests [R. and W., section 5.4.2]. If they disagree, causes may be missing, so the covariance grows.
 
     Args:
-        both: None gives None.
+        both: None returns None.
     """
     if both is None or (own := both.runs[0].run.expected) is None:
         return None
@@ -93,9 +93,9 @@ def expected_beside(both: Together | None) -> Expected | None:
 
 
 def _tail(weights: Floats, covariances_um2: Floats) -> float:
-    """Return the factor on the mean covariance for the longer tails of a mixture of sizes.
+    """Return the factor on the mean covariance that accounts for the longer tails of a mixture of sizes.
 
-    A sound circle exceeds the squared radius with probability SHARE. Covariances are assumed to differ in size only.
+    A sound circle exceeds the scaled ellipsoid with probability SHARE. The mixed covariances are assumed to be proportional.
     """
     sizes = np.trace(covariances_um2, axis1=1, axis2=2)
     sizes /= weights @ sizes
@@ -113,9 +113,10 @@ def _straying(both: Together, size: int) -> float:
 
 
 def _placed(own: Expected, circle: Circle, more_um: Floats, covariance_um2: Floats) -> Expected:
-    """Return an expectation with form, centre and mean moved by a form along the travel [µm]."""
+    """Return an expectation whose form, centre and mean are changed by a form along the travel [µm]."""
     start = np.radians(circle.start_deg)
-    # A shift d along the bar at the start is sqrt 2 of a cosine's coefficient; a raised bar sees cos e of it.
+    # A shift along the bar at the start is sqrt 2 times the cosine's coefficient; a raised bar measures cos e times the
+    # shift.
     along = np.sqrt(2.0) * circle.bar_mm / circle.radius_mm
     turned = along * np.array([[np.cos(start), -np.sin(start)], [np.sin(start), np.cos(start)]])
     to_place = np.zeros((3, COEFFICIENTS))
@@ -135,17 +136,17 @@ def _placed(own: Expected, circle: Circle, more_um: Floats, covariance_um2: Floa
 
 
 def read_um(one: Seen) -> Floats:
-    """Return coefficients of the readings along the travel; their mean shows other lengths."""
+    """Return coefficients of the readings along the travel; their mean contains the bar length."""
     return read_along_um(one.run.circle, one.coefficients_um)
 
 
 def read_along_um(circle: Circle, form_um: Floats) -> Floats:
-    """Return the same of a form on a circle, shape (7,) [µm]."""
+    """Return the same coefficients for a form on a circle, shape (7,) [µm]."""
     return along_travel(circle) * form_um + _length_um(circle)
 
 
 def expected_um(one: Run | Planned) -> Floats:
-    """Return the same expectation without other runs."""
+    """Return the same coefficients as expected without other runs."""
     form = np.zeros(COEFFICIENTS) if one.expected is None else one.expected.form_um
     return along_travel(one.circle) * form + _length_um(one.circle)
 

@@ -34,14 +34,14 @@ class Adapter:
 
 
 def adapter_of(port: str) -> Adapter | None:
-    """Return the adapter of a port, or None if it is not USB or gone."""
+    """Return the adapter of a port, or None if the port is not USB or has gone."""
     return next((adapter for name, adapter in _adapters(list_ports.comports()) if name == port), None)
 
 
 def port_of(adapter: Adapter) -> str | None:
     """Return the adapter's current port, or None.
 
-    Without serial number only the socket counts.
+    For an adapter without serial number, the socket alone decides.
     """
     return next((name for name, other in _adapters(list_ports.comports()) if _same(adapter, other)), None)
 

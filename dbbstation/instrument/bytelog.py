@@ -1,4 +1,4 @@
-"""The byte log: everything that went over a line, with times, as text that a person can read and `replay` can send again.
+"""The byte log: all bytes of a serial line with their times, as text that people can read and `replay` can decode.
 
     # dbb-byte-log/1
     # instrument: heidenhain-nd281b
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 
 _HEAD = "# dbb-byte-log/1"
 _LONGEST_S = 1e9
-"""Greatest time of a line [s]: nobody logs for thirty years."""
+"""Greatest time in a line of the log [s]: thirty years."""
 _LINE = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?) ([<>]) ([0-9a-f]{2}(?: [0-9a-f]{2})*)(?:  \|.*)?")
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Bytes on the line `t_s` seconds after the log was opened."""
+    """Bytes that were on the line `t_s` seconds after the log was opened."""
 
     t_s: float
     direction: Literal["<", ">"]
@@ -103,7 +103,7 @@ class ByteLog:
 
 
 def logged_instrument(path: Path) -> tuple[str, str]:
-    """Return instrument and profile of a byte log's head, each may be empty.
+    """Return instrument and profile from a byte log's head; each may be empty.
 
     Raises:
         InputError: the file cannot be read or is no byte log.
@@ -120,7 +120,7 @@ def logged_instrument(path: Path) -> tuple[str, str]:
 
 
 def read_byte_log(path: Path) -> Iterator[Chunk]:
-    """Yield the chunks in time order, without a cut last line.
+    """Yield the chunks in time order; a last line that was cut off is left out.
 
     Raises:
         InputError: the file cannot be read, is no byte log, or has an invalid line.

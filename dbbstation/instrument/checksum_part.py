@@ -25,7 +25,7 @@ Algorithm: TypeAlias = Literal[
 
 @dataclass(frozen=True, slots=True)
 class _Crc:
-    """One CRC of the Rocksoft model; reflected ones shift towards the low bit."""
+    """One CRC of the Rocksoft model; a reflected CRC shifts towards the low bit."""
 
     bits: int
     polynomial: int
@@ -57,13 +57,13 @@ _COMPILED: dict[str, Callable[[bytes], int]] = {
     "crc16-xmodem": partial(_hqx, start=0),
     "crc32": zlib.crc32,
 }
-"""Those that the standard library has: 90 000 bytes a second of a fast stream must not keep the reader busy."""
+"""Checksums of the standard library: they are fast enough for a stream of 90 000 bytes a second."""
 
 _BYTES: dict[str, int] = {"sum16": 2, "crc16-modbus": 2, "crc16-ccitt": 2, "crc16-xmodem": 2, "crc32": 4}
 
 
 def checksum_bytes(algorithm: Algorithm) -> int:
-    """Return the size before any hexadecimal writing."""
+    """Return the number of checksum bytes, before they are written in hexadecimal."""
     return _BYTES.get(algorithm, 1)
 
 
@@ -85,7 +85,7 @@ def _reversed_bits(value: int, bits: int) -> int:
 
 
 class Checksum(Schema):
-    """A checksum over everything before it, without the first `after` bytes."""
+    """A checksum over all bytes before it, except the first `after` bytes."""
 
     kind: Literal["checksum"]
     algorithm: Algorithm
@@ -102,7 +102,7 @@ class Checksum(Schema):
         return digit + b"{%d}" % self.width
 
     def over(self, before: bytes) -> bytes:
-        """Return the checksum on the wire over all that precedes it."""
+        """Return the bytes of the checksum over the preceding bytes."""
         raw = checksum(self.algorithm, before[self.after :]).to_bytes(checksum_bytes(self.algorithm), self.order)
         if self.written == "binary":
             return raw

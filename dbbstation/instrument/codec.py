@@ -1,4 +1,4 @@
-"""Bytes to readings and back by a protocol's grammar, without port or clock."""
+"""Convert bytes to readings and back by a protocol's grammar, without port or clock."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
 LONGEST_LINE = 256
-"""Bytes without a line end after which they count as garbage; no known length gauge sends longer lines. Also the most that
-is kept of bytes in which no frame of fixed width was found yet."""
+"""Number of bytes without a line end that count as garbage; no known length gauge sends longer lines. It is also the
+greatest number of kept bytes without a frame of fixed width."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
 
 
 def decode(protocol: Protocol, raw: bytes) -> Reading:
-    """Return the reading of exactly these bytes, without time and losses.
+    """Return the reading that exactly these bytes contain, without time and losses.
 
     Raises:
         NotUnderstood: they are no whole frame of this protocol.
@@ -105,7 +105,7 @@ class Decoder:
 
     @property
     def pending(self) -> bytes:
-        """Return the begin of a frame, or garbage without successor."""
+        """Return the pending bytes: the begin of a frame, or garbage at the end."""
         return self._pending
 
     def take_pending(self) -> bytes:
@@ -114,7 +114,7 @@ class Decoder:
         return raw
 
     def feed(self, chunk: bytes) -> list[Heard]:
-        """Return what `chunk` completed, in wire order."""
+        """Return the readings and garbage that `chunk` completed, in wire order."""
         self._pending += chunk
         return self._cut_by_width() if self._protocol.by_width else self._cut_by_line_end()
 
@@ -153,7 +153,7 @@ class Decoder:
         return Garbage(raw, f"{damaged} {characters} with a wrong parity", reason="parity")
 
     def _cut_by_width(self) -> list[Heard]:
-        """Slide to the next fitting frame; out of step, two in a row must fit."""
+        """Move on to the next frame that fits. After a loss of synchronisation two successive frames must fit."""
         longest = max(frame.width or 0 for frame in self._protocol.frames)
         heard: list[Heard] = []
         start = skipped = 0

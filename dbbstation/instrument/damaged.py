@@ -1,4 +1,4 @@
-"""Characters with wrong parity or stop bit: marked, counted, never part of a reading.
+"""Mark and count characters with wrong parity or stop bit, which never become part of a reading.
 
 A serial driver checks parity only with INPCK and marks wrong characters only with PARMRK: FF 00 X for a wrong X, FF FF
 for a right FF, FF 00 00 for a break [IEEE Std 1003.1-2017, 11.2.2 Input Modes]. pyserial 3.5 resets both
@@ -29,7 +29,7 @@ class Marks:
         self._begun = b""
 
     def taken_out(self, raw: bytes) -> bytes:
-        """Return the bytes for the rest of the program."""
+        """Return the bytes without the system's marks; damaged characters are changed."""
         raw, self._begun = self._begun + raw, b""
         return _ESCAPED.sub(self._plain, raw)
 

@@ -1,7 +1,7 @@
-"""Readings that may be damaged though they fit the grammar, on lines without a checksum.
+"""Detect readings that fit the grammar but may be damaged, on lines without a checksum.
 
 A device writes all numbers in one form: unit, decimals, and digits before the point as needed or zero-padded. A lost or
-inserted digit, a moved point or another unit changes this form. Two changes are no damage:
+inserted digit, a moved point or another unit changes this form. Two changes of form are genuine:
 
 - A number passes a power of ten. A digit lost before the point takes at least 0.8 of 10^d from a number of d + 1 digits,
   which is at least 10^d; an inserted digit adds as much. So a step below half of 10^d is genuine.
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     from dbbstation.instrument.reading import Reading
 
 BELIEVED_AFTER = 3
-"""Lines in a row of another form that make it the form of the device."""
+"""Number of successive lines in another form after which it counts as the device's form."""
 
 _TRUE_STEP = 0.5
-"""Greatest step across a power of ten, in units of it, that is no lost digit: those are 0.8 and more."""
+"""Greatest genuine step across a power of ten, in units of this power; a lost digit changes the number by at least
+0.8."""
 
 _REMEDY = "look after the cable, its screen and connectors, and what switches motors beside it"
 
@@ -43,7 +44,7 @@ class Written:
     unit: str = ""
 
     def continues(self, last: Written) -> bool:
-        """Return whether the device can have written this after `last` with unchanged settings."""
+        """Return whether a device with unchanged settings can have written this number after `last`."""
         if (self.behind, self.unit) != (last.behind, last.unit):
             return False
         return self.before == last.before or self._passed_a_power_of_ten(last)
@@ -56,7 +57,7 @@ class Written:
         return whole and abs(self.value - last.value) < _TRUE_STEP * place
 
     def difference(self, last: Written) -> str:
-        """Return the difference from `last`, in words."""
+        """Return the difference of form from `last`, in words."""
         if self.unit != last.unit:
             return f"its unit is {self.unit}, that of the lines before was {last.unit}"
         count, place, of = self.behind, "behind", last.behind
@@ -106,7 +107,7 @@ class Doubts:
         return replace(reading, status=DOUBTFUL, said=f"{why}: a character was damaged or lost", remedy=_REMEDY)
 
     def _unlike(self, written: Written) -> str:
-        """Return how a number's form changed; empty if not, or if the new form holds from now on."""
+        """Return how a number's form changed; empty if it did not change, or if the new form is now the device's."""
         last = self._form
         if last is None or written.continues(last):
             self._form, self._others = written, 0

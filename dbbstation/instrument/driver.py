@@ -1,4 +1,4 @@
-"""The driver: a protocol and a port become readings."""
+"""The driver reads an instrument through a port by its protocol."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Arrivals:
-    """Remembers when bytes were received, as far back as a frame reaches."""
+    """Remembers the times of received bytes for the length of a frame."""
 
     def __init__(self, character_s: float, reach: int) -> None:
         self._character_s = character_s
@@ -51,14 +51,14 @@ class Arrivals:
             self._chunks.popleft()
 
     def at_latest_s(self, behind: int) -> float:
-        """Return the latest arrival of the byte with so many behind it [s]."""
+        """Return the latest possible arrival of a byte [s], by the number of bytes behind it."""
         place = self._count - behind
         end, seen_s = next(one for one in self._chunks if one[0] >= place)
         return seen_s - (end - place) * self._character_s
 
 
 class Listener:
-    """Takes readings until stopped; only a long silence is an error."""
+    """Reads a streaming instrument until stopped; only a long silence is an error."""
 
     def __init__(self, link: Link, reception: Reception) -> None:
         protocol = reception.protocol
@@ -122,10 +122,10 @@ class Listener:
 
 
 _LOOK_S = 0.25
-"""Between looks for an adapter that was pulled out [s]."""
+"""Interval of the search for an unplugged adapter [s]."""
 
 _JOIN_S = 5.0
-"""The reader thread ends within some hundredths of a second; after this long something is broken."""
+"""Longest wait for the end of the reader thread [s]; it usually ends within some hundredths of a second."""
 
 
 class Instrument:

@@ -15,8 +15,8 @@ Unit: TypeAlias = Literal["mm", "um", "nm", "m", "inch", "count"]
 
 
 Reason: TypeAlias = Literal["bytes", "parity", "checksum", "counter"]
-"""Why a frame is rejected: its bytes do not fit the grammar, a character has a wrong parity, its checksum is wrong, its sample
-counter is out of order."""
+"""Reason for rejecting a frame: its bytes do not fit the grammar, a character has a wrong parity, the checksum is
+wrong, or the sample counter is out of order."""
 
 
 class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: most garbled bytes end here)
@@ -71,7 +71,7 @@ class FrameParts:
     digits: tuple[int, int] | None = None
 
     def report(self, status: Status, said: str, remedy: str) -> None:
-        """Keep the worst status."""
+        """Keep a status if it is the worst so far."""
         if SEVERITY[status] > SEVERITY[self.status]:
             self.status, self.said, self.remedy = status, said, remedy
 
@@ -136,7 +136,7 @@ class Literally(Schema):
 
 
 class SignField(Schema):
-    """The sign as an own part; the first of `plus` and `minus` is written."""
+    """The sign as a separate part; the first character of `plus` or `minus` is written."""
 
     kind: Literal["sign"]
     plus: tuple[Bytes, ...] = (b"+",)
@@ -163,7 +163,7 @@ class SignField(Schema):
 
 
 class ChoiceField(Schema):
-    """One of several codes; without a status the first is written."""
+    """One of several codes; the first is written if there is no bad status."""
 
     kind: Literal["choice"]
     codes: tuple[Code, ...] = Field(min_length=1)
@@ -198,7 +198,7 @@ class ChoiceField(Schema):
 
 
 class Flags(Schema):
-    """Status bits of one byte over a fixed base."""
+    """Status bits of one byte, added to a fixed base."""
 
     kind: Literal["flags"]
     base: int = Field(default=0, ge=0, le=255)
@@ -223,7 +223,7 @@ class Flags(Schema):
 
 
 class SkipField(Schema):
-    """Ignored bytes of fixed number; the virtual instrument writes `written`."""
+    """A fixed number of ignored bytes; the virtual instrument writes `written`."""
 
     kind: Literal["skip"]
     written: Bytes = Field(min_length=1)

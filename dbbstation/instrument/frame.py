@@ -1,4 +1,4 @@
-"""One kind of frame: parts in order, as pattern and writer."""
+"""One kind of frame: its parts in order, which read and write it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PlainPart: TypeAlias = Annotated[
 
 
 class Optionally(Schema):
-    """Parts of a feature that may be switched off; both forms are understood.
+    """Parts of a feature that may be switched off; frames with and without them are read.
 
     Attributes:
         feature: written if in the protocol's `features`.
@@ -47,7 +47,7 @@ class Optionally(Schema):
         return b"(?:" + b"".join(part.pattern() for part in self.parts) + b")?"
 
     def read(self, raw: bytes, found: FrameParts) -> None:
-        """Take the parts if present.
+        """Read the parts if present.
 
         Raises:
             NotUnderstood: a part is meaningless.
@@ -124,7 +124,7 @@ class Frame(Schema):
         return next((part for part in self.parts if isinstance(part, Number) and part.of == what), None)
 
     def fault(self) -> str:
-        """Return its inconsistency, or an empty text."""
+        """Return the frame's inconsistency, or an empty text."""
         kinds = [part.of for part in self.parts if isinstance(part, Number)]
         if kinds.count("length") > 1 or kinds.count("counter") > 1:
             return "a frame has at most one length and one counter"
@@ -136,7 +136,7 @@ class Frame(Schema):
 
     @property
     def width(self) -> int | None:
-        """Return bytes of the frame, None if they vary."""
+        """Return the number of bytes of the frame; None if it varies."""
         widths = [part.width for part in self.parts]
         return None if None in widths else sum(width for width in widths if width is not None)
 
@@ -163,7 +163,7 @@ class Frame(Schema):
 
     @property
     def voices(self) -> tuple[Code | Bit, ...]:
-        """Return every code and bit for a status."""
+        """Return every code and bit that stands for a status."""
         found: list[Code | Bit] = []
         for part in self.parts:
             if isinstance(part, ChoiceField | ErrorTable):

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
 GROUP = "dbbstation.instruments"
-"""Entry points of this group name packages; every `.yaml` file in the folder of one is an instrument."""
+"""Entry points of this group name packages; every `.yaml` file in such a package's folder is an instrument."""
 
 HOW_TO_ADD = "or give the path of your own file, as in `--instrument ./my-gauge.yaml`, or install its package"
-"""What an unknown name may lack."""
+"""Advice for an unknown name."""
 
 
 def instruments_folder() -> Path:
@@ -51,7 +51,7 @@ def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Pro
 
 
 def load_variants(name_or_file: str | Path) -> list[Protocol]:
-    """Return every variant, the usual one first.
+    """Return every variant of an instrument, the usual one first.
 
     Raises:
         InstrumentError, InputError: as `load_instrument`.
@@ -90,14 +90,14 @@ def _at_zero(protocol: Protocol, zero_mm: float) -> Protocol:
 
 
 def at_rate(protocol: Protocol, rate_hz: float | None) -> Protocol:
-    """Return the protocol at another sample rate, if given."""
+    """Return the protocol with another sample rate, if one is given."""
     if rate_hz is None:
         return protocol
     return protocol.model_copy(update={"timing": protocol.timing.model_copy(update={"rate_hz": rate_hz})})
 
 
 def read_protocol(path: Path, profile: str | None = None) -> Protocol:
-    """Return the protocol of a file, of one or the usual profile.
+    """Return the protocol of a file with this profile, or with the usual one.
 
     Raises:
         InstrumentError: the file has no such profile.

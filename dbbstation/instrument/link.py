@@ -22,15 +22,16 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import LineSettings
 
 _ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError, *LINE_ERRORS)
-"""What a port can raise; pyserial lets some errors of the system through, and TypeError from a port just closed."""
+"""Errors that a port can raise: pyserial passes on some system errors, and a TypeError of a port that was just
+closed."""
 
 _OPENING_ERRORS: tuple[type[Exception], ...] = (*_ERRORS, ValueError)
 
 _TICK_S = 0.02
-"""How long a read waits at most, so that a reader thread sees soon that it shall stop."""
+"""Longest wait of a read [s], so that the reader thread stops soon after a request."""
 
 _MOST = 1 << 16
-"""Bytes taken from a socket at once."""
+"""Greatest number of bytes that are read from a socket at once."""
 
 _PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
 
@@ -38,7 +39,7 @@ _BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
 
 
 class Port(Protocol):
-    """The used part of pyserial, or a stand-in."""
+    """The methods of pyserial that the driver uses; a test port may replace it."""
 
     @property
     def in_waiting(self) -> int:
@@ -86,7 +87,7 @@ class Link:
         return self._marks is not None and self._has_bits
 
     def read(self) -> bytes:
-        """Return arrived bytes after a short wait; may be empty.
+        """Return the bytes that arrive within a short wait; may be empty.
 
         Raises:
             LineClosedError: the line is closed.
@@ -130,7 +131,7 @@ class Link:
             raise self._gone(error) from None
 
     def close(self) -> None:
-        """Close the port if owned."""
+        """Close the port if this link opened it."""
         if self._owned:
             _close_quietly(self._port)
 

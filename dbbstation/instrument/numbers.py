@@ -53,7 +53,7 @@ class Number(Schema):
             found.counter = int(value)
 
     def write(self, content: Content) -> bytes:
-        """Return the number, or the status's special.
+        """Return the bytes of the number, or of the special that stands for the status.
 
         Raises:
             NotRepresentable: it does not fit.
@@ -66,7 +66,7 @@ class Number(Schema):
         return self._written(self._times(content.value, 1.0 / self.scale))
 
     def as_read(self, value: float) -> float:
-        """Return a length after writing and reading, in its unit."""
+        """Return a length as it reads after it was written, in its unit."""
         return self._times(self.rounded(self._times(value, 1.0 / self.scale)), self.scale)
 
     @staticmethod
@@ -91,7 +91,7 @@ class Number(Schema):
 
 
 class DecimalText(Number):
-    """A number in text.
+    """A decimal number in text.
 
     Attributes:
         width: with sign and point; None: free, at most `max_width`.
@@ -255,7 +255,7 @@ class Integer(Number):
 
 
 class Ieee(Number):
-    """An IEEE 754 number of 4 or 8 bytes; not-a-number is no reading unless special."""
+    """An IEEE 754 number of 4 or 8 bytes. Not-a-number is rejected unless it is a special."""
 
     kind: Literal["float"]
     size: Literal[4, 8] = 4

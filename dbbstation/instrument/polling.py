@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Latch:
-    """Moment of a length.
+    """Moment at which a device measured a length.
 
     Attributes:
         t_s: most likely, by the host's clock.
@@ -35,12 +35,12 @@ class Latch:
 
 
 def latch_of(protocol: Protocol, *, asked_s: float, first_byte_s: float, baud: int) -> Latch:
-    """Return when the length of a reply was taken.
+    """Return when the device measured the length of a reply.
 
-    The moment is uniform between the device's bounds and before the reply: its middle, with the width over the root of
-    12 as standard uncertainty [JCGM 100:2008, 4.3.7]. A late reply was delayed by the computer, mostly on arrival, so
-    the estimate is kept and the uncertainty includes a delayed request. A reply earlier than possible refutes the
-    bounds; then the moment is anywhere between request and first byte.
+    The moment is distributed uniformly between the device's bounds, before the reply. The estimate is the middle, and
+    the standard uncertainty is the width over √12 [JCGM 100:2008, 4.3.7]. The computer delays late replies, mostly on
+    arrival. The estimate is then kept, and the uncertainty includes a delayed request. A reply earlier than possible
+    refutes the bounds; the moment is then anywhere between request and first byte.
     """
     character_s = protocol.line.character_s(baud)
     sent_s = asked_s + len(protocol.ask.request) * character_s
@@ -58,14 +58,14 @@ def latch_of(protocol: Protocol, *, asked_s: float, first_byte_s: float, baud: i
 _PAUSE_TICK_S = 0.001
 
 _MARGIN_S = 0.02
-"""Behind the time that a reply takes, before the line counts as quiet [s]."""
+"""Time that is added to the duration of a reply before the line counts as quiet [s]."""
 
 EXCHANGES = 20
-"""Requests over which noise is counted."""
+"""Number of last requests over which disturbed replies are counted."""
 
 MOST_NOISY = 7
-"""Of these, as many with bytes that belong to no reply are no noise but another instrument, whose replies are cut in the wrong
-places. Where one exchange in twenty is disturbed, so many come once in 30 000 times (binomial)."""
+"""If so many of these have bytes of no reply, the cause is not noise but another instrument, whose replies are cut at
+the wrong places. If one exchange in twenty is disturbed, so many occur once in 30 000 times (binomial)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class PolledReply:
 
     @property
     def clean(self) -> bool:
-        """Return whether nothing else came."""
+        """Return whether only the reply arrived."""
         return isinstance(self.heard, Piece) and self.heard.raw == self.raw
 
 
@@ -127,7 +127,7 @@ class Poller:
                 pass
 
     def _seen_s(self, answer: PolledReply, asked_s: float) -> float:
-        """Return the arrival of the reply's first byte; if time is counted, the earliest possible one."""
+        """Return the arrival time of the reply's first byte; if time is counted, the earliest possible time."""
         if not isinstance(self._to.clock, MachineTime):
             return answer.first_s
         characters = len(self._protocol.ask.request) + 1
@@ -162,7 +162,7 @@ class Poller:
             raise self._to.symptom(telling.raw, telling.why)
 
     def _refuse_strangers(self) -> None:
-        """Fail if foreign bytes recur, because replies are then only apparent."""
+        """Fail if foreign bytes recur: the replies then come from another instrument."""
         noisy = [answer for answer in self._recent if answer.raw and not answer.clean]
         if len(noisy) >= MOST_NOISY:
             raw = b"".join(answer.raw for answer in self._recent)[-LONGEST_LINE:]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class LineInstead(Schema):
-    """Keys of `line` that a profile has instead."""
+    """Keys of `line` that a profile replaces."""
 
     baud: int | None = None
     baud_choices: tuple[int, ...] | None = None
@@ -31,7 +31,7 @@ class LineInstead(Schema):
 
 
 class AskInstead(Schema):
-    """Keys of `ask` that a profile has instead."""
+    """Keys of `ask` that a profile replaces."""
 
     mode: str | None = None
     request: Bytes | None = None
@@ -42,14 +42,14 @@ class AskInstead(Schema):
 
 
 class ReplyInstead(Schema):
-    """Keys of `reply` that a profile has instead."""
+    """Keys of `reply` that a profile replaces."""
 
     prefix: Bytes | None = None
     end: Bytes | None = None
 
 
 class LengthInstead(Schema):
-    """Keys of `length` that a profile has instead."""
+    """Keys of `length` that a profile replaces."""
 
     unit: str | None = None
     mm_per_count: float | None = None
@@ -61,7 +61,7 @@ class LengthInstead(Schema):
 
 
 class TimingInstead(Schema):
-    """Keys of `timing` that a profile has instead."""
+    """Keys of `timing` that a profile replaces."""
 
     latch_delay_s: float | None = None
     latch_bounds_s: tuple[float, float] | None = None
@@ -72,10 +72,10 @@ class TimingInstead(Schema):
 
 
 class Profile(Schema):
-    """One variant: keys that it has instead of those of the file. Lists are replaced whole, and nothing removes a key.
+    """One variant: its keys replace keys of the file. A list is replaced as a whole, and a profile cannot remove a key.
 
     Attributes:
-        references: more of them, beside those of the file.
+        references: added to the references of the file.
     """
 
     title: str = Field(min_length=1)

@@ -54,7 +54,7 @@ class LineSettings(Schema):
 
 
 class LineCommand(Schema):
-    """One command of a start or stop sequence: bytes sent, the answer waited for, a rest afterwards.
+    """One command of a start or stop sequence: the bytes to send, the expected answer, and a pause.
 
     Attributes:
         refused: the answer of a device that does not know the command or does not allow it.
@@ -67,7 +67,7 @@ class LineCommand(Schema):
 
 
 class FollowUp(Schema):
-    """A request that is sent once after a fault, to get the device's own message.
+    """A request that is sent once after a fault, to read the device's message.
 
     Attributes:
         frames: the first is the answer while there is a fault, others that there is nothing to tell. All are messages.
@@ -114,13 +114,13 @@ class Ask(Schema):
 
 
 class Reply(Schema):
-    """What all replies have in common, so that a profile changes it in one place."""
+    """Common parts of all replies, so that a profile changes them in one place."""
 
     prefix: Bytes = b""
     end: Bytes = b""
 
     def around(self, frame: Frame) -> Frame:
-        """Return a frame with prefix and end, unless bare."""
+        """Return a frame with prefix and end; a bare frame stays unchanged."""
         if frame.bare:
             return frame
         before = (Literally(kind="literal", value=self.prefix),) if self.prefix else ()
@@ -164,7 +164,7 @@ class Length(Schema):
 
 
 class Timing(Schema):
-    """When things happen.
+    """Times of the protocol.
 
     Attributes:
         latch_delay_s: asked: from the end of the request to the moment the device takes the length. Stream: from that
@@ -196,7 +196,7 @@ class Timing(Schema):
 
 
 class Reference(Schema):
-    """Source of a statement of the file; `verified` is true if it was read in the source."""
+    """Source of a statement in the file; `verified` is true if the source was read."""
 
     says: str
     where: str
@@ -246,7 +246,7 @@ class Protocol(Schema):
         return self
 
     def whole(self) -> Protocol:
-        """Return the protocol with common parts written into requests and replies."""
+        """Return the protocol with the common parts inserted into requests and replies."""
         ask, end = self.ask, self.ask.request_end
         steps = {
             key: tuple(step.model_copy(update={"send": step.send + end}) for step in getattr(ask, key))
@@ -263,7 +263,7 @@ class Protocol(Schema):
 
     @property
     def label(self) -> str:
-        """Name and profile, as people are told."""
+        """Return name and profile as text for people."""
         return f"{self.name} (profile {self.profile})" if self.profile else self.name
 
     @property
@@ -274,7 +274,7 @@ class Protocol(Schema):
 
     @property
     def terminator(self) -> bytes:
-        """Return the common line end of frames, bare ones apart; may be empty."""
+        """Return the line end of all frames that are not bare; may be empty."""
         ends = {frame.terminator for frame in self.frames if not frame.bare}
         return ends.pop() if len(ends) == 1 else b""
 
@@ -286,13 +286,13 @@ class Protocol(Schema):
 
     @property
     def explaining(self) -> Protocol | None:
-        """Return the protocol of a fault's follow-up, or None."""
+        """Return the protocol of the request after a fault, or None."""
         follow_up = self.ask.follow_up
         return None if follow_up is None else self.model_copy(update={"frames": follow_up.frames})
 
     @property
     def has_checksum(self) -> bool:
-        """Return whether a wrong digit is noticed."""
+        """Return whether a checksum detects wrong digits."""
         return any(part.kind == "checksum" for part in self.frames[0].parts)
 
     @property
@@ -301,7 +301,7 @@ class Protocol(Schema):
         return not any(frame.binary for frame in self.frames)
 
     def voice(self, status: Status) -> tuple[Frame, Code | Bit | None] | None:
-        """Return the device's way to say `status`: a code, else a message, or None."""
+        """Return the code of a status, else its message, or None."""
         for frame in self.frames:
             for voice in frame.voices:
                 if voice.status == status:
@@ -318,12 +318,12 @@ class Protocol(Schema):
 
     @property
     def frame_characters(self) -> int:
-        """Characters of a typical reading on the wire."""
+        """Return the number of characters of a typical reading."""
         width = self.frames[0].width
         return len(self.frames[0].write(Content(0.0, features=self.features))) if width is None else width
 
     def fastest_hz(self, baud: int | None = None) -> float:
-        """Return the greatest rate of the line with latency, at most `rate_hz`."""
+        """Return the greatest rate of readings that the line allows with latency, at most `rate_hz`."""
         character_s = self.line.character_s(baud)
         one_s = self.frame_characters * character_s
         if self.ask.asked:
@@ -331,9 +331,9 @@ class Protocol(Schema):
         return min(1.0 / one_s, self.timing.rate_hz or float("inf"))
 
     def latch_bounds_s(self) -> tuple[float, float]:
-        """Return earliest and latest latching after the request [s].
+        """Return the earliest and latest time of latching after the request [s].
 
-        Without bounds a polled device latches anywhere before its reply.
+        A polled device without bounds latches at any time before its reply.
         """
         timing = self.timing
         if timing.latch_bounds_s is not None:

@@ -6,16 +6,17 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 SaidStatus: TypeAlias = Literal["ok", "overrange", "fault"]
-"""What a device says of a length. `ok`: it can be trusted. `overrange`: it (or its range) says that it cannot. `fault`: no length."""
+"""A device's status of a length. `ok`: valid. `overrange`: invalid by the device or its range. `fault`: no length."""
 
 Status: TypeAlias = Literal["ok", "doubtful", "overrange", "fault"]
-"""`doubtful`: the device says nothing against the length, but it may have been damaged on the line. It is kept and not used."""
+"""`doubtful`: the device reports no fault, but the length may have been damaged on the line. It is kept, but not
+used."""
 
 OK: Status = "ok"
 DOUBTFUL: Status = "doubtful"
 
 SEVERITY: dict[Status, int] = {"ok": 0, "doubtful": 1, "overrange": 2, "fault": 3}
-"""Where several parts of a reply speak of the status, the worst is taken."""
+"""Order of severity. If several parts of a reply have a status, the worst applies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,5 +45,5 @@ class Reading:
 
     @property
     def gone(self) -> bool:
-        """Return whether the device reports no length; a doubtful length was damaged on the line."""
+        """Return whether the device reports no length; a doubtful length is still a length."""
         return self.status not in {OK, DOUBTFUL}

@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from dbbstation.instrument.reading import Reading
 
 INCOMPLETE = "incomplete"
-"""Why bytes are no frame that only began to be one."""
+"""Reason for bytes that began a frame but did not complete it."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """Counts since `start`.
+    """Counts of readings and rejected bytes since `start`.
 
     Attributes:
         rejected: frames and stretches of bytes, by reason.
@@ -38,7 +38,7 @@ class Tally:
     reconnected: int = 0
 
     def reject(self, raw: bytes, reason: Reason) -> None:
-        """Count bytes that were not believed."""
+        """Count rejected bytes."""
         if raw:
             self.rejected[reason] = self.rejected.get(reason, 0) + 1
             self.garbage_bytes += len(raw)
@@ -47,7 +47,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """A line being read.
+    """The state of a line while it is read.
 
     Attributes:
         clock: of readings [s].
@@ -73,7 +73,7 @@ class Reception:
         return self.protocol.line.character_s(self.baud)
 
     def symptom(self, raw: bytes, why: str) -> InstrumentError:
-        """Return the error of a line without readings."""
+        """Return the error for a line without readings."""
         if not raw:
             heard_before = self.tally.readings > 0
             return symptoms.silence(self.protocol, self.where, self.timeout_s, self.baud, heard_before=heard_before)

@@ -1,4 +1,4 @@
-"""Decode a byte log as the live line."""
+"""Decode a byte log in the same way as a live line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """Content of a byte log at one place.
+    """A reading or rejected bytes of a byte log.
 
     Attributes:
         t_s: last byte, since the log was opened.
@@ -56,7 +56,7 @@ class _Decoding:
         self._last_s = 0.0
 
     def sent(self, raw: bytes) -> Iterator[Replayed]:
-        """Take bytes to the device, which end the reply before."""
+        """Process bytes that were sent to the device; they end the previous reply."""
         if not self._protocol.ask.asked:
             return
         yield from self._unfinished("no end before the next request")
@@ -67,7 +67,7 @@ class _Decoding:
         self._decoder = Decoder(told or self._protocol, joining=False)
 
     def came(self, chunk: Chunk) -> Iterator[Replayed]:
-        """Take bytes from the device."""
+        """Process bytes from the device."""
         self._last_s = chunk.t_s
         self._answer += chunk.raw if self._protocol.ask.asked else b""
         for heard in self._decoder.feed(chunk.raw):

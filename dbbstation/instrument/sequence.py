@@ -1,8 +1,9 @@
-"""The device's sample counter: losses and counters out of order.
+"""Detect lost samples and counters out of order by the device's sample counter.
 
-After a damaged or doubled line the counter continues from the line before. After a loss it is larger, after a restart smaller. The driver therefore keeps the line until it has read the next lines. A damaged counter is continued by chance only with two
-faults in a row and one value in `modulus`: at one damaged line in a thousand and modulus 256, one chance in 250
-million.
+After a damaged or doubled line the counter continues from the line before. After a loss it is larger, after a restart
+smaller. The driver therefore keeps the line until it has read the next lines. The next lines continue a damaged counter
+only if two successive lines are damaged and their counters match by chance. With one damaged line in a thousand and
+modulus 256, the probability is one in 250 million.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from dbbstation.errors import InstrumentError
 Held = TypeVar("Held")
 
 GAP_FOLLOWERS = 1
-"""Lines that must go on from a counter ahead before samples count as lost."""
+"""Number of lines that must continue from a larger counter before samples count as lost."""
 
 RESTART_FOLLOWERS = 2
-"""Lines that must count on, one by one, from a counter behind before a restart is believed: it ends a measurement, a gap does
-not, so it takes one more."""
+"""Number of lines that must continue from a smaller counter before a restart is assumed. A restart ends a measurement
+and a gap does not, so it needs one line more."""
 
 
 @dataclass(frozen=True, slots=True)
 class Placed(Generic[Held]):
-    """A sample with its place in the sequence.
+    """A sample with its position in the sequence.
 
     Attributes:
         lost: missing before it; None: it is rejected.
@@ -50,11 +51,11 @@ class SampleOrder(Generic[Held]):
         return self._modulus is not None
 
     def left(self) -> list[Placed[Held]]:
-        """Return held samples as rejected, at the end."""
+        """Return the held samples as rejected, at the end of reading."""
         return self._rejected()
 
     def place(self, counter: int | None, sample: Held) -> list[Placed[Held]]:
-        """Take the next sample and return those with a known place.
+        """Add the next sample and return the samples whose position is now known.
 
         Raises:
             InstrumentError: the device restarted. Earlier samples were returned; held ones are in `left`.

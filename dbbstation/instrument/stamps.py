@@ -1,8 +1,8 @@
 """Sample times from the arrival of bytes.
 
 Bytes are received late, never early: line, adapter buffer (16 ms on a common USB chip) and system add delay. A request
-bounds its moment. For a stream, sample number times period is a precise clock, whose offset is the smallest recent
-delay.
+bounds the moment of its sample. In a stream, sample number times period is a precise clock. Its offset is the smallest
+recent delay.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections import deque
 
 
 class MachineTime:
-    """Clock of a virtual machine that waits for its reader: samples are counted."""
+    """Clock that counts samples, for a virtual machine that waits for its reader."""
 
     def __init__(self, period_s: float, begins_s: float) -> None:
         self._period_s = period_s

@@ -1,4 +1,4 @@
-"""From symptoms on the line to likely causes."""
+"""Find likely causes of symptoms on the line."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 SMALLEST_SHARE = 0.5
-"""Share of the bytes that must be readings of an instrument before it is named: more than half cannot be said of two that
-understand different bytes."""
+"""Least share of the bytes that an instrument must decode before it is named. Two instruments that decode different
+bytes cannot both exceed one half."""
 
 
 def looks_like(raw: bytes, other_than: Protocol) -> list[Protocol]:
-    """Return known instruments and profiles that decode some bytes best, the likeliest first."""
+    """Return the known instruments and profiles that decode these bytes best, the likeliest first."""
     found = []
     for name in known_instruments():
         for protocol in load_variants(name):
@@ -45,17 +45,18 @@ def _understood(protocol: Protocol, raw: bytes) -> float:
 _TELLING_BYTES = 12
 
 _MOSTLY = 0.25
-"""Share of characters with a wrong parity above which no noise did it: with another parity set all are wrong, with none half."""
+"""Share of characters with wrong parity above which noise is excluded. If the device has the other parity all
+characters are wrong, without parity half of them."""
 
 _OTHERS = 3
-"""Instruments that a message names: the likeliest."""
+"""Greatest number of likely instruments in a message."""
 
 _SHOWN = 24
-"""Bytes that a message shows; a whole line of any instrument at hand fits."""
+"""Number of bytes in a message, enough for a whole line of each known instrument."""
 
 
 def silence(protocol: Protocol, where: str, waited_s: float, baud: int, *, heard_before: bool) -> InstrumentError:
-    """Return the error of a silent line."""
+    """Return the error for a silent line."""
     if heard_before:
         what = f"the instrument fell silent: nothing for {waited_s:g} s"
         remedy = "is it still switched on, is the cable still plugged in at both ends?"
@@ -72,7 +73,7 @@ def silence(protocol: Protocol, where: str, waited_s: float, baud: int, *, heard
 
 
 def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
-    """Return the error of an unfinished frame."""
+    """Return the error for an unfinished frame."""
     return InstrumentError(
         f"only part of a reply came, then nothing for {waited_s:g} s: {shown(raw)}",
         where=where,
@@ -83,7 +84,7 @@ def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
 def garbage(
     protocol: Protocol, where: str, raw: bytes, why: str, baud: int, *, marked: bool = False
 ) -> InstrumentError:
-    """Return the error of unreadable bytes with the likeliest cause."""
+    """Return the error for unreadable bytes, with the likeliest cause."""
     return InstrumentError(
         f"what comes is not {protocol.label}: {shown(raw)}" + (f" ({why})" if why else ""),
         where=where,
@@ -101,7 +102,7 @@ def begins_well(protocol: Protocol, raw: bytes) -> bool:
 
 
 def shown(raw: bytes) -> str:
-    """Return bytes in hexadecimal, and as text if mostly text."""
+    """Return bytes in hexadecimal, and also as text if most are text."""
     head = raw[:_SHOWN]
     text = head.hex(" ") + (f" … ({len(raw)} bytes)" if len(raw) > _SHOWN else "")
     printable = sum(32 <= byte < 127 for byte in head)  # noqa: PLR2004 (printable ASCII)
@@ -140,9 +141,9 @@ def _cause(protocol: Protocol, raw: bytes, baud: int, *, marked: bool) -> str:
 
 
 def parity_in(raw: bytes) -> str:
-    """Return the parity in the highest bits, or empty.
+    """Return the parity that the highest bits show; empty if none.
 
-    A dozen equal parities occur by chance once in 4096 times; fewer do not count.
+    Twelve equal parities occur by chance once in 4096 times; fewer are ignored.
     """
     even = sum(byte.bit_count() % 2 == 0 for byte in raw)
     if len(raw) < _TELLING_BYTES or 0 < even < len(raw):

@@ -1,4 +1,4 @@
-"""Parts of a frame with a device's own words and error numbers."""
+"""Parts of a frame with a device's messages and error numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _PRINTABLE = b"[\\x20-\\x7e]"
 
 
 class Text(Schema):
-    """The device's own words, appended to the frame's meaning.
+    """The device's message, which is appended to the frame's meaning.
 
     Attributes:
         width: characters; None: 1 to `max_width`.

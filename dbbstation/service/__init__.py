@@ -1,1 +1,1 @@
-"""Services for a screen: sessions, choices, ports, a running sequence and later work."""
+"""Services for a screen: sessions, choices, ports, the running sequence and the evaluation."""

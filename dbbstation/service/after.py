@@ -27,36 +27,36 @@ if TYPE_CHECKING:
 
 
 FILE = "worked-out.json"
-"""Name of the file in a folder of results."""
+"""File that lists finished steps, in the folder of results."""
 
 LARGEST_BYTES = 50_000_000
-"""Largest such file that is read: what the commands answered, some megabytes for a large session."""
+"""Largest list of steps that is read; it contains the commands' answers, some megabytes for a large session."""
 
 
 class DoneStep(BaseModel):
-    """A step that was done."""
+    """A finished step."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     path: str
-    """What it wrote, in the folder of results."""
+    """Its output in the folder of results."""
     passed_s: float
-    """How long it took [s]."""
+    """Its duration [s]."""
     answer: dict[str, object]
-    """What its command printed."""
+    """The answer that its command printed."""
 
 
 class _File(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     key: str
-    """Of what decided it, as `counted` has it."""
+    """Key of the inputs, from `counted`."""
     steps: dict[str, DoneStep]
 
 
 @dataclass(frozen=True)
 class StepsBefore:
-    """What was done with a session as it is now."""
+    """Finished steps of an unchanged session."""
 
     folder: Path
     counted: str
@@ -64,7 +64,7 @@ class StepsBefore:
 
 
 def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
-    """Keep finished steps beside their results, if possible; another screen's steps of the session are kept."""
+    """Write finished steps beside their results, if possible; keep steps of another screen on this session."""
     with suppress(OSError, OutputError):
         before = _kept(folder / FILE)
         if before is not None and before.key == key:
@@ -74,7 +74,7 @@ def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
 
 
 def steps_before(session: Path) -> StepsBefore | None:
-    """Return the last results of an unchanged session, or None."""
+    """Return the last steps of an unchanged session, or None."""
     session = session.absolute()
     kept = sorted(
         session.parent.glob(f"{glob.escape(session.name)}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime
@@ -105,7 +105,7 @@ def _is_result(folder: Path, name: str, step: DoneStep) -> bool:
 
 
 def counted(session: Path) -> str:
-    """Return the key of a session's results: its files and the program.
+    """Return the key of a session's results, which depends on its files and the program.
 
     Raises:
         InputError: faults of the session.
@@ -116,10 +116,10 @@ def counted(session: Path) -> str:
 
 
 USUAL = (SessionTask.CALIBRATE, SessionTask.DIAGNOSE, SessionTask.PROGRAMS, SessionTask.REPORT)
-"""Steps on the session alone: an acceptance also needs one that was measured before."""
+"""Steps that need this session only; an acceptance also needs an earlier session."""
 
 _OF_OTHERS = {SessionTask.ACCEPTANCE, SessionTask.HISTORY}
-"""Steps whose result other sessions change."""
+"""Steps whose result depends on other sessions."""
 
 KINEMATIC, JOINT, PROGRAMS, REPORT = "model.yaml", "joint-model.yaml", "programs", "report.html"
 ACCEPTANCE, FIGURES, HISTORY = "acceptance.html", "circles.pdf", "history.html"
@@ -144,7 +144,7 @@ class Result:
 
 
 class After:
-    """Works on one session step by step; results go into a new folder beside it.
+    """Evaluates one session step by step; a new folder beside it gets the results.
 
     Args:
         model: of an earlier calibration, for comparison until a new one exists; None: none.
@@ -185,7 +185,7 @@ class After:
 
     @property
     def folder(self) -> Path:
-        """Return the results' folder, new with the first step."""
+        """Return the folder of results; the first step makes it."""
         if self._folder is None:
             self._folder = unused_path(self.session.parent, f"{self.session.name}-results")
         return self._folder
@@ -205,7 +205,7 @@ class After:
 
     @property
     def model(self) -> Path | None:
-        """Return the best model: of diagnosis, calibration, or earlier."""
+        """Return the best model: from the diagnosis, else the calibration, else an earlier one."""
         for step in (SessionTask.DIAGNOSE, SessionTask.CALIBRATE):
             if self.results[step].progress is WorkProgress.DONE:
                 return self.results[step].path
@@ -217,7 +217,7 @@ class After:
         return self.busy is None and not lacking.get(step, False)
 
     def accept(self, former: Former) -> None:
-        """Compare with an earlier session; its models are copied first.
+        """Choose an earlier session for the comparison and copy its models.
 
         Raises:
             OutputError: a copy cannot be written.
@@ -230,7 +230,7 @@ class After:
         self.do(SessionTask.ACCEPTANCE)
 
     def do(self, *steps: SessionTask) -> None:
-        """Do steps in order; failing or cancelling ends the row."""
+        """Do steps in order; a failed or cancelled step ends the series."""
         if self.busy is None:
             self._waiting = list(steps)
             self._next()
@@ -242,7 +242,7 @@ class After:
             self._running[1].cancel()
 
     def look(self) -> None:
-        """Take in progress and begin the next step."""
+        """Read the progress and begin the next step."""
         if self._running is None:
             return
         step, work = self._running

@@ -1,4 +1,4 @@
-"""The bar on its calibrator: live readings, averaged on request."""
+"""Live readings of the bar on its calibrator, averaged on request."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _TICK_S = 0.05
 
 @dataclass(frozen=True)
 class Stated:
-    """Stated facts of bar and calibrator."""
+    """Facts of bar and calibrator that the operator states."""
 
     serial_number: str
     calibrator: str
@@ -39,7 +39,7 @@ class Stated:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """What was found.
+    """Result of the calibration.
 
     Attributes:
         long_um: excess of the bar's reading.
@@ -53,7 +53,7 @@ class Calibrated:
 
 
 class BarCalibration:
-    """Borrows the instrument while the bar is on its calibrator; close it in any case.
+    """Uses the instrument while the bar is on its calibrator; it must be closed in any case.
 
     Attributes:
         latest: None before a reading.

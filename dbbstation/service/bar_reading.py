@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.trace.steady import Steady
 
 DRIFT = 2.0
-"""A drift that is greater than the expanded uncertainty (k = 2) matters."""
+"""Drift that is reported, in standard uncertainties: more than the expanded uncertainty (k = 2)."""
 
 
 def read_on_calibrator(
@@ -29,7 +29,7 @@ def read_on_calibrator(
     resolution_um: float | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Steady:
-    """Return the mean of good readings, without impossible ones of a resting bar.
+    """Return the mean of good readings, without readings that a resting bar cannot have.
 
     Args:
         resolution_um: display step; None: estimated from the readings.
@@ -56,7 +56,7 @@ def read_on_calibrator(
 def bar_file(
     found: Steady, of_bar: Mapping[str, object], calibrator: Mapping[str, object], instrument: str, now: datetime
 ) -> BarFile:
-    """Return the calibration as a file.
+    """Return the content of the bar's calibration file.
 
     Args:
         of_bar: serial number, temperature with uncertainty, expansion, as in `BarFile`.

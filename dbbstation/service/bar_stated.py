@@ -1,4 +1,4 @@
-"""Check typed facts of a bar and its calibrator."""
+"""Check the facts of a bar and its calibrator that the operator typed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ if TYPE_CHECKING:
     from dbbstation.files.yaml.schema import Schema
 
 USUAL_INTERVAL_YEARS = 3.0
-"""Laboratories calibrate gauge blocks anew every one to three years [ISO 3650 leaves it to the user]; older ones are asked about."""
+"""Age above which a calibration is questioned. Laboratories recalibrate gauge blocks every one to three years [ISO 3650
+leaves the interval to the user]."""
 
 _RANGES: dict[str, tuple[type[Schema], str]] = {
     "calibrator_mm": (CalibratorSchema, "length_mm"),
     "calibrator_u_um": (CalibratorSchema, "uncertainty_um"),
     "temp_c": (BarFile, "temp_c"),
 }
-"""Where the format of a bar's calibration has the range of a number."""
+"""Format and key that define the range of each number."""
 
 _DAYS_PER_YEAR = 365.25
 

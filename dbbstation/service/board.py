@@ -1,4 +1,4 @@
-"""Events folded into the state that a screen draws."""
+"""Collect events into the state that a screen draws."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MESSAGES = 50
 
 
 class Mark(StrEnum):
-    """State of a planned run; its text is beside the sign."""
+    """State of a planned run, as the text beside its sign."""
 
     OPEN = "open"
     NEXT = "next"
@@ -41,7 +41,7 @@ class Mark(StrEnum):
 
 
 class RunDecision(StrEnum):
-    """Decision on a recorded run; its text is shown."""
+    """Decision on a recorded run, as the shown text."""
 
     NONE = ""
     ACCEPTED = "accepted"
@@ -68,12 +68,12 @@ _RUN_MARKS = {
     State.COMPLETE: Mark.COMPLETE,
     State.FLAWED: Mark.FLAWED,
 }
-"""How the announced run stands in each state."""
+"""Mark of the announced run in each state."""
 
 
 @dataclass
 class Board:
-    """The state that is drawn.
+    """The state that the screen draws.
 
     Attributes:
         lost: samples lost in the latest run.
@@ -117,13 +117,13 @@ class Board:
 
     @property
     def circle(self) -> Circle | None:
-        """Return the circle of the traces, else the announced one, or None."""
+        """Return the circle of the traces, else the announced circle, or None."""
         announced = self.announced.circle if self.announced else None
         return next((trace.circle for trace in self.traces.values()), announced)
 
     @property
     def views(self) -> dict[View, Mapping[Direction, LiveTrace | Derived]]:
-        """Return the possible views: measured always, others once complete and not during a circle."""
+        """Return the possible views: always the measured one; others if a circle is complete and none is running."""
         views: dict[View, Mapping[Direction, LiveTrace | Derived]] = {View.MEASURED: self.traces}
         if self.state in RECORDING:
             return views
@@ -136,7 +136,7 @@ class Board:
 
     @property
     def beneath(self) -> dict[View, Mapping[Direction, LiveTrace | Derived]]:
-        """Return the session before in the drawn directions, for the same test and no difference."""
+        """Return the former session's traces in the drawn directions, if they are of the same test and no difference is drawn."""
         views = self.views
         mine = {way: one for way, one in self.last.items() if one.run.test == self.test}
         return {
@@ -150,7 +150,7 @@ class Board:
 
     @property
     def test(self) -> str:
-        """Return the test of the traces, else the announced one; may be empty."""
+        """Return the test of the traces, else the announced test; may be empty."""
         announced = self.announced.run.test if self.announced else ""
         return next((trace.run.test for trace in self.traces.values()), announced)
 
@@ -183,7 +183,7 @@ class Board:
         return standing[-1] if standing else None
 
     def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901, PLR0912 - a line per event, nothing nested
-        """Take an event."""
+        """Process an event."""
         message = message_of(event)
         if message is not None:
             self.messages.append(message)

@@ -1,4 +1,4 @@
-"""Files to choose: machines, plans and bar calibrations of working folder and package."""
+"""Machines, plans and bar calibrations to choose from, in the working folder and the package."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class CandidateFormat(StrEnum):
-    """Formats to choose from, by the begin of their `format` key."""
+    """Formats to choose from; the value is the begin of their `format` key."""
 
     MACHINE = "dbb-machine/"
     PLAN = "dbb-plan/"
@@ -24,10 +24,10 @@ class CandidateFormat(StrEnum):
 
 
 DEPTH = 2
-"""Folders below the working folder that are looked into."""
+"""Depth of folders below the working folder that are searched."""
 
 _HEAD = 4096
-"""Bytes of a file within which its format is stated: behind the comments at its top."""
+"""Number of bytes at a file's begin that contain its format, behind the comments at its top."""
 
 _SHIPPED = {
     CandidateFormat.MACHINE: ("fixtures", "machines/reference.yaml"),
@@ -37,7 +37,7 @@ _SHIPPED = {
 
 
 def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
-    """Return files of a format, those under a folder first, without session copies."""
+    """Return the files of a format, first those in a folder; copies in sessions are left out."""
     own = [path for path in _files(under, DEPTH) if _is(kind, path)]
     if not shipped or kind not in _SHIPPED:
         return tuple(own)

@@ -1,4 +1,4 @@
-"""A chosen measurement, its missing parts, and the checked job."""
+"""The choice of a measurement, its missing parts, and the checked job."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from dbbstation.station.programs import RunProgram
 
 PROGRAMS = "programs"
-"""Folder of a session in which its NC programs are."""
+"""Folder of a session that contains its NC programs."""
 
 
 class SetUpPart(StrEnum):
@@ -74,7 +74,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Choice:
-    """A session to make or continue.
+    """The choices for a session to make or continue.
 
     Attributes:
         machine: nominal; None: not chosen, or the session's own.
@@ -117,7 +117,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A choice, read and checked.
+    """A choice whose files were read and checked.
 
     Attributes:
         height_and_drift: correlation of test height with a steady drift, 0 to 1.
@@ -134,12 +134,12 @@ class Prepared:
 
     @property
     def mixes_drift(self) -> bool:
-        """Return whether drift and height could be confused."""
+        """Return whether drift could look like an effect of height."""
         return self.height_and_drift > LARGEST_LEAK
 
 
 def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel | None = None) -> Prepared:
-    """Read the choice and dry-run it without opening or writing.
+    """Read the choice and make a dry run, without opening the instrument or writing files.
 
     Args:
         model: for judging circles; None: the nominal machine.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class InForce:
-    """The programs of a session's accepted circles.
+    """Programs that commanded a session's accepted circles.
 
     Attributes:
         programs: folder of program copies; None for plain circles.
@@ -39,7 +39,7 @@ class InForce:
 
 @dataclass(frozen=True)
 class Former:
-    """A session measured before."""
+    """An earlier session."""
 
     folder: Path
     measured: datetime
@@ -48,7 +48,7 @@ class Former:
 
 @dataclass(frozen=True)
 class BeforeAndNow:
-    """Sessions that an acceptance can compare.
+    """This session, and the earlier sessions that an acceptance can compare it with.
 
     Attributes:
         formers: the last first.
@@ -59,7 +59,7 @@ class BeforeAndNow:
 
 
 def before_and_now(folder: Path) -> BeforeAndNow:
-    """Return comparable sessions beside this one, as `former_sessions`.
+    """Return this session and the comparable sessions beside it.
 
     Raises:
         InputError: the session cannot be read.
@@ -72,7 +72,7 @@ def before_and_now(folder: Path) -> BeforeAndNow:
 
 
 def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
-    """Return what commanded a session's accepted circles."""
+    """Return the programs that commanded a session's accepted circles."""
     runs = session.in_state(RunState.ACCEPTED)
     programs = [run.program for run in runs if run.program is not None]
     used = sorted({program.model_sha256 for program in programs if program.model_sha256})

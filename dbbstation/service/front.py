@@ -1,4 +1,4 @@
-"""The station's front desk: sessions, choices, ports; opens and closes jobs."""
+"""The station's entry point: it lists sessions, choices and ports, and opens and closes jobs."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
-    """Return instrument and port for an existing session."""
+    """Return instrument and port to continue an existing session."""
     try:
         session = read_session(folder)
     except InputError:  # what is wrong with it is said where it is opened
@@ -57,10 +57,10 @@ def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
 
 
 SEED = 3
-"""Of the virtual machine's errors: the same machine every time, so that a session can be gone on with."""
+"""Seed of the virtual machine's errors: always the same machine, so that a session can be continued."""
 
 USUAL_VIRTUAL = "streaming-encoder"
-"""Instrument of a virtual machine where none was chosen."""
+"""Instrument of a virtual machine if none was chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ class Front:
         return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
 
     def probe(self, line: Line) -> ProbeOutcome:
-        """Return the answer at a port; takes seconds."""
+        """Return the answer of the instrument at a port; this takes seconds."""
         if line.virtual:
             return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
@@ -162,7 +162,7 @@ class Front:
         return probe(protocol, line.port, line.baud)
 
     def hold(self, protocol: Protocol, line: Line) -> HeldLine | None:
-        """Return the instrument, kept open until another is asked for; None if virtual."""
+        """Return the instrument, which stays open until another is requested; None if virtual."""
         return None if line.virtual else self._held.line(protocol, line.port, line.baud)
 
     def release(self) -> None:
@@ -210,7 +210,7 @@ class Front:
             work.close()
 
     def bar_calibration(self, line: Line, values: Mapping[str, str]) -> BarCalibration:
-        """Begin to read the bar on its calibrator; close it in any case.
+        """Begin to read the bar on its calibrator; the result must be closed in any case.
 
         Args:
             values: as in `stated_bar`; a relative instrument shows zero at the calibrator's length.
@@ -326,7 +326,7 @@ class Front:
 
 
 class NoNumberError(ValueError):
-    """A text that should be a number."""
+    """A text that should be a number, but is not."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name, self.text = name, text

@@ -1,4 +1,4 @@
-"""An instrument that stays open for checklist, bar and circles."""
+"""An instrument that stays open for the checklist, the bar and the circles."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from dbbstation.station.events import Sample
 
 _TICK_S = 0.05
-"""Between looks at an instrument that nobody else reads: as often as a display can be read [s]."""
+"""Interval of readings while no other part reads the instrument [s]: as often as a person can read a display."""
 
 AGAIN_S = 2.0
-"""An instrument that does not answer is opened again after so long [s]."""
+"""Time after which an instrument without an answer is opened again [s]."""
 
 _KEPT = 4096
-"""Samples kept for whoever looks: more than a second of the quickest instrument, so that its rate can be told."""
+"""Number of kept samples: more than a second of the fastest instrument, so that its rate can be computed."""
 
 _JOIN_S = 10.0
-"""A serial line that hangs in the operating system is waited for so long [s]."""
+"""Longest wait for a serial line that hangs in the operating system [s]."""
 
 
 class HeldLine:
-    """Owns an instrument until it is closed.
+    """Keeps an instrument open until it is closed.
 
     Attributes:
         latest: None before a reading and during failure.
@@ -66,7 +66,7 @@ class HeldLine:
         self._thread.start()
 
     def is_of(self, protocol: Protocol, port: str, baud: int | None) -> bool:
-        """Return whether it is this instrument at this port."""
+        """Return whether the held instrument is this one at this port."""
         return (protocol, port, baud) == (self.protocol, self._port, self._baud)
 
     @contextmanager
@@ -131,7 +131,7 @@ class HeldOpen:
         self._line: HeldLine | None = None
 
     def line(self, protocol: Protocol, port: str, baud: int | None) -> HeldLine:
-        """Return the instrument, after closing another one."""
+        """Return the instrument, and close another one first."""
         if self._line is None or not self._line.is_of(protocol, port, baud):
             self.release()
             self._line = HeldLine(protocol, port, baud)

@@ -1,4 +1,4 @@
-"""Tasks on a measured session, in a form for another process."""
+"""Tasks on a measured session, as data for another process."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ class SessionJob(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     task: SessionTask
-    """What is to be done."""
+    """The task."""
     beside: Path
-    """Folder in which the shop's settings are looked for."""
+    """Folder that may contain the shop's settings."""
     out: str
-    """Name of what is written, in the folder of results."""
+    """Name of the output in the folder of results."""
     session: Path | None = None
     """Folder of the session; programs need none."""
     before: Path | None = None
-    """Session that an acceptance holds it against."""
+    """Earlier session for the comparison of an acceptance."""
     model: Path | None = None
-    """Model to compensate with, or to put beside; None: nominal programs, or no model."""
+    """Model for compensation or comparison; None: nominal programs, or no model."""
     plan: Path | None = None
     """Plan of the programs."""
     machine: Path | None = None
     """Machine of the programs."""
     settings: Path | None = None
-    """File of the shop's settings where one was named."""
+    """File of the shop's settings, if one was named."""
     tolerances: Path | None = None
-    """Settings with the tolerances of an operator's job, in place of the shop's."""
+    """Settings with the tolerances of an operator's job, which replace the shop's."""
     place: str = ""
-    """Where was measured, for a certificate."""
+    """Place of the measurement, for a certificate."""
     force: bool = True
-    """Whether what is there already is written over: the folder of results is the program's own."""
+    """Whether existing files are replaced: only the program writes into the folder of results."""

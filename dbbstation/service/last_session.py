@@ -1,4 +1,4 @@
-"""Circles of the last session of the same machine and plan, drawn under the present ones."""
+"""Circles of the last session of the same machine and plan, which are drawn beneath the present circles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
-    """Return a test's last accepted circles in the session before, by direction; may be empty.
+    """Return a test's last accepted circles in the former session, by direction; may be empty.
 
     Raises:
         InputError: the present session cannot be read.

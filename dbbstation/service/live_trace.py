@@ -1,4 +1,4 @@
-"""Drawn traces of a test, with bounded points: measured, centred, and the directions' difference."""
+"""Traces of a test with a limited number of points: measured, centred, and the difference of the directions."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _FIRST_ROOM = 4096
 _TURN_DEG = 360.0
 
 STEP_DEG = 0.05
-"""Of the samples within such a step of the travel the least and the greatest are kept: a tenth of a dot of the largest
-screen. A turn has at most three points a step then, whatever the sampling rate [deg]."""
+"""Step of the travel in which the least and greatest sample are kept [deg]: a tenth of a dot of the largest screen. A
+turn then has at most three points per step at any sampling rate."""
 
 
 class View(StrEnum):
-    """Views of a test; the text is shown."""
+    """Views of a test; the value is the shown text."""
 
     MEASURED = "as measured"
     CENTRED = "centred"
@@ -50,7 +50,7 @@ class LiveTrace:
 
     @classmethod
     def of(cls, run: RunId, turn: RawCircle) -> LiveTrace:
-        """Return the trace of a recorded turn, with all samples, centred too."""
+        """Return the trace of a recorded turn with all samples, which can be centred."""
         trace = cls(run, turn.circle)
         deviation_um = 1e3 * (turn.length_mm - turn.circle.bar_mm)
         trace._append(turn.circle.theta_deg(turn.phi_deg), deviation_um)
@@ -68,11 +68,11 @@ class LiveTrace:
 
     @property
     def deviation_um(self) -> Floats:
-        """Return bar length minus nominal, shape (n,) [µm]; NaN breaks the line."""
+        """Return bar length minus nominal length, shape (n,) [µm]; NaN breaks the line."""
         return self._data[1, : self._count]
 
     def centre(self) -> None:
-        """Subtract the least-squares circle, for a scale of the form."""
+        """Subtract the least-squares circle, so that the scale shows the form."""
         known = np.isfinite(self.deviation_um)
         height_mm = self.circle.bar_mm * np.sin(np.radians(self.circle.elevation_deg))
         radius_mm = np.sqrt((self.circle.bar_mm + self.deviation_um[known] / 1e3) ** 2 - height_mm**2)
@@ -135,7 +135,7 @@ class LiveTrace:
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """A complete trace less its circle or the other direction.
+    """A complete trace minus its circle or minus the other direction.
 
     Attributes:
         deviation_um: shape (n,); NaN breaks the line.

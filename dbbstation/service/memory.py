@@ -14,17 +14,17 @@ from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.gateway import content_of
 
 FILE = "station.json"
-"""Name of the file in the user's folder for states."""
+"""Name of the memory's file in the user's state folder."""
 
 LARGEST_BYTES = 1_000_000
-"""Largest such file that is read: twenty sessions and their lines take some kilobytes."""
+"""Largest file that is read: twenty sessions and their lines need some kilobytes."""
 
 MOST = 20
-"""Sessions that are remembered: more than anybody looks through."""
+"""Number of remembered sessions."""
 
 
 class Line(BaseModel):
-    """Port of an instrument."""
+    """An instrument and its port."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -33,11 +33,11 @@ class Line(BaseModel):
     profile: str = ""
     """Variant of the instrument; empty: the usual one."""
     port: str = ""
-    """Name or URL of the port; or that of a virtual machine in this program."""
+    """Name or URL of the port, or the name for a virtual machine in this program."""
     baud: int | None = None
-    """Baud rate where it is not the usual one."""
+    """Baud rate if it is not the usual one."""
     zero_mm: float | None = None
-    """Where a relative instrument shows zero [mm]."""
+    """Length at which a relative instrument shows zero [mm]."""
 
     @property
     def virtual(self) -> bool:
@@ -46,12 +46,12 @@ class Line(BaseModel):
 
     @property
     def time_scale(self) -> float:
-        """Return its speed relative to real time."""
+        """Return the virtual machine's speed relative to real time."""
         return time_scale_of(self.port) or 1.0
 
 
 VIRTUAL = (virtual_port(), virtual_port(10.0))
-"""What is offered where the name of a port stands, to try everything without hardware."""
+"""Choice in the list of ports that needs no hardware."""
 
 _NO_LINE = Line()
 
@@ -79,11 +79,11 @@ class Remembered:
     sessions: tuple[tuple[Path, Line], ...] = ()
 
     def line_of(self, folder: Path) -> Line:
-        """Return a session's remembered instrument, else the last choice."""
+        """Return a session's remembered instrument, else the last chosen one."""
         return dict(self.sessions).get(folder.absolute(), self.line)
 
     def with_session(self, folder: Path, line: Line) -> Remembered:
-        """Return the memory with a session just opened; a virtual line stays with its session."""
+        """Return the memory with a newly opened session. A virtual line is remembered for its session only."""
         folder = folder.absolute()
         others = [(other, by) for other, by in self.sessions if other != folder]
         last = self.line if line.virtual else line
@@ -106,7 +106,7 @@ class Memory:
         return self._path
 
     def read(self) -> Remembered:
-        """Return the last choices; none if missing or unreadable."""
+        """Return the last choices; empty if the file is missing or unreadable."""
         try:
             file = _File.model_validate_json(content_of(self.path, LARGEST_BYTES))
         except (OSError, ValidationError):

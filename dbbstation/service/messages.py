@@ -18,7 +18,7 @@ class Weight(StrEnum):
 
 @dataclass(frozen=True)
 class Message:
-    """Something to be read."""
+    """A message for the operator."""
 
     weight: Weight
     text: str
@@ -58,5 +58,5 @@ def message_of(event: object) -> Message | None:  # noqa: C901, PLR0911 - a line
 
 
 def problem_alone(completed: events.RunCompleted) -> str:
-    """Return a run's problem without its name."""
+    """Return a run's problem without the run's name."""
     return completed.problem.removeprefix(f"{completed.run.label}: ")

@@ -1,4 +1,4 @@
-"""Open the session for each sequence, with an instrument that stays open."""
+"""Open the session again for each sequence, while the instrument stays open."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> Opener:
-    """Return a function that borrows the instrument and opens the session anew."""
+    """Return a function that borrows the instrument and opens the session again."""
 
     @contextmanager
     def opened() -> Iterator[OpenStation]:

@@ -40,18 +40,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Operated:
-    """A job and its file."""
+    """An operator's job and its file."""
 
     path: Path
     job: JobFile
 
     @property
     def sessions(self) -> Path:
-        """Return the folder of its sessions."""
+        """Return the folder of the job's sessions."""
         return self._beside(self.job.sessions)
 
     def choice(self, *, anew: bool = False) -> Choice:
-        """Return what to measure: the last session if incomplete with the same plan and not `anew`, else a new one."""
+        """Return what to measure: the last session if it is incomplete and has the same plan, else a new one; with `anew` always a new one."""
         job = self.job
         line = Line(instrument=instrument_of(self.path, job), profile=job.profile, port=job.port, baud=job.baud)
         return Choice(
@@ -67,7 +67,7 @@ class Operated:
         )
 
     def tolerances_file(self, session: Path) -> Path:
-        """Write the job's tolerances as settings beside a session, and note in it that they changed; return the file.
+        """Write the job's tolerances as settings beside a session, note a change in the session, and return the file.
 
         Raises:
             OutputError: it cannot be written.
@@ -88,7 +88,7 @@ class Operated:
         return self._beside(self.job.model) if self.job.model else None
 
     def left_long_ago(self, choice: Choice) -> bool:
-        """Return whether the session to go on with was last written before this shift."""
+        """Return whether the session to continue was last written before this shift."""
         if choice.folder is None or not choice.goes_on:
             return False
         return time.time() - (choice.folder / SESSION_FILE).stat().st_mtime > SHIFT_S
@@ -114,7 +114,7 @@ class Operated:
 
 @dataclass(frozen=True)
 class Answered:
-    """The answer on a session.
+    """The answer of a job on a session.
 
     Attributes:
         report: None if none was made.
@@ -127,7 +127,7 @@ class Answered:
 
 
 class JobAnswer:
-    """Judges circles by the job's tolerances with a report.
+    """Makes a report that judges circles by the job's tolerances.
 
     Args:
         missing: planned runs without accepted recording, in words.
@@ -148,7 +148,7 @@ class JobAnswer:
         self._after.do(SessionTask.REPORT)
 
     def look(self) -> Answered | None:
-        """Return the answer; None until known."""
+        """Return the answer; None until it is known."""
         self._after.look()
         result = self._after.results[SessionTask.REPORT]
         if result.progress in {None, WorkProgress.RUNNING}:
@@ -170,7 +170,7 @@ def answer_of(
     report: Path | None,
     trouble: str = "",
 ) -> Answered:
-    """Return the answer of a report, which is complete only with every planned run."""
+    """Return the answer of a report; it is complete only if every planned run is accepted."""
     verdict = answer.verdict
     kinds = {str(one): one for one in Conformity}
     word = kinds.get(verdict.kind, Conformity.UNDECIDED)

@@ -20,14 +20,14 @@ class Order(StrEnum):
     HOLDER = "holder"
     """By holder and ball, each put up once."""
     DRIFT = "drift"
-    """Heights in turn, so that a drift does not look like an effect of height."""
+    """Mixed heights, so that a drift does not look like an effect of height."""
 
 
 class Gate(StrEnum):
     """Tests repeated at the end, which show the drift."""
 
     PLAN = "plan"
-    """What the plan names in `repeat_at_end`."""
+    """The tests that the plan names in `repeat_at_end`."""
     FIRST = "first"
     """The first test."""
     HOLDERS = "holders"

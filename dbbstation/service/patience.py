@@ -5,18 +5,20 @@ from __future__ import annotations
 from typing import TypedDict
 
 RECONNECT_S = 30.0
-"""How long a measurement waits for an adapter whose cable was pulled out: time to see it and to put it back [s]."""
+"""Time that a measurement waits for an unplugged adapter, so that a person can notice and reconnect it [s]."""
 
 _MEMORY_S = 2.0
-"""How long the driver remembers the quickest arrival of samples; longer, the instrument's clock would drift [s]."""
+"""Time for which the driver remembers the fastest arrival of samples [s]; in a longer time the instrument's clock
+drifts."""
 
 _SCALED_MEMORY_S, _SCALED_TIMEOUT_S = 60.0, 5.0
-"""On scaled time a moment in which the computer attends to something else is long: the driver then remembers the quickest
-arrival of samples for this long, and waits this long for a line that is silent [s of real time]."""
+"""Memory of the fastest arrival and patience with a silent line on scaled time [s of real time]. On scaled time a short
+pause of the computer is a long time."""
 
 
 _WAITING_TIMEOUT_S = 600.0
-"""A machine that waits is silent while runs are judged; where its program ends, the line is closed and nobody waits [s]."""
+"""Patience with a machine that waits [s]: it is silent while runs are judged. If its program ends, the line closes at
+once."""
 
 
 class DriverPatience(TypedDict):

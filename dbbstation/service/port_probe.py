@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
 PATIENCE_S = 4.0
-"""So long is waited for a reading: a display answers in a tenth of a second, a stream sends by itself [s]."""
+"""Longest wait for a reading [s]: a display answers within a tenth of a second, and a stream needs no request."""
 
 _LOOK_S = 0.02
 
 
 @dataclass(frozen=True)
 class ProbeOutcome:
-    """What came from a port.
+    """The answer at a port.
 
     Attributes:
         text: reading, status, or fault with remedy.

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from dbbstation.station.events import Sample
 
 _WINDOW_S = 2.0
-"""Long enough for an instrument of a few readings per second, short enough to follow a change [s]."""
+"""Time over which readings are counted [s]: enough for a few readings per second, and short enough to follow a
+change."""
 
 _FEWEST = 3
 

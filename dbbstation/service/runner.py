@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.station.schedule import Schedule
 
 _JOIN_S = 10.0
-"""A serial line that hangs in the operating system is waited for so long when the screen closes [s]."""
+"""Longest wait for a hanging serial line when the screen closes [s]."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class OpenStation:
 
 
 Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
-"""Borrows the instrument and opens the session; called again when a line that failed is connected again."""
+"""Function that borrows the instrument and opens the session. It is called again when a failed line is connected
+again."""
 
 
 class Runner:

@@ -27,7 +27,7 @@ class BarAtFeedIn:
 
 
 def seat(length_mm: float, circle: Circle) -> BarAtFeedIn:
-    """Return the bar's position at the feed-in point of the next circle."""
+    """Return the bar's position relative to the feed-in point of the next circle."""
     long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)
     margin_mm = (0.5 - HYSTERESIS) * circle.feed_in_mm
     return BarAtFeedIn(long_mm, abs(long_mm) < margin_mm, abs(long_mm + 2.0 * circle.feed_in_mm) < margin_mm)

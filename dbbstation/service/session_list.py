@@ -42,7 +42,7 @@ class SessionLine:
 
     @property
     def complete(self) -> bool:
-        """Return whether nothing is left to measure."""
+        """Return whether every planned run is accepted."""
         return not self.problem and self.accepted == self.planned
 
 
@@ -72,5 +72,5 @@ def _line(folder: Path, changed: datetime) -> SessionLine:
 
 
 def schedule_of(session: SessionFolder) -> Schedule:
-    """Return done and left runs of a session, read only."""
+    """Return finished and remaining runs of a session, without writing."""
     return Schedule(session.plan, lambda _test, _direction: 1, session.runs)

@@ -1,4 +1,4 @@
-"""The shop's temperature, typed and noted."""
+"""Read the shop's temperature from a typed text and note it in the session."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def shop_degc(text: str) -> float | None:
 
 
 def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
-    """Note a text or the shop's temperature [degC] in a session without running sequence, which takes an `AddNote`.
+    """Note a text or the shop's temperature [degC] in a session without a running sequence; a running one needs `AddNote`.
 
     Raises:
         InputError: the session has faults.

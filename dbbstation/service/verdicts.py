@@ -1,4 +1,4 @@
-"""Change verdicts of a session after its sequence."""
+"""Change verdicts on runs after the sequence has ended."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.station.commands import Judge
 
 PATIENCE_S = 5.0
-"""The sequence that has just ended lets go of the session within so long [s]."""
+"""Time within which an ended sequence releases the session [s]."""
 
 
 def give_verdict(folder: Path, command: Judge) -> None:

@@ -41,7 +41,7 @@ class Helper:
         self._announced: events.RunAnnounced | None = None
 
     def __call__(self, event: events.Event) -> None:
-        """Do the event's request.
+        """Do what the event requests.
 
         Raises:
             MachineError: the machine refuses.

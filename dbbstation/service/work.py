@@ -1,4 +1,4 @@
-"""Long work in a process that can be ended; its outputs are whole or absent."""
+"""Long work in a process that can be ended; its outputs are complete or absent."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from dbbstation.service.job import SessionJob
 
 WORKER = "dbbstation.service.worker"
-"""Module that the process runs. The station never loads it: it knows what is computed."""
+"""Module that the process runs. The station never imports it, since it imports all computations."""
 
 STAGE_MARK = "stage: "
-"""How the process begins a line that names a stage of its work."""
+"""First characters of a line that names a stage of the work."""
 
 LOG_MARK = "log: "
-"""How it begins a line for the log."""
+"""First characters of a line for the log."""
 
 _LOG = logging.getLogger(__name__)
 
 _POLITE_S = 3.0
-"""Work that was asked to end has so long before it is ended [s]."""
+"""Time between the request to end and the forced end of the process [s]."""
 
 
 class WorkProgress(StrEnum):

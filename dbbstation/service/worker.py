@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
 
 FAILED, INTERRUPTED = 1, 130
-"""Codes that it leaves with: the work failed, with the reason on standard error; it was asked to end."""
+"""Exit codes: the work failed, with the reason on standard error; the work was interrupted."""
 
 _LOG = logging.getLogger(__name__)
 

@@ -1,1 +1,1 @@
-"""The sequence of a measurement without a screen: a table of states, and events."""
+"""The sequence of a measurement, independent of a screen: a table of states, and events."""

@@ -1,4 +1,4 @@
-"""Assemble a station: plan, session folder, storage and sequencer about one instrument."""
+"""Assemble a station: plan, session folder, storage and sequencer for one instrument."""
 
 from __future__ import annotations
 
@@ -120,12 +120,12 @@ def _on_turn(raw: RawCircle) -> tuple[Sample, ...]:
 
 
 MOST_SHOWN = 3600
-"""Samples of a turn that are drawn again, about: ten for each degree."""
+"""Approximate number of samples of a turn that are redrawn: ten for each degree."""
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What is measured, on what, into what.
+    """A measurement: machine, plan and session folder.
 
     Attributes:
         plan: jig inlined.
@@ -179,10 +179,10 @@ class Job:
 
 
 BYTES_PER_READING = 100
-"""A row of a run file, and the same again for its journal and copies."""
+"""Size of a row of a run file, with the same size for its journal and copies [bytes]."""
 
 LEAST_FREE = 50e6
-"""Room for everything beside the readings: session file, log, report [bytes]."""
+"""Space for session file, log and report, in addition to the readings [bytes]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +196,7 @@ class Workplace:
     _storage: Storage
 
     def close(self) -> None:
-        """Sync everything to disk and let others write."""
+        """Write everything to the disk and unlock the session for other programs."""
         try:
             self._storage.close()
         finally:
@@ -206,7 +206,7 @@ class Workplace:
 def assemble(
     job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[str, int]] = dict, *, asked: bool = False
 ) -> Workplace:
-    """Open the session and build the station; storage is its first observer.
+    """Open the session and build the station. Storage is the station's first observer.
 
     Args:
         unreadable: rejected bytes so far, by fault.

@@ -1,4 +1,4 @@
-"""Mount, start and accept runs in place of a person, for virtual machines and tests."""
+"""Mount, start and accept runs without a person, for virtual machines and tests."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from dbbstation.station.commands import Command
 
 MOST_REPEATS = 2
-"""Times that a run without a usable circle is measured again; what fails three times fails for a reason."""
+"""Greatest number of repetitions of a run without a usable circle: a third failure has a cause."""
 
 
 class Hands(Protocol):
-    """What moves the machine."""
+    """Interface that moves the machine and mounts balls."""
 
     def stands_since_s(self) -> float:
-        """Return the machine time since which it has stood [s]; minus infinity if it does not wait."""
+        """Return the machine time at which the machine stopped to wait [s]; minus infinity if it never waits."""
 
     def standing(self) -> str | None:
         """Return the name of the mounted ball."""
@@ -32,7 +32,7 @@ class Hands(Protocol):
         """Put up the ball of a test."""
 
     def start(self, test: str, direction: Direction, program: str) -> None:
-        """Start a circle, by its NC program where one is named."""
+        """Start a circle, by its NC program if one is named."""
 
 
 class Autopilot:

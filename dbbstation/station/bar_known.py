@@ -1,4 +1,4 @@
-"""Check that the bar's length is known well enough, because places on a plate need an absolute length."""
+"""Check that the bar's length is known well enough, because balls at known positions need an absolute length."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
 
 USUAL_AGE_H = 24.0
-"""Age of a calibration beyond which it is stale, where the shop sets no other [h]. A bar is put down, carried and warmed by hands every
-day, and a display is switched off over night and preset again: one day has one of each at the most."""
+"""Usual age beyond which a calibration is stale [h]. Every day a bar is carried and warmed by hands, and a display is
+switched off and preset again. One day limits this to one time."""
 
 _REMEDY = (
     "put it on its calibrator: `dbbstation bar`, then --bar FILE; or say with --bar-waiver TEXT why it is done without"
@@ -23,10 +23,10 @@ _REMEDY = (
 
 
 def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: float = USUAL_AGE_H) -> None:
-    """Refuse a calibrator whose certificate does not hold, and for balls at known places an unknown or stale length of the bar.
+    """Refuse a calibrator with an invalid certificate. For balls at known positions, also refuse an unknown or stale bar length.
 
-    An error of the bar's length is an error of the machine's scale. Balls under the spindle and circularity alone need no
-    length.
+    An error of the bar's length becomes an error of the machine's scale. Balls under the spindle, and circularity
+    alone, need no length.
 
     Args:
         largest_age_h: beyond which a calibration is stale.

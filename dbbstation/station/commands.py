@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Start:
-    """The ball stands and the bar is in: wait for the feed-in.
+    """Ball and bar are in place: wait for the feed-in.
 
     Attributes:
-        remounted: the holder was touched without being asked for, so the run gets a new mounting.
+        remounted: the holder was touched although the program did not ask for it, so the run gets a new mounting.
         after_s: earlier readings, by machine time, do not count.
     """
 
@@ -40,7 +40,7 @@ class Accept:
 
 @dataclass(frozen=True)
 class Repeat:
-    """Measure the run again; it does not count.
+    """Discard this run and measure it again.
 
     Attributes:
         reason: empty: the finding, else the operator's wish.
@@ -52,24 +52,24 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Reject:
-    """Reject the run and go on. The end names tests without an accepted run."""
+    """Reject the run and continue. The end of the sequence names tests without an accepted run."""
 
     reason: str = ""
 
 
 @dataclass(frozen=True)
 class Skip:
-    """Leave the announced run out for now."""
+    """Skip the announced run for now."""
 
 
 @dataclass(frozen=True)
 class Quit:
-    """Stop here; a running recording is kept, and the session can be continued."""
+    """Stop the sequence. A running recording is kept, and the session can be continued."""
 
 
 @dataclass(frozen=True)
 class GoTo:
-    """Measure another test next, also one skipped or done; then go on from there.
+    """Measure another test next, even a skipped or finished test; then continue from there.
 
     Attributes:
         direction: None: whichever is left.

@@ -1,4 +1,4 @@
-"""Begin and end of a circle in the readings, since no control tells a ball bar when it moves."""
+"""Detect begin and end of a circle in the readings, since no control reports its motion to a ball bar."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
 
 AGREEING = 3
-"""Readings in a row on one side before a side counts: one misread line is no movement."""
+"""Number of successive readings on one side before the side counts, so that one misread line is no movement."""
 
 HYSTERESIS = 0.1
-"""Share of the feed-in about its middle where neither side is meant."""
+"""Share of the feed-in, about its middle, that belongs to neither side."""
 
 CORNER_DWELL_S = 0.3
-"""Controls stop about so long between feed-in and arc; only the live display assumes it [s]."""
+"""Assumed stop of controls between feed-in and arc [s]; only the live display uses it."""
 
 DWELL_BEHIND_S = 0.5
-"""Recorded behind the feed-out, so that its edge has both sides [s]."""
+"""Time that is recorded after the feed-out, so that its edge has both sides [s]."""
 
 
 def feed_out_due_s(circle: Circle) -> float:
-    """Return the time between feed-in and feed-out edges at the plan's feed, with the tolerance of cutting [s]."""
+    """Return the time between the edges of feed-in and feed-out at the plan's feed, plus the tolerance of cutting [s]."""
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     return (1.0 + FEED_TOLERANCE) * circle.swept_deg / circle.turning_deg_s + feeding_s + 2.0 * CORNER_DWELL_S
 
 
 @dataclass(frozen=True)
 class Patience:
-    """Longest waiting times, in machine time.
+    """The station's longest waiting times, in machine time.
 
     Attributes:
         for_machine_s: for the bar at the feed-in point, and there for the feed-in.
@@ -48,11 +48,11 @@ class Patience:
 
 
 SETTLED_S = 2.0
-"""A bar that is put in by hand passes the circle's length in less [s]."""
+"""Time at the circle's length that indicates a machine [s]; a bar that is put in by hand passes it faster."""
 
 
 class CircleWatch:
-    """Detects the machine on an unrecorded circle, from readings in time order."""
+    """Detects a machine that moves on a circle without recording, from readings in time order."""
 
     def __init__(self, circle: Circle, *, waits_for_feed_in: bool) -> None:
         self._edges = EdgeDetector(circle)
@@ -63,7 +63,7 @@ class CircleWatch:
         self._mirrored_mm = circle.bar_mm - circle.feed_in_mm
         self._reach_mm = (0.5 - HYSTERESIS) * circle.feed_in_mm
         self.backwards = False
-        """Whether the length came from as far inside as the feed-in point is outside: a gauge that counts the wrong way round."""
+        """Whether the length changed in the wrong direction before the circle, as with an inverted gauge."""
 
     def seen(self, t_s: float, length_mm: float) -> bool:
         """Return True once, when the bar has kept the circle's length for `SETTLED_S`."""

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from dbbstation.station.sequencer import Sequencer
 
 _TICK_S = 0.005
-"""Real time between looks at an instrument that has nothing new; a command wakes the loop at once."""
+"""Real time between two polls of an instrument without new readings [s]; a command wakes the loop at once."""
 
 
 class ReadingSource(Protocol):
-    """An instrument; the driver is one."""
+    """A source of readings, such as the driver."""
 
     def drain(self) -> Sequence[Reading]:
         """Return new readings without waiting.

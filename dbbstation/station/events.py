@@ -44,7 +44,7 @@ class RunId:
 
 @dataclass(frozen=True)
 class Sample:
-    """One reading, as the sequencer sees it.
+    """One reading for the sequencer.
 
     Attributes:
         t_s: machine time; since the first sample while recording, else of the driver's clock.
@@ -99,7 +99,7 @@ class ReadingsSeen:
 
 @dataclass(frozen=True)
 class RunStarted:
-    """The bar is outside the circle; from now on every sample belongs to the run."""
+    """The bar is outside the circle. All following samples belong to the run."""
 
     run: RunId
     program: str
@@ -115,7 +115,7 @@ class SamplesRecorded:
 
 @dataclass(frozen=True)
 class FeedInSeen:
-    """The bar came onto the circle."""
+    """The bar has entered the circle."""
 
     run: RunId
     t_s: float
@@ -164,7 +164,7 @@ class RunCompleted:
 
 @dataclass(frozen=True)
 class RunDoubted:
-    """An accepted run contradicts the others, as the circle just completed shows."""
+    """The circle just completed shows that an accepted run contradicts the others."""
 
     run: RunId
     finding: Finding
@@ -180,7 +180,7 @@ class RunRestored:
 
 @dataclass(frozen=True)
 class FeedInMissed:
-    """The machine is on the circle, and nothing is recorded."""
+    """The machine is on the circle, but no run is being recorded."""
 
     run: RunId
     problem: str
@@ -217,7 +217,7 @@ class RunRejected:
 
 @dataclass(frozen=True)
 class RunLate:
-    """The machine did not come; the run is announced again."""
+    """The machine did not start; the run is announced again."""
 
     run: RunId
     problem: str
@@ -225,7 +225,7 @@ class RunLate:
 
 @dataclass(frozen=True)
 class CommandRefused:
-    """A command that the state does not take; nothing happened."""
+    """The present state does not allow a command; it had no effect."""
 
     command: Command
     state: State
@@ -234,7 +234,7 @@ class CommandRefused:
 
 @dataclass(frozen=True)
 class SessionFinished:
-    """The sequence is through."""
+    """The sequence is finished."""
 
     accepted: int
     missing: tuple[str, ...]
@@ -285,4 +285,4 @@ Event: TypeAlias = (
 )
 
 Observer: TypeAlias = "Callable[[Event], None]"
-"""Called with each event in the thread that runs the sequence; what it raises ends the sequence."""
+"""Function that is called with each event in the sequence's thread. An exception in it ends the sequence."""

@@ -25,7 +25,7 @@ def instructions(
 
 
 def too_slow(sampling: Sampling) -> str:
-    """Return the figures that so few points do not resolve."""
+    """Return the figures that are not resolved by so few points."""
     points = f"The instrument brings {sampling.points_per_turn:.0f} points per turn"
     if not sampling.is_circle:
         return f"{points}, which is no circle: take a lower feed"
@@ -38,7 +38,7 @@ def _mounted(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:
 
 
 def _under_spindle(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:
-    """Return the steps of the standard circular test [CAL III-A]: first to the circle's centre and tilt."""
+    """Return the steps of the standard circular test [CAL III-A], beginning with the move to the circle's centre and tilt."""
     if not put_up:
         return (f"Leave the ball {ball.name} and the moving ball as they stand, do not touch them", _tilt(circle))
     a, b, c = circle.tilt_deg

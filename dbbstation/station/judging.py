@@ -1,4 +1,4 @@
-"""Judge new runs against earlier ones and expectation."""
+"""Judge new runs by comparison with earlier runs and expected circles."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class JudgedRun:
 
 
 class RunJudge:
-    """Judges runs beside counted ones; an observer of the station.
+    """Judges each run together with the accepted runs; an observer of the station.
 
     Args:
         model: gives expected circles; None: the nominal machine.
@@ -76,7 +76,7 @@ class RunJudge:
                 self._read(entry, kept[entry.state])
 
     def __call__(self, event: Event) -> None:
-        """Note which runs count."""
+        """Note which runs are accepted."""
         if not isinstance(event, events.RunAccepted | events.RunRejected):
             return
         key = _key(event.run)
@@ -91,7 +91,7 @@ class RunJudge:
                     self._rejected[key] = known.pop(key)
 
     def known(self) -> tuple[JudgedRun, ...]:
-        """Return figures and findings of judged runs from disk."""
+        """Return figures and findings of judged runs from the disk."""
         together = SessionRuns(list(self._counting.values()), self._together)
         found = []
         for entry in self._writer.runs:
@@ -136,7 +136,7 @@ class RunJudge:
         return findings if assigned is None else _decided(findings, new, assigned, suspects.get(new))
 
     def doubted(self) -> Mapping[events.RunId, Finding]:
-        """Return accepted runs that contradict the others since the last run was judged."""
+        """Return accepted runs that contradict the others, as the last judged run shows."""
         return self._doubted
 
     def _assigned(self, runs: list[Seen]) -> Assigned | None:
@@ -195,7 +195,7 @@ def _decided(
 
 
 CIRCLE_SHOWN = frozenset({Name.TEST, Name.DIRECTION})
-"""Findings on which circle a run shows."""
+"""Findings about which circle a run shows."""
 
 
 def _key(run: events.RunId | RunEntry) -> tuple[str, Direction, int]:

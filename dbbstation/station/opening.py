@@ -36,7 +36,7 @@ def check_session(
     with_programs: bool,
     session: SessionFolder,
 ) -> None:
-    """Refuse to continue a session with another machine, plan, way of command, or virtual instead of real.
+    """Refuse to continue a session with another machine, plan or kind of programs, or with a virtual machine instead of a real one.
 
     Raises:
         InputError: everything that differs.
@@ -102,13 +102,13 @@ def open_session(
 
 
 SHIFT_S = 8.0 * 3600.0
-"""A shift: whoever left the session has gone since, and ball and holder may have been touched [s]."""
+"""Length of a shift [s]: after it another person may continue, and ball and holder may have been touched."""
 
 _OPERATOR = "operator from here on: "
 
 
 def changed_since(session: SessionFolder, details: SessionDetails) -> Iterator[AddNote]:
-    """Yield notes on what is not as a session has it: operator, temperature, shift, a clock that went back."""
+    """Yield notes on changes since a session was interrupted: operator, temperature, shift, a clock that was set back."""
     by = [note.text.removeprefix(_OPERATOR) for note in session.notes if note.text.startswith(_OPERATOR)]
     if details.operator not in {"", (by or [session.operator])[-1]}:
         yield AddNote(f"{_OPERATOR}{details.operator}")
@@ -130,7 +130,7 @@ def clock_watch(
     wall: Callable[[], float] = time.time,
     steady: Callable[[], float] = time.monotonic,
 ) -> Callable[[], None]:
-    """Return a duty that tells when the computer's clock is set, or the computer has slept."""
+    """Return a function that reports when the computer's clock was set, or the computer has slept."""
     ahead_s = [wall() - steady()]
 
     def look() -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
 
 _MODEL = re.compile(r"model file: .*\bsha256 ([0-9a-f]{64})")
-"""How the header of a compensated program names its model."""
+"""Pattern of the model's name in the header of a compensated program."""
 
 _PHI_DEG = np.linspace(0.0, 359.0, 360)
 
@@ -59,7 +59,7 @@ def load_programs(folder: Path, plan: Plan, machine: Machine) -> dict[tuple[str,
 
 
 def read_toolpath(path: Path, content: bytes) -> Toolpath:
-    """Return what a program file commands.
+    """Return the toolpath that a program file commands.
 
     Raises:
         InputError: faults with line and column.

@@ -1,4 +1,4 @@
-"""The current run: sample count, edges, and its circle in the end."""
+"""The current run: sample count, edges, and at the end its circle."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from dbbstation.station.events import RunId
 
 _STEP_S = 2e-6
-"""Run files have microseconds; two samples must not round to the same one."""
+"""Least time between two samples [s]: run files have microseconds, and two times must not round to the same value."""
 
 
 class RunRecall(Protocol):
-    """Returns the recording of the current run."""
+    """A function that returns the recording of the current run."""
 
     def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:
         """Return the whole run.
@@ -80,7 +80,7 @@ class RunRecord:
     def add(self, reading: Reading) -> Sample:
         """Add a reading.
 
-        A reading without a number repeats the last one; its status excludes it from calculations.
+        A reading without a number repeats the last length; its status excludes it from calculations.
         """
         t_s = reading.t_s - self.started_s
         if self.samples:
@@ -105,15 +105,15 @@ class RunRecord:
         return live_phi_deg(self.circle, t_s - self.fed_in_s)
 
     def swept_deg(self) -> float:
-        """Return the way since the feed-in [deg]."""
+        """Return the angle since the feed-in [deg]."""
         if self.fed_in_s is None or not self.samples:
             return 0.0
         return live_phi_deg(self.circle, self._last_s - self.fed_in_s) + self.circle.overshoot_deg
 
     def stands(self, sample: Sample) -> bool:
-        """Add a sample on the turn and return whether the gauge fails to follow the machine.
+        """Add a sample on the turn, and return whether the gauge fails to follow the machine.
 
-        A stuck gauge gives a constant length where noise, or the due feed-out, would change it.
+        A stuck gauge reads a constant length, although noise or the expected feed-out would change it.
         """
         if self.fed_in_s is None or sample.phi_deg is None or sample.length_mm is None or sample.status != OK:
             return False
@@ -129,7 +129,7 @@ class RunRecord:
 
     @property
     def standing(self) -> str:
-        """Return the words for a gauge that does not follow."""
+        """Return a sentence on a gauge that does not follow the machine."""
         stands = f"the length has stood at {self._last_mm:.4f} mm for {self.held.held_s:.1f} s"
         return f"{stands} while the machine moved; {AFTER_HELD}"
 

@@ -1,4 +1,4 @@
-"""Which run comes next, by plan order and accepted runs, and its mounting."""
+"""Choose the next run, and its mounting, by plan order and accepted runs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class NextRun:
 
 
 class Schedule:
-    """Counts runs and mountings."""
+    """Counts runs and mountings of a session."""
 
     def __init__(
         self, plan: Plan, next_repeat: Callable[[str, Direction], int], recorded: Sequence[RunEntry] = ()
@@ -82,12 +82,12 @@ class Schedule:
         return tuple(task for task in self.tasks if task.occurrence > runs.count((task.test, task.direction)))
 
     def to_come(self, run: RunId) -> int:
-        """Return the number of other tasks without an accepted run."""
+        """Return the number of tasks without an accepted run, apart from this run's task."""
         mine = self.tasks[self._place_of(run.test, run.direction)]
         return sum(task != mine for task in self.open)
 
     def counts_beside(self, run: RunId) -> RunId | None:
-        """Return an accepted run of the same task that would count beside this one, or None."""
+        """Return an accepted run of the same task that would count in addition to this one, or None."""
         if any((task.test, task.direction) == (run.test, run.direction) for task in self.open):
             return None
         mine = [
@@ -121,7 +121,7 @@ class Schedule:
         return run
 
     def accept(self, run: RunId) -> None:
-        """Note an accepted run and go on from there."""
+        """Note an accepted run and continue after it."""
         place = self._place_of(run.test, run.direction)
         self._accepted[run.test, run.direction, run.repeat] = True
         self._place, self._again = place, None

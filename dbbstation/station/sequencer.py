@@ -1,4 +1,4 @@
-"""Commands and readings in, events out, without port, file, clock or thread."""
+"""The sequencer turns commands and readings into events; it uses no port, file, clock or thread."""
 
 from __future__ import annotations
 
@@ -66,14 +66,14 @@ class Waiting:
 
 
 FEEDING_DEG = 10.0
-"""Stretch at either end of the turn that may be feed-in or feed-out where there is no overshoot [deg]."""
+"""Angle at either end of the turn that may belong to feed-in or feed-out if there is no overshoot [deg]."""
 
 LOOK_AFTER_LINE = "look after bar, balls and cable"
-"""What to do about a reading that cannot be."""
+"""Advice about an impossible reading."""
 
 
 class Sequencer:
-    """Walks through a plan by the table of `states.py`.
+    """Runs a plan by the table of states in `states.py`.
 
     Args:
         waiting: recorded runs without verdict, oldest first; judged before measuring.
@@ -124,7 +124,7 @@ class Sequencer:
         return self._told()
 
     def command(self, command: Command) -> list[Event]:
-        """Obey a command, or refuse it in this state."""
+        """Execute a command, or refuse it in this state."""
         cause = COMMAND_CAUSES[type(command)]
         if cause not in TRANSITIONS[self.state]:
             self._out.append(events.CommandRefused(command, self.state, self._why_not(cause)))
@@ -154,7 +154,7 @@ class Sequencer:
         return self._told()
 
     def readings(self, readings: Iterable[Reading]) -> list[Event]:
-        """Take readings in time order."""
+        """Process readings in time order."""
         for reading in readings:
             if self.state in FINAL:
                 break
@@ -330,7 +330,7 @@ class Sequencer:
         self._tell_progress()
 
     def _held_against_feed(self, reading: Reading) -> Reading:
-        """Return a reading, doubtful if the machine cannot move the bar so fast."""
+        """Return a reading, marked as doubtful if the machine cannot move the bar so fast."""
         if self._reachable is None or reading.length_mm is None or reading.status != OK:
             return reading
         if self.state not in RECORDING or self._record is None:

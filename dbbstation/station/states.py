@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class State(StrEnum):
-    """State of the sequence, in words for people."""
+    """State of the sequence; the value is text for people."""
 
     BETWEEN = "between runs"
     ANNOUNCED = "waiting for the set-up"
@@ -107,21 +107,21 @@ _WAYS: Mapping[State, Mapping[Trigger, State]] = MappingProxyType(
         State.FAULTED: {},
     }
 )
-"""Where causes lead that change the state."""
+"""New state for each trigger that changes the state."""
 
 TRANSITIONS: Mapping[State, Mapping[Trigger, State]] = MappingProxyType(
     {state: {**ways, Trigger.NOTE: state} if ways else ways for state, ways in _WAYS.items()}
 )
-"""To which state a cause leads from each state; what does not stand here does not happen. A note changes nothing."""
+"""New state for each state and trigger; other triggers are refused. A note changes no state."""
 
 RECORDING = frozenset({State.DWELLING, State.TURNING, State.LEAVING})
-"""States in which every reading is written down."""
+"""States in which every reading is recorded."""
 
 VERDICT = frozenset({State.COMPLETE, State.FLAWED})
-"""A run has ended and waits for what somebody decides about it."""
+"""States in which a finished run awaits a decision."""
 
 FINAL = frozenset(state for state, ways in TRANSITIONS.items() if not ways)
-"""States that nothing leads out of."""
+"""States that cannot be left."""
 
 COMMAND_CAUSES: Mapping[type[Command], Trigger] = MappingProxyType(
     {
@@ -138,9 +138,9 @@ COMMAND_CAUSES: Mapping[type[Command], Trigger] = MappingProxyType(
         Resume: Trigger.RESUME,
     }
 )
-"""What each command is in the table."""
+"""The trigger of each command."""
 
 
 def commands_allowed(state: State) -> frozenset[type[Command]]:
-    """Return the commands that a state takes."""
+    """Return the commands that a state allows."""
     return frozenset(command for command, cause in COMMAND_CAUSES.items() if cause in TRANSITIONS[state])

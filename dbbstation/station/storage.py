@@ -1,4 +1,4 @@
-"""Storage: keeps every sample and verdict in the session folder."""
+"""Storage writes every sample and verdict into the session folder."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
 
 COLUMNS = ("t_s", "length_mm", "status")
-"""What the station records of every instrument."""
+"""Columns that the station records for every instrument."""
 
 
 FASTER_BEGINS_BEFORE = timedelta(days=30)
-"""How far back the time of a faster clock begins: at ten times real time it comes up to the computer's after three days of measuring."""
+"""Time by which a faster clock begins in the past: at ten times real time it reaches the computer's time after three
+days of measuring."""
 
 
 class Storage:
@@ -60,7 +61,7 @@ class Storage:
         self._instrument = instrument
 
     def __call__(self, event: events.Event) -> None:
-        """Keep an event.
+        """Write an event into the session.
 
         Raises:
             OutputError: the disk refuses; earlier data stays.
@@ -106,7 +107,7 @@ class Storage:
         )
 
     def sync_if_due(self) -> None:
-        """Sync data that has waited for a second, also without readings.
+        """Write data to the disk that has waited for a second, also without new readings.
 
         Raises:
             OutputError: the disk refuses.
@@ -115,7 +116,7 @@ class Storage:
             self._journal.sync_if_due()
 
     def close(self) -> None:
-        """Sync the current run as it is; its file remains a `.part`."""
+        """Write the current run to the disk; its file remains a `.part`."""
         if self._journal is None:
             return
         journal, self._journal = self._journal, None
@@ -166,9 +167,9 @@ class Storage:
 
 
 def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Callable[[], datetime]:
-    """Return a time of day that runs as fast as a scaled `clock`.
+    """Return a clock of the time of day that runs as fast as a scaled `clock`.
 
-    It begins early enough to stay behind the computer's time.
+    It begins far enough in the past to stay behind the computer's time.
     """
     begun_s = clock()
     begun = datetime.now(UTC) - FASTER_BEGINS_BEFORE

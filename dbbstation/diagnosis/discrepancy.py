@@ -29,11 +29,6 @@ if TYPE_CHECKING:
 BY_DIRECTION = ("strut-speed-sign", "joint-angle-speed-sign")
 """Variables that are a direction."""
 
-TURNING = (*BY_DIRECTION, "strut-speed")
-"""Variables of causes whose effect turns its sign with the direction: it may be another in each. Lowering a load, a drive lags otherwise
-than lifting it."""
-
-
 STAGES_APART = 2
 """Points of the grid of time constants from one further stage of a warm-up to the next: a factor of two."""
 
@@ -75,7 +70,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
             continue
         effects.append(by_strut)
         along.append([values[motion.kept] for values in _followed_by_strut(source, known, motion, machine)])
-        if source.varies_with in TURNING:
+        if source.varies_with in BY_DIRECTION:
             signs.append(known["strut-speed-sign"][motion.kept])
     by_variable = [modulated(effects, one, signs or None) for one in zip(*along, strict=True)]
     # Each variable takes its part of what a formula may be off by.

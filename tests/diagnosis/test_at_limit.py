@@ -11,13 +11,12 @@ from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis import diagnose as finished
 from dbbstation.diagnosis import explain
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.limits import limits_of_fit
-from dbbstation.diagnosis.shapes import ranges, samples_of, shapes, variables
+from dbbstation.diagnosis.shapes import ranges, samples_of, shapes
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import search
-from dbbstation.sources.contract import Effect, Parameter
+from dbbstation.sources.contract import Parameter
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.diagnose import diagnose
 from dbbstation.tasks.load import load_sessions
@@ -250,24 +249,3 @@ def test_a_parameter_at_an_end_and_a_fit_that_moves_are_said(tmp_path):
         assert (at_end.what, at_end.name) == ("parameter", "backlash wind_up_length_mm")
         assert f"{end} end of its range, {value:.4g} mm" in at_end.text
         assert moves.what == "fit"
-
-
-def test_the_formula_of_a_lag_may_be_off_by_another_share_in_each_direction(tmp_path):
-    """A lag that is a tenth more while a strut grows, and less while it shrinks, is what its slack says, for every strut."""
-    record(tmp_path / "s", seed=5, mechanisms=[KINEMATICS], rate_hz=4.0)
-    recorded = load_sessions([tmp_path / "s"])
-    channel = CircleChannel(calibrate(recorded.machine, recorded.observations), ())
-    (lag,) = sources_named(["servo-lag"])
-    values, runs, wanted = np.array([2.0, 1.0, 3.0, -1.0, 2.0, 1.0]), [], []
-    for motion, reading in zip(channel.motions[:6], channel.readings[:6], strict=True):
-        derivative = reading.by_source(lag, channel.machine, values)
-        known = variables(motion, channel.machine)
-        runs.append(Effects(motion, reading, values, derivative, known))
-        struts = reading.by_parameters(
-            Effect(strut_mm=np.eye(6)[None] * lag.effect(motion, channel.machine, values).strut_mm[:, :, None])
-        )
-        wanted.append(0.1 * struts * known["strut-speed-sign"][motion.kept])
-    slack, off = discrepancy_of(lag, channel.machine, runs), np.vstack(wanted)
-    left = off - slack @ np.linalg.lstsq(slack, off, rcond=None)[0]
-    assert np.abs(off).max() > 1e-3
-    assert np.abs(left).max() < 0.02 * np.abs(off).max()

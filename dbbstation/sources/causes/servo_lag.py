@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Parameter
 
 S_PER_MS = 1e-3
-
-BY_DIRECTION = 0.3
-"""Share by which a lag may be more one way and less the other, one standard deviation: weight and friction load a drive by direction."""
 
 
 class ServoLag(ErrorSource):
@@ -53,13 +50,20 @@ class ServoLag(ErrorSource):
         "divided by speed is the lag.",
         cure="Set the position-loop gains of all struts to the same value and adjust velocity feed-forward; until then "
         "measure and finish at a low feed.",
-        equation="actual minus driven length = y - x, tau dy/dt = x - y; nearly -tau dx/dt",
+        equation="actual minus driven length = y - x, tau dy/dt = x - y; nearly -tau dx/dt; tau may be another where a strut "
+        "lengthens than where it shortens",
         origin="first-order position loop; radius loss (v tau)² / 2R and the ellipse of unequal gains as in "
         "Kakino, Ihara and Shinohara, Accuracy Inspection of NC Machine Tools by Double Ball Bar Method, 1993",
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
+
+    _more: ClassVar[tuple[tuple[float, float], ...]] = ((1.0, 1.0),)
+    """What each six values add while a strut shortens, and while it lengthens."""
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return (_ByDirection(),)
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         return Effect(strut_mm=self._lag(motion, machine, values)[0])
@@ -70,35 +74,60 @@ class ServoLag(ErrorSource):
 
     def advance(self, motion: Motion, machine: Machine, values: Floats, state: LoopState) -> tuple[Effect, LoopState]:
         length, time_s = motion.struts(machine).length_mm, np.asarray(motion.time_s)
-        lag, _, behind = driven(length, time_s, S_PER_MS * values, state)
+        lag, _, behind = driven(length, time_s, self._constants_s(values), state)
         return Effect(strut_mm=lag), behind
 
     def undone(self, motion: Motion, reached: Motion, machine: Machine, values: Floats, state: LoopState) -> Floats:
         commanded, wanted = motion.struts(machine).length_mm, reached.struts(machine).length_mm
-        return undone(commanded, wanted, np.asarray(motion.time_s), S_PER_MS * values, state)
+        return undone(commanded, wanted, np.asarray(motion.time_s), self._constants_s(values), state)
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_constant = self._lag(motion, machine, values)[1]
-        return Effect(strut_mm=S_PER_MS * by_constant[:, :, None] * np.eye(STRUTS))
+        own = [S_PER_MS * np.tensordot(by_constant, more, (1, 0))[:, :, None] * np.eye(STRUTS) for more in self._more]
+        return Effect(strut_mm=np.concatenate(own, axis=2))
 
-    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return changes if each strut lags otherwise while it shortens than while it lengthens, as under a load."""
-        lag, _ = self._lag(motion, machine, values)
-        return Effect(strut_mm=BY_DIRECTION * np.abs(lag)[:, :, None] * np.eye(STRUTS))
+    def _constants_s(self, values: Floats) -> Floats:
+        """Return time constants while struts shorten, and while they lengthen, shape (2, 6)."""
+        return S_PER_MS * np.transpose(self._more) @ values.reshape(-1, STRUTS)
 
     def _lag(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats]:
+        """Return errors, shape (n, 6), and derivatives by time constants, shape (n, 2, 6)."""
         self.require(motion)
+        constants = self._constants_s(values)
         if motion.straight:
-            length = motion.struts(machine).length_mm
-            return driven(length, np.asarray(motion.time_s), S_PER_MS * values, STANDING)[:2]
+            return driven(motion.struts(machine).length_mm, np.asarray(motion.time_s), constants, STANDING)[:2]
         time_s, length, place = driven_in_time(motion, machine)
-        speed, step, constant = speed_mm_s(time_s, length), np.diff(time_s), S_PER_MS * values
+        speed, step, constant = speed_mm_s(time_s, length), np.diff(time_s), constants.ravel()
+        # Each way of travel is followed by its own constant; where both are the same, their sum is one loop.
+        speed = np.hstack([np.minimum(speed, 0.0), np.maximum(speed, 0.0)])
         lag, by_constant = followed(speed, step, np.abs(constant))
         if (constant < 0.0).any():
             ahead, by_ahead = followed(-speed[::-1], step[::-1], np.abs(constant))
             lag = np.where(constant < 0.0, ahead[::-1], lag)
             by_constant = np.where(constant < 0.0, -by_ahead[::-1], by_constant)
-        return lag[place], by_constant[place]
+        shape = len(place), 2, STRUTS
+        return lag[place].reshape(shape).sum(axis=1), by_constant[place].reshape(shape)
+
+
+class _ByDirection(ServoLag):
+    """Struts late by tau + d while they lengthen, and tau - d while they shorten: weight and friction load a drive by direction."""
+
+    _more = ((1.0, 1.0), (-1.0, 1.0))
+
+    @property
+    def law(self) -> str:
+        return "by direction"
+
+    def other_laws(self) -> tuple[ErrorSource, ...]:
+        return ()
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        meaning = "time by which strut {} is later than that while it lengthens, and less late while it shortens"
+        return (*super().parameters(machine), *of_each_strut("strut_{}_by_direction_ms", "ms", USUAL_MS, meaning))
+
+
+USUAL_MS = 0.3
+"""Usual difference of a lag from its mean, either way: three tenths of a usual lag."""
 
 
 def followed(speed: Floats, step_s: Floats, constant_s: Floats) -> tuple[Floats, Floats]:

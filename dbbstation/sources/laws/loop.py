@@ -26,7 +26,8 @@ from dbbstation.sources.laws.rates import SHORTEST_S
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
-INPUT, INPUT_SPEED, OUTPUT, OUTPUT_SPEED, BY_CONSTANT, SPEED_BY_CONSTANT = range(6)
+INPUT, INPUT_SPEED, OUTPUT, OUTPUT_SPEED = range(4)
+BY_CONSTANT, SPEED_BY_CONSTANT = (4, 5), (6, 7)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ class LoopState:
     Attributes:
         rows: steps so far: 0 before the first row, 2 with a speed.
         memory: commanded and driven length [mm], mean speeds of the last step [mm/s], and derivatives of driven length and speed
-            by time constant, shape (6, 6).
+            by time constants of either way, shape (8, 6).
     """
 
     rows: int
@@ -45,18 +46,18 @@ class LoopState:
     memory: Floats
 
 
-STANDING = LoopState(0, 0.0, 0.0, np.zeros((6, STRUTS)))
+STANDING = LoopState(0, 0.0, 0.0, np.zeros((8, STRUTS)))
 """Before a program: nothing has moved."""
 
 
 def driven(length_mm: Floats, time_s: Floats, constant_s: Floats, state: LoopState) -> tuple[Floats, Floats, LoopState]:
-    """Return errors y - x [mm], derivatives by tau [mm/s], shapes (n, 6), and the last state.
+    """Return errors y - x [mm], shape (n, 6), derivatives by tau [mm/s], shape (n, 2, 6), and the last state.
 
     Args:
         time_s: shape (n,); rows within `SHORTEST_S` are one.
-        constant_s: tau, shape (6,); a negative one leads by -tau dx/dt.
+        constant_s: tau while y falls and while it rises, shape (2, 6); a negative one leads by -tau dx/dt.
     """
-    lag, by_constant, memory = np.empty_like(length_mm), np.empty_like(length_mm), state.memory.copy()
+    lag, by_constant, memory = np.empty_like(length_mm), np.empty((len(length_mm), 2, STRUTS)), state.memory.copy()
     clock = np.array([state.rows, state.time_s, state.step_s])
     lengths, times = np.ascontiguousarray(length_mm), np.ascontiguousarray(time_s)
     _drive(lengths, times, constant_s, SHORTEST_S, clock, memory, lag, by_constant)
@@ -120,11 +121,13 @@ def _undo(
         share = _even(length[k], memory, h, clock)
         gain = (1.0 + share) / h
         for i in range(columns):
-            tau, y = constant[i], reached[k, i]
-            if tau < 0.0:
-                x = (y - tau * (gain * needed[i] + share * needed_speed[i])) / (1.0 - tau * gain)
-            else:
-                x = y + tau * (gain * (y - memory[OUTPUT, i]) - share * memory[OUTPUT_SPEED, i])
+            y = reached[k, i]
+            speed = gain * (y - memory[OUTPUT, i]) - share * memory[OUTPUT_SPEED, i]
+            x = y + constant[int(speed > 0.0), i] * speed
+            if constant[int(speed > 0.0), i] < 0.0:
+                before = gain * needed[i] + share * needed_speed[i]
+                tau = min(constant[int(gain * y > before), i], 0.0)
+                x = (y - tau * before) / (1.0 - tau * gain)
             error[k, i] = y - x
             memory[OUTPUT_SPEED, i], memory[OUTPUT, i] = (y - memory[OUTPUT, i]) / h, y
             needed_speed[i], needed[i] = (x - needed[i]) / h, x
@@ -150,26 +153,30 @@ def _drive(
             for i in range(columns):
                 error = memory[OUTPUT, i] - memory[INPUT, i]
                 memory[INPUT, i], memory[OUTPUT, i] = length[k, i], length[k, i] + error
-                lag[k, i], by_constant[k, i] = error, memory[BY_CONSTANT, i]
+                lag[k, i] = error
+                for way in range(2):
+                    by_constant[k, way, i] = memory[BY_CONSTANT[way], i]
             if clock[0] == 0.0:
                 clock[0], clock[1] = 1.0, time[k]
             continue
         share = _even(length[k], memory, h, clock)
         for i in range(columns):
-            tau, x = constant[i], length[k, i]
-            speed = (x - memory[INPUT, i]) / h
-            at, by_at = memory[OUTPUT, i], memory[BY_CONSTANT, i]
-            if tau < 0.0:
-                ahead = (1.0 + share) * speed - share * memory[INPUT_SPEED, i]
-                y, by_y = x - tau * ahead, -ahead
-            else:
-                gain = (1.0 + share) / h
-                before = gain * at + share * memory[OUTPUT_SPEED, i]
-                by_before = gain * by_at + share * memory[SPEED_BY_CONSTANT, i]
-                y = (x + tau * before) / (1.0 + tau * gain)
-                by_y = (before - gain * y + tau * by_before) / (1.0 + tau * gain)
+            x, at, gain = length[k, i], memory[OUTPUT, i], (1.0 + share) / h
+            speed, before = (x - memory[INPUT, i]) / h, gain * at + share * memory[OUTPUT_SPEED, i]
+            now = int(gain * x > before)
+            tau, leads = max(constant[now, i], 0.0), constant[now, i] < 0.0
+            y = (x + tau * before) / (1.0 + tau * gain)
+            by_y, kept = (before - gain * y) / (1.0 + tau * gain), tau / (1.0 + tau * gain)
+            if leads:
+                by_y, kept = share * memory[INPUT_SPEED, i] - (1.0 + share) * speed, 0.0
+                now = int(by_y < 0.0)
+                y = x + min(constant[now, i], 0.0) * by_y
+            for way in range(2):
+                by_at = memory[BY_CONSTANT[way], i]
+                by = kept * (gain * by_at + share * memory[SPEED_BY_CONSTANT[way], i]) + (by_y if way == now else 0.0)
+                memory[BY_CONSTANT[way], i], memory[SPEED_BY_CONSTANT[way], i] = by, (by - by_at) / h
+                by_constant[k, way, i] = by
             memory[INPUT, i], memory[INPUT_SPEED, i] = x, speed
             memory[OUTPUT, i], memory[OUTPUT_SPEED, i] = y, (y - at) / h
-            memory[BY_CONSTANT, i], memory[SPEED_BY_CONSTANT, i] = by_y, (by_y - by_at) / h
-            lag[k, i], by_constant[k, i] = y - x, by_y
+            lag[k, i] = y - x
         clock[0], clock[1], clock[2] = 2.0, time[k], h

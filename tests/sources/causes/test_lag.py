@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
@@ -21,6 +22,7 @@ from dbbstation.sources.contract import Fitted, Motion
 from tests.sources.runs import DEG_PER_S, concealed_share, jig_runs, random_run, run
 
 LAG, SKEW = ServoLag(), TimeSkew()
+(BY_DIRECTION,) = LAG.other_laws()
 SPEED_MM_S = 1000.0 / 60.0
 
 
@@ -161,15 +163,36 @@ def test_an_exact_machine_shows_no_skew(reference):
     assert np.allclose(skewed, 150.0, rtol=0, atol=1e-6)
 
 
-def test_a_lag_by_direction_is_more_one_way_and_as_much_less_the_other(reference):
-    """To first order in tau the error is -tau (1 + 0.3 s) dx/dt, s the sign of dx/dt."""
-    motion, tau_ms = run((100, 100, -1150), (-10, 10), step_deg=0.25), np.array([2.0, -1.0, 0.5, 3.0, 0.0, 1.0])
-    speed = np.gradient(travel(reference, motion), motion.time_s, axis=0)
-    changes = LAG.left_open(motion, reference, tau_ms).strut_mm
-    own = np.diagonal(changes, axis1=1, axis2=2)
-    assert np.array_equal(changes, own[:, :, None] * np.eye(6))
-    assert np.allclose(own, 0.3e-3 * np.abs(tau_ms) * np.abs(speed), atol=3e-5)
-    assert own.max() > 5e-3
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_lag_by_direction_solves_a_loop_with_a_gain_for_each_way(reference, straight):
+    """tau dy/dt = x - y with one tau while y rises, another while it falls, solved by an independent integrator."""
+    motion, times = run((100, 100, -1150), (-10, 10), step_deg=0.25), (8.0, 4.0)
+    length, time_s = travel(reference, motion)[:, 2], motion.time_s
+    command = CubicSpline(time_s, length)
+
+    def speed(t, y):
+        behind = command(t) - y
+        return behind / (1e-3 * (times[0] if behind > 0.0 else times[1]))
+
+    start = length[:1] - 1e-3 * times[int(command(time_s[0], 1) <= 0.0)] * command(time_s[0], 1)
+    solved = solve_ivp(speed, time_s[[0, -1]], start, t_eval=time_s, rtol=1e-9, atol=1e-10, max_step=0.02, method="LSODA")
+    values = np.zeros(12)
+    values[[2, 8]] = np.mean(times), 0.5 * (times[0] - times[1])
+    lag = BY_DIRECTION.effect(replace(motion, straight=straight), reference, values).strut_mm[:, 2]
+    assert np.ptp(lag) > 0.05
+    # Of a loop, a drive at rest before the first row differs for some times tau; between rows the speed is straight.
+    late = time_s > time_s[0] + 1.0
+    assert np.abs(lag - (solved.y[0] - length))[late].max() < 2e-4
+
+
+def test_a_lag_alike_in_both_directions_is_the_simple_law(reference):
+    motion, ms = run((-100, 50, -1008), (10, -5), step_deg=0.5), np.array([3.0, -2.0, 5.0, 0.0, -1.0, 4.0])
+    for straight in (False, True):
+        at = replace(motion, straight=straight)
+        simple, other = (
+            law.effect(at, reference, v).strut_mm for law, v in ((LAG, ms), (BY_DIRECTION, np.append(ms, np.zeros(6))))
+        )
+        assert np.array_equal(simple, other)
 
 
 def test_no_kinematic_parameter_can_take_a_lag(reference):
@@ -177,8 +200,10 @@ def test_no_kinematic_parameter_can_take_a_lag(reference):
     assert (share < 0.002).all()
 
 
-def test_lags_are_compensated(reference):
-    model = MachineModel(reference, (Fitted(LAG, np.array([8.0, -3.0, 5.0, 2.0, 12.0, 6.0])),))
+@pytest.mark.parametrize("apart_ms", [(), (2.0, 1.0, -3.0, -1.0, 4.0, 0.0)], ids=["simple", "by direction"])
+def test_lags_are_compensated(reference, apart_ms):
+    values = np.array([8.0, -3.0, 5.0, 2.0, 12.0, 6.0, *apart_ms])
+    model = MachineModel(reference, (Fitted(BY_DIRECTION if apart_ms else LAG, values),))
     wanted = replace(run((100, 100, -1150), (-10, 10), step_deg=0.5), kept=slice(None))
     commanded = compensated(model, wanted)
     assert np.abs(commanded - wanted.poses)[:, :3].max() > 0.05

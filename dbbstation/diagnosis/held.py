@@ -28,12 +28,12 @@ def held_variance(calibration: Calibration, held: Floats) -> Floats:
     amplitudes = calibration.x[fitted] / known.scale[fitted]
     hidden = np.sum(calibration.solution.held**2, axis=0)
     square = np.ones(len(known.random))
-    for name in {term.source.name for term in calibration.layout.terms}:
+    for name, least in {term.source.name: term.source.concealed_times**2 for term in calibration.layout.terms}.items():
         columns, _ = calibration.layout.columns_of(name)
         own = np.isin(fitted, columns)
         seen = float(np.sum(1.0 - hidden[own]))
-        if seen > HALF:
-            square[columns] = max(1.0, float(np.sum(amplitudes[own] ** 2)) / seen)
+        found = float(np.sum(amplitudes[own] ** 2)) / seen if seen > HALF else 0.0
+        square[columns] = max(least, found)
     along = held**2 @ square[fitted]
     variance = np.zeros(len(known.random))
     variance[fitted] = along @ (held * known.scale[fitted]) ** 2

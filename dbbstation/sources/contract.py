@@ -388,6 +388,8 @@ class ErrorSource(ABC):
     for each row; such a source answers `undone`."""
     happens_once: ClassVar[bool] = False
     """True for what acts once in a session, such as a bump: no other tests can show it again, and it is never called identified."""
+    concealed_times: ClassVar[float] = 1.0
+    """Times the plausible size that directions may have which a fit holds, because no recording shows them."""
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
 

@@ -30,7 +30,7 @@ MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),
     "STICKING_HALVES": (shapes, "STICKING_HALVES", (4, 6), 23),
     "UNLIKE": (unlike_struts, "UNLIKE", (1.5, 3.0), 32),
-    "BY_DIRECTION": (servo_lag, "BY_DIRECTION", (0.15, 0.6), 52),
+    "USUAL_MS": (servo_lag, "USUAL_MS", (0.1, 1.0), 52),
 }
 """By constant: its module and name, other values, and the session on which it decides most."""
 

@@ -175,7 +175,9 @@ def test_a_lag_by_direction_solves_a_loop_with_a_gain_for_each_way(reference, st
         return behind / (1e-3 * (times[0] if behind > 0.0 else times[1]))
 
     start = length[:1] - 1e-3 * times[int(command(time_s[0], 1) <= 0.0)] * command(time_s[0], 1)
-    solved = solve_ivp(speed, time_s[[0, -1]], start, t_eval=time_s, rtol=1e-9, atol=1e-10, max_step=0.02, method="LSODA")
+    solved = solve_ivp(
+        speed, time_s[[0, -1]], start, t_eval=time_s, rtol=1e-9, atol=1e-10, max_step=0.02, method="LSODA"
+    )
     values = np.zeros(12)
     values[[2, 8]] = np.mean(times), 0.5 * (times[0] - times[1])
     lag = BY_DIRECTION.effect(replace(motion, straight=straight), reference, values).strut_mm[:, 2]

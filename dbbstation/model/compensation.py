@@ -157,7 +157,7 @@ class _Stretch:
         self._machine = self._own.as_found
         self._nominal, self._convention = self._own.machine.hexapod, self._own.machine.hexapod.rotation
         self._wanted = wanted
-        self._target = Frames.from_poses(wanted.poses, self._convention)
+        self._near = self._target = Frames.from_poses(wanted.poses, self._convention)
         acting = self._own.acting(wanted)
         self._weights = tuple(f for f in acting if f.source.weighs and not f.source.has_history)
         self._others = tuple(f for f in acting if not f.source.weighs and not f.source.has_history)
@@ -169,7 +169,7 @@ class _Stretch:
 
     def commanded(self, driven: Floats) -> Floats:
         """Return the poses at nominal lengths, shape (n, 6) [mm, deg]."""
-        return forward(self._nominal, driven, self._target).to_poses(self._convention)
+        return forward(self._nominal, driven, self._near).to_poses(self._convention)
 
     def passed(self) -> Passed:
         """Return the memory after the last row."""
@@ -193,7 +193,8 @@ class _Stretch:
             change = float(np.abs(driven - last).max())
             if change < AGREED_MM:
                 break
-            motion, last = self._driven_to(driven, slice(None), self._target), driven
+            motion, last = self._driven_to(driven, slice(None), self._near), driven
+            self._near = motion.frames(self._own.machine)
         if change > MET_MM:
             raise ModelError(
                 f"the compensation does not settle: {change:.2e} mm after {MOST_ROUNDS} rounds",

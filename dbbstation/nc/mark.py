@@ -77,7 +77,7 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
     numbers = _numbers(toolpath.numbers_written[moves], decimals)
     free = _free(toolpath, moves, decimals)
     can = np.flatnonzero(free.any(axis=1))
-    bits = BITS[min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]  # a pose that comes again counts once
+    bits = BITS[min(max(_distinct(_sums(numbers[can])), 2), 4)]  # a pose that comes again counts once
     steps = _steps(FARTHEST_ANGLE, 1) if bits == BITS[4] else _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
     shifts = np.append(_SHIFTS, np.uint64(64 - bits))
     fixed, moved = _as_bits(~free[can]), _as_bits(steps != 0)
@@ -96,7 +96,7 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
 def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance explains."""
     poses = toolpath.numbers_written[toolpath.is_move & (toolpath.unknown == 0)]
-    count = len(np.unique(_sums(_numbers(poses, DECIMALS))))
+    count = _distinct(_sums(_numbers(poses, DECIMALS)))
 
     @cache
     def part(first: int, decimals: int) -> NDArray[np.uint64]:
@@ -106,10 +106,15 @@ def is_marked(toolpath: Toolpath) -> bool:
     for decimals in decimals_of(poses):
         sums = part(0, decimals[0]) + part(3, decimals[5])
         for bits in BITS.values():
-            hits = len(np.unique(sums[_has_mark(sums, bits)]))
+            hits = _distinct(sums[_has_mark(sums, bits)])
             if hits > 0 and float(bdtrc(hits - 1, count, 0.5**bits)) < BY_CHANCE:
                 return True
     return False
+
+
+def _distinct(sums: NDArray[np.uint64]) -> int:
+    # A sort takes a fifth of the time of NumPy's `unique`, which hashes.
+    return int(np.count_nonzero(np.diff(np.sort(sums)))) + bool(len(sums))
 
 
 def decimals_of(poses: Floats) -> Iterator[tuple[int, ...]]:

@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
-from itertools import accumulate
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import numpy as np
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
 from dbbstation.nc.rs274.expressions import ValueReader
-from dbbstation.nc.rs274.plain import letters_of, plain_lines
+from dbbstation.nc.rs274.plain import MOST_LINES, letters_of, plain_lines
 from dbbstation.nc.rs274.tokens import BadLine, Place
 from dbbstation.nc.setup import ControlSetup
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Integers
     from dbbstation.nc.rs274.plain import PlainLines
 
 MOST_AGAIN = 500_000
@@ -100,10 +101,11 @@ class Flow:
         self._o_lines: dict[int, OLine] = {}
         self._macros: dict[int, OLine] = {}
         self._labels: dict[str, list[OLine]] = {}
-        self._lines: list[str] = []
+        self._text, self._begins = "", cast("Integers", np.zeros(1, dtype=np.int64))
+        self._window: tuple[int, NDArray[np.uint8]] = -1, letters_of("")
         self.files: tuple[tuple[int, str], ...] = ()
         self._append(text, file)
-        self._own_lines = len(self._lines)
+        self._own_lines = self._count
         self.percent, self._next = self._opening()
         self._frames: list[_Frame] = []
         self._globals: dict[int | str, float] = {}
@@ -113,9 +115,12 @@ class Flow:
         self._ran = 0
 
     def _append(self, text: str, file: str) -> None:
-        before = len(self._lines)
+        before = self._count
         self.files += ((before, file),)
-        self._lines += text.split("\n")
+        behind = len(self._text)
+        self._text += f"{text}\n"
+        begins = behind + 1 + np.flatnonzero(letters_of(f"{text}\n") == ord("\n"))
+        self._begins = np.concatenate([self._begins, begins])
         line, begin = 1 + before, 0
         for match in _O_LINE.finditer(text):
             line, begin = line + text.count("\n", begin, match.start()), match.start()
@@ -126,8 +131,16 @@ class Flow:
             line = 1 + before + text.count("\n", 0, match.start())
             rest, column = _COMMENT.sub("", match["rest"]).rstrip(BLANKS), match.start("rest") - match.start()
             self._macros[line] = OLine(line, "", match["word"].upper(), rest, column)
-        self._letters: NDArray[np.uint8] | None = None
-        self._begins = list[int]()
+        self._window = -1, letters_of("")
+
+    @property
+    def _count(self) -> int:
+        """Return the number of lines of all files so far."""
+        return len(self._begins) - 1
+
+    def _line(self, at: int) -> str:
+        """Return a line by its index, from 0."""
+        return self._text[self._begins[at] : self._begins[at + 1] - 1]
 
     def _found(self, label: str, keyword: str) -> list[OLine]:
         """Return the begin of a subprogram; if no line has it, look for its file."""
@@ -150,15 +163,15 @@ class Flow:
         Raises:
             BadLine: an O-word that makes no sense, or the program does not end.
         """
-        last = next((at for at in range(self._own_lines, 0, -1) if self._lines[at - 1].strip(BLANKS)), 1) - 1
+        last = next((at for at in range(self._own_lines, 0, -1) if self._line(at - 1).strip(BLANKS)), 1) - 1
         # Past its last line a file does not go on in the next one.
-        while self._next < len(self._lines) and not (self._next and any(self._next == at for at, _ in self.files)):
+        while self._next < self._count and not (self._next and any(self._next == at for at, _ in self.files)):
             self._ran += 1
             place = self._place(self._next + 1)
-            if self._ran > len(self._lines) + MOST_AGAIN:
+            if self._ran > self._count + MOST_AGAIN:
                 what = f"its loops and subprograms run more than {MOST_AGAIN} lines: they may never end"
                 raise place.fault(1, what, "check the conditions of its loops")
-            line = self._lines[self._next]
+            line = self._line(self._next)
             self._next += 1
             skipped = _SKIPPED.match(line)
             if skipped is not None and self._setup.block_delete is not None:
@@ -182,10 +195,12 @@ class Flow:
 
     def plain_lines(self) -> PlainLines:
         """Return the content of the plain lines from the last yielded line on."""
-        if self._letters is None:
-            self._letters = letters_of("\n".join(self._lines))
-            self._begins = [0, *accumulate(len(line) + 1 for line in self._lines)]
-        return plain_lines(self._letters, self._begins[self._next - 1])
+        number, within = divmod(self._next - 1, MOST_LINES)
+        first = number * MOST_LINES
+        if self._window[0] != number:
+            end = self._begins[min(first + MOST_LINES, self._count)]
+            self._window = number, letters_of(self._text[self._begins[first] : end])
+        return plain_lines(self._window[1], int(self._begins[first + within] - self._begins[first]))
 
     def skip(self, lines: int) -> None:
         """Mark the next lines as run."""
@@ -203,13 +218,14 @@ class Flow:
         Raises:
             BadLine: the percent sign that closes it.
         """
-        if self.percent and not any(is_percent(line) for line in self._lines[self._opening()[1] : self._own_lines]):
+        if self.percent and not any(is_percent(self._line(at)) for at in range(self._opening()[1], self._own_lines)):
             raise BadLine(self.cut_short())
 
     def all_lines(self) -> Iterator[tuple[str, Place]]:
         """Yield all lines without O-words in file order, up to the closing percent sign."""
         begin = self._opening()[1]
-        for number, line in enumerate(self._lines[begin : self._own_lines], begin + 1):
+        for number in range(begin + 1, self._own_lines + 1):
+            line = self._line(number - 1)
             if self.percent and is_percent(line):
                 return
             if number not in self._o_lines and number not in self._macros:
@@ -264,8 +280,8 @@ class Flow:
 
         A program between percent signs needs no other end. Elsewhere LinuxCNC treats a percent sign as a fault.
         """
-        start = next((index for index, line in enumerate(self._lines) if line.strip(BLANKS)), 0)
-        return (True, start + 1) if is_percent(self._lines[start]) else (False, 0)
+        start = next((at for at in range(self._count) if self._line(at).strip(BLANKS)), 0)
+        return (True, start + 1) if is_percent(self._line(start)) else (False, 0)
 
     def cut_short(self) -> Problem:
         """Return the fault of a program without an end."""
@@ -317,7 +333,7 @@ class Flow:
         ]
         return range(
             max(line for line in begins if line <= self._next),
-            min((line for line in begins if line > self._next), default=len(self._lines) + 1),
+            min((line for line in begins if line > self._next), default=self._count + 1),
         )
 
     def _loop_line(self, macro: OLine, number: int, place: Place, keyword: str) -> OLine:
@@ -334,7 +350,7 @@ class Flow:
 
     def _numbered(self, number: int, place: Place) -> int:
         """Return the index of the next line with this number; after the last line the search continues at the first [Fanuc, GOTO]."""
-        found = ((line, _NUMBERED.match(self._lines[line - 1])) for line in self._program())
+        found = ((line, _NUMBERED.match(self._line(line - 1))) for line in self._program())
         lines = [line - 1 for line, match in found if match and int(match[1]) == number]
         if not lines:
             raise place.fault(1, f"GOTO {number}: no line has the number N{number}", "add it")

@@ -1,1 +1,1 @@
-"""Fit errors to raw circles: sources, observability, uncertainty, evaluation."""
+"""Fit error sources to raw circles, with observability, uncertainty and evaluation."""

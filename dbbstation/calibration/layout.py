@@ -1,4 +1,4 @@
-"""The numbers of a fit: every source's parameters, once per sharing set."""
+"""Columns of a fit: each source's parameters, once per group of runs that share values."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 
 
 HELD = 1e-9
-"""Share of its plausible size to which a parameter is known that is at the end of its range."""
+"""Relative prior standard deviation of a parameter held at a limit of its range."""
 
 GEOMETRY = frozenset({"strut-reference-length", "base-joints"})
-"""Sources that are where joints stand and how long struts are: there is no formula of it that a machine could depart from. What these
-sources state of theirs is for a change from one session to another."""
+"""Sources of joint places and strut lengths, which have no formula error. The formula uncertainty that they state
+applies to changes between sessions."""
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterSet:
-    """One set of parameters of one source."""
+    """The parameters of one source for one group of runs."""
 
     source: ErrorSource
     shared: str
@@ -40,21 +40,21 @@ class ParameterSet:
     columns: slice
 
     def acts_on(self, motion: Motion) -> bool:
-        """Return whether a run takes its values from this set."""
+        """Return whether this set applies to a run."""
         return self.source.shared_by(motion) == self.shared and not self.source.of_currents
 
     def fitted(self, x: Floats) -> Fitted:
-        """Return the source with its values of x, shape (k,)."""
+        """Return the source with its values from x, shape (k,)."""
         return Fitted(self.source, x[self.columns], self.shared)
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Terms of a fit with priors.
+    """All parameter sets of a fit, with priors.
 
     Attributes:
         known: priors about `nominal`, and scales.
-        nominal: values of unseen columns, shape (k,): zero for amplitudes, usual for shapes such as time constants.
+        nominal: values before measurement, shape (k,): zero for amplitudes, usual values for shapes such as time constants.
     """
 
     machine: Machine
@@ -64,7 +64,7 @@ class Layout:
 
     @property
     def names(self) -> tuple[tuple[str, str, str], ...]:
-        """Return source, set and parameter of every column."""
+        """Return source, sharing set and parameter of every column."""
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
 
     def columns_of(self, source: str) -> tuple[Integers, Integers]:
@@ -80,12 +80,12 @@ class Layout:
 
     @property
     def limits(self) -> tuple[Floats, Floats]:
-        """Return limits of every column, shape (k,) each: shapes keep to their grid and one step beyond."""
+        """Return lower and upper limits of every column, shape (k,) each: shapes may exceed their grid by one step."""
         each = [p.limits for term in self.terms for p in term.parameters]
         return np.array([low for low, _ in each]), np.array([high for _, high in each])
 
     def held_at(self, x: Floats, columns: Integers) -> Layout:
-        """Return the layout with some columns known as in x, shape (k,)."""
+        """Return the layout with some columns held at their values in x, shape (k,)."""
         nominal, prior = self.nominal.copy(), self.known.prior.copy()
         nominal[columns], prior[columns] = x[columns], HELD * self.known.scale[columns]
         return replace(self, nominal=nominal, known=replace(self.known, prior=prior))
@@ -96,7 +96,7 @@ class Layout:
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 
     def formula_variance(self, x: Floats) -> Floats:
-        """Return every column's variance by its formula's inaccuracy, shape (k,)."""
+        """Return every column's variance due to the inaccuracy of its formula, shape (k,)."""
         share = [
             0.0 if parameter.grid or term.source.name in GEOMETRY else term.source.form_uncertainty
             for term in self.terms
@@ -106,7 +106,7 @@ class Layout:
 
     @property
     def needs(self) -> frozenset[Need]:
-        """Return what all sources of the reading need."""
+        """Return the inputs of all sources that affect the reading."""
         return frozenset[Need]().union(*(term.source.needs for term in self.terms if not term.source.of_currents))
 
     def model(self, x: Floats) -> MachineModel:
@@ -118,13 +118,13 @@ class Layout:
 
 
 def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> Layout:
-    """Return the sets of every source that the observations need.
+    """Return the layout with all parameter sets that the observations require.
 
-    A stated size makes a random effect; size zero removes it. Shape parameters have a prior about a usual value.
-    Tolerances of the machine file are priors; without one nothing is regularised.
+    A source with a stated size is a random effect; size zero removes it. Shape parameters have a prior about a usual
+    value. Tolerances of the machine file are priors. Other parameters are not regularised.
 
     Raises:
-        ModelError: a source needs what machine file or recordings lack.
+        ModelError: machine file or recordings lack an input of a source.
     """
     terms: list[ParameterSet] = []
     prior: list[float] = []
@@ -147,7 +147,7 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
 
 
 _Stated: TypeAlias = "Floats | ModelError | None"
-"""Size that is stated of a set of parameters, shape (p,), None where there is none; or why its source cannot be there."""
+"""Stated standard deviations of a parameter set, shape (p,), None if unstated; or the error that excludes the source."""
 
 
 def _sets(sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> list[dict[str, _Stated]]:

@@ -1,1 +1,1 @@
-"""Check fits against statements: plan, scatter, noise, physics."""
+"""Compare fits with plan, stated scatter, noise and physics."""

@@ -1,4 +1,4 @@
-"""Why tests lose directions, and which tests would determine them."""
+"""Explain why tests leave directions undetermined, and which tests would determine them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 APART_MM = 20.0
-"""Heights that differ by less are one level [mm]."""
+"""Smaller height differences count as one height [mm]."""
 
 TILTED_DEG = 2.0
-"""Orientations that differ by less are one [deg]."""
+"""Smaller orientation differences count as one orientation [deg]."""
 
 
 def gaps(calibration: Calibration) -> tuple[str, ...]:
-    """Return the missing measurements behind lost directions, in words; may be empty.
+    """Return texts on the measurements that would determine lost directions; may be empty.
 
-    The fifteen circles of [CAL Table II] lose only the common height, which raised bars determine. One level loses
-    three directions, one orientation most of the rest.
+    The fifteen circles of [CAL Table II] lose only the common height, which raised bars determine. Circles at one
+    height lose three directions; circles in one orientation lose most of the others.
     """
     lost = len(calibration.directions_lost) + len(calibration.directions_regularised)
     if lost == 0:

@@ -1,4 +1,4 @@
-"""The bar's noise from the finest structure of residuals."""
+"""Estimate the bar's noise from high harmonics of residuals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def fine_noise_mm(calibration: Calibration) -> float:
-    """Return the noise of a reading from above the smooth harmonics, without misfit [mm]."""
+    """Return a reading's noise, estimated above the harmonics of smooth misfit [mm]."""
     square, count = 0.0, 0.0
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))

@@ -1,4 +1,4 @@
-"""Check that tests are enough to contradict their plan."""
+"""Check whether the tests are redundant enough to reveal a wrong plan."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class PlanCheck:
 
 @with_one_thread
 def check_plan(calibration: Calibration) -> PlanCheck:
-    """Count the directions that tests determine by the fit's noise, without tolerances of the machine file."""
+    """Count the directions that tests determine at the fit's noise, without tolerances of the machine file."""
     known = calibration.layout.known
     free = replace(known, prior=np.where(calibration.layout.bounded, np.inf, known.prior))
     fitted = int(np.count_nonzero(~known.random))

@@ -1,4 +1,4 @@
-"""Compare the scatter of balls and bar with plan and session."""
+"""Compare the fitted scatter of balls and bar with the scatter stated by plan and session."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 DETERMINED = 0.5
-"""Share of an effect's stated variance that the runs must take away for them to say where a ball stands."""
+"""Share of a coordinate's stated variance that the runs must remove before it counts as determined."""
 
 CONFIDENCE = 0.95
-"""Of the interval of what balls scatter by. Of balls that stand as stated, 25 groups of 1000 are said to scatter more, at
-99 % it would be 5. Balls that scatter by 1.5 times the stated size are found in 52 of 100 sessions with ten determined
-coordinates, at 99 % in 34 (from chi-square)."""
+"""Coverage of the interval of the balls' scatter. It reports excess scatter for 25 of 1000 sound groups; 99 % would
+give 5. With ten determined coordinates it detects 1.5 times the stated scatter in 52 of 100 sessions, at 99 % in 34
+(from chi-square)."""
 
 UNKNOWN_MM = 1.0
-"""Stated size of the place of a ball that stands nobody knows where, in the plane that a level bar sees [mm]."""
+"""Prior standard deviation of a ball at an unknown place, in the plane that a level bar measures [mm]."""
 
 LEAST_STATED_MM = 0.1
-"""Sizes from here on are not a scatter that anybody states of a holder: a ball set free, or put up by hand [mm]."""
+"""Larger prior standard deviations do not describe a holder, but a freed ball or a ball set up by hand [mm]."""
 
 
 @dataclass(frozen=True, eq=False)
 class MountingOffset:
-    """A ball's place in one mounting, mounting and CMM error together.
+    """A ball's place in one mounting, mounting and CMM errors combined.
 
     Attributes:
         stated_mm: standard deviation of each coordinate, shape (3,) [mm].
         shift_mm: best prediction, machine axes, shape (3,) [mm].
         spread_mm2: its covariance, shape (3, 3) [mm²].
-        square: of determined coordinates in units of their expected scatter, summed.
+        square: sum of squared determined coordinates, each over its expected variance.
     """
 
     mounting: str
@@ -61,13 +61,13 @@ class ScatterVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class ScatterCheck:
-    """Whether balls of one stated size scatter as stated.
+    """Comparison of the scatter of balls that have one stated size.
 
     Attributes:
-        stated_um: standard deviation per axis, mounting and CMM together.
-        interval_um: 95 % of that; None if undetermined.
+        stated_um: standard deviation per axis, mounting and CMM combined.
+        interval_um: 95 % interval of the standard deviation; None if undetermined.
         fits: whether they scatter no more than stated; None if undetermined.
-        finding: stated size relative to the interval.
+        finding: position of the stated size relative to the interval.
     """
 
     stated_um: float
@@ -79,10 +79,10 @@ class ScatterCheck:
 
 
 def seats_of(calibration: Calibration) -> list[MountingOffset]:
-    """Return every ball's place and its improbability.
+    """Return every ball's place, with a chi-square for its displacement.
 
-    A best prediction m with stated covariance P and remaining covariance V scatters by P - V [Henderson, Biometrics 31
-    (1975) 423]: m (P - V)^-1 m is chi-square over the determined coordinates.
+    A best linear unbiased prediction m with stated covariance P and remaining covariance V has the covariance P - V
+    [Henderson, Biometrics 31 (1975) 423]. Over the determined coordinates m (P - V)^-1 m is chi-square.
     """
     layout, covariance = calibration.layout, calibration.solution.covariance
     terms = {(term.source.name, term.shared): term for term in layout.terms}
@@ -96,7 +96,8 @@ def seats_of(calibration: Calibration) -> list[MountingOffset]:
         shift = sum(calibration.x[own] for own in columns)
         left = sum(covariance[np.ix_(a, b)] for a in columns for b in columns)
         size = np.sqrt(np.asarray(stated))
-        # In units of the stated sizes: eigenvalues near one are determined by the runs, near nought by the plan alone.
+        # In units of stated sizes, directions with eigenvalues near one are determined by the runs, near zero by the
+        # plan alone.
         share, axes = np.linalg.eigh(np.eye(3) - np.asarray(left) / np.outer(size, size))
         known = share > DETERMINED
         along = (axes.T @ (np.asarray(shift) / size))[known]
@@ -117,8 +118,8 @@ def seats_of(calibration: Calibration) -> list[MountingOffset]:
 def check_scatter(seats: Sequence[MountingOffset]) -> list[ScatterCheck]:
     """Compare found and stated scatter by stated size.
 
-    The sum of squares is chi-square in units of the true variance. Neighbours share errors of the fitted machine, which
-    narrows the interval a little for few balls.
+    The sum of squares over the true variance is chi-square. Errors of the fitted machine are common to neighbouring
+    balls, which makes the interval slightly too narrow for few balls.
     """
     groups: dict[float, list[MountingOffset]] = {}
     for seat in seats:

@@ -1,4 +1,4 @@
-"""Information of runs on the machine: singular values, weak directions, indices, leverage."""
+"""How well runs determine the machine: singular values, weak directions, observability indices, leverage."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from dbbstation.inference.blocks import Block
 
 WEAKEST = 3
-"""Weak directions that are reported."""
+"""Number of reported weak directions."""
 
 STRONGEST = 5
-"""Correlations that are reported."""
+"""Number of reported correlations."""
 
 
 @dataclass(frozen=True)
 class Indices:
-    """Observability indices O1 to O5 of scaled parameters [Sun and Hollerbach, ICRA 2008, eqs 3 to 7].
+    """Observability indices O1 to O5 for scaled parameters [Sun and Hollerbach, ICRA 2008, eqs 3 to 7].
 
     With singular values s_1 >= ... >= s_L of the sensitivity of n readings: O1 = (s_1 ... s_L)^(1/L) / sqrt(n), O2 =
-    s_L / s_1, O3 = s_L, O4 = s_L^2 / s_1, O5 = 1 / (1/s_1 + ... + 1/s_L). All grow with information.
+    s_L / s_1, O3 = s_L, O4 = s_L^2 / s_1, O5 = 1 / (1/s_1 + ... + 1/s_L). All five grow with information.
     """
 
     o1: float
@@ -44,8 +44,8 @@ class WeakDirection:
     """A weakly determined direction.
 
     Attributes:
-        uncertainty: of its largest parameter along it, one standard deviation.
-        unit: µm for lengths of the geometry.
+        uncertainty: standard uncertainty of its largest parameter along it.
+        unit: µm for lengths of the geometry, else the parameter's unit.
     """
 
     text: str
@@ -55,7 +55,7 @@ class WeakDirection:
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two parameters that the runs hardly tell apart, by source and name."""
+    """Two parameters that the runs hardly distinguish, each by source and name."""
 
     first: str
     second: str
@@ -67,12 +67,12 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Observability:
-    """Information of circles on the machine's parameters.
+    """How well circles determine the machine's parameters.
 
     Attributes:
-        singular_values_mm: of readings' sensitivity to parameters in usual sizes, falling, without lost ones.
+        singular_values_mm: of the readings' sensitivity to parameters scaled by usual sizes, in descending order, without lost directions.
         indices: O1 to O5.
-        leverage: information of each test in parameters; the sum is their number, but for shared parts.
+        leverage: each test's information, in numbers of parameters; without shared effects the sum is their total number.
     """
 
     singular_values_mm: tuple[float, ...]
@@ -85,14 +85,14 @@ class Observability:
 
 @with_one_thread
 def visibility(calibration: Calibration) -> Observability:
-    """Examine the matrix of a calibration."""
+    """Return the observability of a calibration."""
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     scale = known.scale[fitted]
     whole = spread_over(calibration.circle_blocks, fitted)[:, :-1] * scale
     free = complement(calibration.solution.held)
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
-    singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
+    singular = singular[singular > ROUNDING * singular[0]]  # circles contain no information on sources that change currents only
     readings = sum(block.count for block in calibration.circle_blocks)
     return Observability(
         singular_values_mm=tuple(singular.tolist()),
@@ -105,7 +105,7 @@ def visibility(calibration: Calibration) -> Observability:
 
 
 def indices(singular: Floats, readings: int) -> Indices:
-    """Return O1 to O5 of singular values, falling and positive, shape (L,)."""
+    """Return O1 to O5 of positive singular values in descending order, shape (L,)."""
     greatest, least = float(singular[0]), float(singular[-1])
     return Indices(
         o1=float(np.exp(np.mean(np.log(singular)))) / float(np.sqrt(readings)),
@@ -126,7 +126,7 @@ def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
     found = []
     for k in range(len(fitted) - 1, len(fitted) - 1 - min(WEAKEST, calibration.parameters_identified), -1):
         moved = scale * axes[:, k]
-        # Among parameters of several units, the one that moves most in units of its usual size.
+        # Units differ, so compare parameters in units of their usual sizes.
         most = int(np.argmax(np.abs(axes[:, k])))
         size, unit = float(np.sqrt(variance[k]) * np.abs(moved[most])), units[fitted[most]]
         size, unit = (1e3 * size, "µm") if unit == "mm" else (size, unit)
@@ -150,10 +150,10 @@ def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
 
 
 def _leverage(calibration: Calibration, fitted: Integers) -> dict[str, float]:
-    """Return the trace of covariance times a test's own information, averaged over its random effects.
+    """Return, per test, the trace of covariance times the test's information, after elimination of its random effects.
 
-    The trace approximates how many parameters are lost without the test. Shared effects, such as the bar's length, count as
-    unknowns.
+    The trace approximates the number of parameters lost without the test. Effects shared with other tests, such as the
+    bar's length, count as unknowns.
     """
     known, noise = calibration.layout.known, calibration.noise.effective
     tests: dict[str, list[Block]] = {}

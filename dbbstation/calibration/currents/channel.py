@@ -1,4 +1,4 @@
-"""Motor currents as a second channel: load profiles of struts beside circles [GRAV 3.2]."""
+"""Fit motor currents, which show strut loads, together with circles [GRAV 3.2]."""
 
 from __future__ import annotations
 
@@ -28,16 +28,17 @@ if TYPE_CHECKING:
 
 
 FEWEST = 20
-"""Readings of a motor that say something."""
+"""Fewest usable readings of a motor."""
 
 CLIPPED_SAMPLES = 20
 CLIPPED_RATIO = 5.0
-"""Readings at one limit, and how many times more than at the next value inside it: at the crest of a wave that is read in
-steps the last step has two or three times as many readings as the one before; an amplifier at its limit has all of them."""
+"""Clipping needs this number of readings at one limit, and this ratio to the next value inside. At the crest of a
+quantised wave the last step has two or three times the readings of the step before. A saturated amplifier gives all of
+them at the limit."""
 
 
 def cleaned(labels: Sequence[str], current_a: Sequence[Floats]) -> tuple[list[Floats], list[str]]:
-    """Return currents with NaN at unusable readings, and notes in words, by motor.
+    """Return currents with NaN at unusable readings, and notes by motor.
 
     Args:
         current_a: per run, shape (n, 6), NaN for a motor without log.
@@ -50,7 +51,7 @@ def cleaned(labels: Sequence[str], current_a: Sequence[Floats]) -> tuple[list[Fl
 
 
 def one_way(growing: Sequence[Flags], usable: Sequence[Flags]) -> list[str]:
-    """Name motors whose struts never reverse, shapes (n, 6) per run."""
+    """Return notes on motors whose struts never reverse; flags have shape (n, 6) per run."""
     notes = []
     for motor in range(STRUTS):
         ways = np.unique(
@@ -109,32 +110,32 @@ def _listed(labels: Sequence[str]) -> str:
 
 MOST_STEPS = 20
 SETTLED_SIGMA = 1e-2
-"""Share of its standard deviation by which the last step of the currents alone may still move a parameter."""
+"""Convergence limit of the fit to currents alone: largest last step, in standard deviations."""
 
 SECTORS = 1440
-"""Of a turn, a quarter of a degree each, over which currents of long runs are averaged: on the way loads change by a
-thousandth, and friction that turns over does not count anyway."""
+"""Sectors of a turn, a quarter of a degree each, over which currents of long runs are averaged. Within a sector loads
+change by a thousandth; samples of reversing friction are excluded anyway."""
 
 LONG = 2
-"""Readings per sector from which a run is long."""
+"""Fewest readings per sector of a long run."""
 
 FULLY = 1.0 - 1e-9
-"""Direction of friction that has turned over, but for rounding."""
+"""Direction of fully reversed friction, less rounding."""
 
 ROUNDING = 1e-6
-"""Share of a parameter's plausible size that is rounding."""
+"""Rounding, relative to a parameter's prior standard deviation."""
 
 SMALLEST_NOISE_A = 1e-6
-"""No drive's current is better; keeps noise-free simulations from dividing by zero."""
+"""Least noise of a current, which prevents division by zero in noise-free simulations."""
 
 
 @dataclass(frozen=True, eq=False)
 class CurrentChannel:
-    """Runs with motor currents.
+    """Motor currents of all runs that have them.
 
     Attributes:
         current_a: one array of shape (n, 6) per run.
-        usable: samples that count: logged, unclipped, after friction reversed; shape (n, 6) per run.
+        usable: samples to fit: logged, unclipped, with fully reversed friction; shape (n, 6) per run.
     """
 
     motions: tuple[Motion, ...]
@@ -144,7 +145,7 @@ class CurrentChannel:
 
 
 def current_channel(layout: Layout, observations: Sequence[Observation]) -> CurrentChannel | None:
-    """Return the currents of all runs that have them, or None without a source of currents.
+    """Return the currents of all runs that have them; None if no source of currents is fitted.
 
     Raises:
         CalibrationError: no motor has usable currents.
@@ -177,7 +178,7 @@ def _motion(run: Observation, current_a: Floats) -> Motion:
 
 
 def current_blocks(layout: Layout, channel: CurrentChannel | None, x: Floats) -> list[Block]:
-    """Return blocks of currents about x, shape (k,), per run and motor with its noise."""
+    """Return one block per run and motor, linearised about x, shape (k,), and weighted by the motor's noise."""
     if channel is None:
         return []
     blocks, left = linearised(layout, channel, x)
@@ -188,7 +189,7 @@ def current_blocks(layout: Layout, channel: CurrentChannel | None, x: Floats) ->
 def linearised(
     layout: Layout, channel: CurrentChannel, x: Floats
 ) -> tuple[list[tuple[int, Block]], list[list[Floats]]]:
-    """Return information blocks of the motors, and each motor's residual per run [A]."""
+    """Return information blocks with their motors, and each motor's residual per run [A]."""
     model = layout.model(x)
     whole = x - layout.nominal
 
@@ -231,9 +232,9 @@ def _effective(noise: Noise | None) -> float:
 
 
 def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, Floats]:
-    """Return start values by source from currents alone, at the nominal geometry.
+    """Return starting values by source, fitted to currents alone at the nominal geometry.
 
-    Gains multiply loads and frictions, which a start at zero would hide.
+    Gains multiply loads and friction, so at zero gain their derivatives vanish.
     """
     if channel is None:
         return {}
@@ -256,7 +257,7 @@ def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, F
 def by_themselves(
     blocks: Sequence[Block], known: Columns, noise: float = 1.0, nominal: Sequence[Block] | None = None
 ) -> tuple[Integers, Solution]:
-    """Solve for the columns of some blocks, from these blocks alone."""
+    """Solve for the columns of some blocks from these blocks alone."""
     columns = np.unique(np.concatenate([block.columns for block in blocks]))
     part = Columns(known.prior[columns], known.scale[columns], known.random[columns])
 

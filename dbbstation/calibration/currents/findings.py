@@ -1,4 +1,4 @@
-"""Facts of motor currents in a fit: noise, residuals, centre of gravity."""
+"""Findings on motor currents in a fit: noise, residuals, centre of gravity."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Solution
 
 OPEN = 0.1
-"""Share of a parameter that may lie in held directions before it counts as left open."""
+"""Largest component in held directions of a determined parameter."""
 
 MORE_THAN_NOISE = 1.2
-"""Residual over fine noise above which something slow must be left."""
+"""Ratio of residual to fine noise above which the residual contains a slow misfit."""
 
 SLOW_SAMPLES = 10.0
-"""Correlation in samples from which a residual is slow."""
+"""Correlation length of a slow residual, in samples."""
 
 SURE = 5.0
-"""Standard deviations from which a gain is taken to have a sign."""
+"""Standard deviations above which a gain's sign counts as known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +38,12 @@ class MotorFindings:
     """Findings of the motor currents in a fit.
 
     Attributes:
-        noise: of each motor's reading, or sector mean in long runs; None without readings.
+        noise: of each motor's readings, or of sector means in long runs; None without readings.
         residual_a: rms per motor; NaN without readings.
-        fine_a: noise from differences of neighbours, free of slow misfit; NaN without readings.
-        held: undetermined parameters of the drives.
+        fine_a: noise noise from differences of neighbours, without slow misfit; NaN without readings.
+        held: names of undetermined drive parameters.
         alone: centre of gravity by channel (`circles`, `currents`) and parameter, with standard deviation [mm]; None if
-            undetermined alone. Empty without cog-shift.
+            this channel alone does not determine it. Empty without cog-shift.
     """
 
     noise: tuple[Noise | None, ...]
@@ -64,7 +64,7 @@ def motor_findings(
     nominal: Sequence[Block],
     noise: Noise,
 ) -> MotorFindings | None:
-    """Return residuals and each channel's own facts."""
+    """Return residuals, and results of each channel alone."""
     if channel is None:
         return None
     own, left = linearised(layout, channel, x)
@@ -133,7 +133,7 @@ def _doubts(layout: Layout, x: Floats, solution: Solution, held: frozenset[str])
 
 
 def _misfits(residual_a: Sequence[float], fine_a: Sequence[float], noise: Sequence[Noise | None]) -> list[str]:
-    """Return a text for motors with slow residuals; correlated noise counts only if it lasts long."""
+    """Return a note on motors with slow residuals; noise counts only if its correlation is long."""
     lacking = [
         str(motor + 1)
         for motor, (left, fine, found) in enumerate(zip(residual_a, fine_a, noise, strict=True))

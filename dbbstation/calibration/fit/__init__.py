@@ -1,1 +1,1 @@
-"""The fit: equations, nodes, prescribed parameters, three methods."""
+"""Least-squares fit of error sources: equations, nodes, prescribed parameters, three methods."""

@@ -1,4 +1,4 @@
-"""The fit: Gauss-Newton on exact predictions with analytic sensitivities and random effects [CAL II-D]."""
+"""Fit error sources by Gauss-Newton, with exact predictions, analytic sensitivities and random effects [CAL II-D]."""
 
 from __future__ import annotations
 
@@ -39,39 +39,39 @@ KINEMATIC_SOURCES = ("strut-reference-length", "base-joints")
 """The 24 parameters of [CAL II-C]."""
 
 MEASUREMENT_SOURCES = ("mounting", "ball-coordinate", "bar-offset", "run-start")
-"""Random effects that every session has, with the sizes that plan and session state."""
+"""Random effects of every session, with standard deviations stated by plan and session."""
 
 FEWEST_TESTS = 3
-"""Fewer circles leave more directions open than they close."""
+"""Fewest tests; fewer circles leave more directions undetermined than they determine."""
 
 MOST_STEPS = 30
 SMALLEST_SHARE = 0.1
-"""Of a step, however much a fit swings."""
+"""Least share of a step, even if the fit oscillates."""
 CONVERGED = 1e-6
-"""Share of the columns' plausible sizes by which the last step may still move: a fifth of a nanometre on joints."""
+"""Largest last step of a converged fit, relative to prior standard deviations: a fifth of a nanometre for joints."""
 
 CONVERGED_SIGMA = 1e-3
-"""The same as a share of their standard deviations, for what the runs hardly see."""
+"""Largest last step in units of standard deviations, for parameters that the runs hardly determine."""
 FIRST_NOISE_MM = 1e-3
 
 COARSE_MM = 1.0
-"""What a nominal machine leaves [mm rms] beyond which the fit approaches first. Curvature leaves the square of an error over
-the length of a strut, 1 µm for 1 mm: less than a usual bar's noise below, more than that above. An approach where none is
-needed costs two steps and changes nothing."""
+"""Nominal residual [mm rms] above which the fit starts with approach steps. Nonlinearity contributes the squared error
+over a strut's length, 1 µm for 1 mm, about a usual bar's noise. An unnecessary approach costs two steps and changes
+nothing."""
 
 NOISE_STEPS = 12
-"""Steps in which the noise is read anew. What is left to be called noise depends on how it is weighted against what is known
-of balls; where physics is missing the two creep, or run, after each other without an end."""
+"""Number of steps that re-estimate the noise. The residual depends on its weight relative to the balls' priors; with
+missing physics, noise and residual might otherwise change without end."""
 
 MOST_KEPT = 50_000
-"""Poses of all runs up to which a fit keeps their motions from step to step: up to a hundred numbers a pose, 40 MB. A diagnosis of thirty
-circles has half as many."""
+"""Most poses of all runs whose motions a fit keeps between steps: up to a hundred numbers per pose, 40 MB. A diagnosis
+of thirty circles has half as many."""
 
 MotionOf: TypeAlias = "Callable[[Observation], Motion]"
-"""Motion of a run."""
+"""A function that returns a run's motion."""
 
 AT_NODES = frozenset({Need.POSE, Need.TIME})
-"""What a source may need for its effect to be as smooth as the circle; a path's history and logged values are not."""
+"""Inputs of sources whose effects are as smooth as the circle; effects of path history and logged values are not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +81,12 @@ class Calibration:
     Attributes:
         x: all columns, shape (k,).
         solution: covariance, directions and held rows of all columns.
-        machine_residual_mm: per run, beyond the machine's sources.
-        residual_mm: per run, beyond the measurement's effects too.
-        blocks: information about x: one per circle, then motor currents.
-        directions_lost: invisible to the recordings, in words.
-        directions_regularised: invisible, but bounded by the machine file's tolerances.
-        at_limit: columns held at an end of their range.
+        machine_residual_mm: per run, residual without the machine's sources.
+        residual_mm: per run, residual without machine sources and measurement effects.
+        blocks: information blocks for x: one per circle, then motor currents.
+        directions_lost: descriptions of directions that the recordings do not determine.
+        directions_regularised: descriptions of undetermined directions that tolerances of the machine file bound.
+        at_limit: columns held at a limit of their range.
     """
 
     layout: Layout
@@ -111,22 +111,22 @@ class Calibration:
 
     @property
     def circle_blocks(self) -> tuple[Block, ...]:
-        """Return one block of the columns per circle."""
+        """Return the blocks of the circles."""
         return self.blocks[: len(self.observations)]
 
     @property
     def null_space(self) -> Floats:
-        """Return undetermined combinations of columns, each at its plausible size, shape (h, k)."""
+        """Return undetermined combinations of columns, scaled to prior standard deviations, shape (h, k)."""
         return unseen_combinations(self.blocks, self.layout.known, self.noise.effective, self.solution.held)
 
     @property
     def parameters_identified(self) -> int:
-        """Return the number of machine parameters less held directions."""
+        """Return the number of machine parameters less the number of held directions."""
         return int(np.count_nonzero(~self.layout.known.random)) - len(self.solution.held)
 
 
 def default_sources() -> tuple[ErrorSource, ...]:
-    """Return the paper's kinematic parameters and every session's random effects."""
+    """Return the sources of the paper's kinematic parameters and of every session's random effects."""
     return sources_named(KINEMATIC_SOURCES + MEASUREMENT_SOURCES)
 
 
@@ -144,21 +144,21 @@ def calibrate(
 ) -> Calibration:
     """Fit error sources to raw circles.
 
-    Lost directions are found at the nominal geometry by the noise, and held at nominal. The fit solves for values instead
-    of steps, so that curvature moves nothing along them. Tolerances of the machine file are priors.
+    Directions that noise hides at the nominal geometry are lost and held at nominal. The fit solves for values instead
+    of steps, so nonlinearity cannot move them. Tolerances of the machine file are priors.
 
     Args:
-        sources: None: the default ones.
-        start: values by source, for shape parameters that a zero amplitude hides.
-        prescribe: parameters to hold in place of lost directions, equally many; empty: chosen among base joints; None: hold the
-            directions.
-        shapes_within: relative prior of shape parameters about the start; None: usual sizes.
-        amplitudes_within: prior of started amplitudes in plausible sizes, one standard deviation.
-        must_settle: False: return the last step anyway.
+        sources: None for the default sources.
+        start: starting values by source, because shape parameters have no effect at zero amplitude.
+        prescribe: parameters to hold instead of lost directions, in equal number; empty to choose base-joint
+            coordinates; None to hold the directions.
+        shapes_within: relative prior standard deviation of shape parameters about the start; None for usual sizes.
+        amplitudes_within: prior standard deviation of started amplitudes, relative to their usual one.
+        must_settle: False to return the last step without convergence.
 
     Raises:
         CalibrationError: centred circles, too few tests, unsuitable prescribed parameters, or no convergence.
-        ModelError: a source lacks what it needs.
+        ModelError: a source lacks an input.
     """
     check_raw(observations)
     _check_enough(observations)
@@ -198,7 +198,7 @@ def calibrate(
         beyond = np.setdiff1d(np.flatnonzero((x < limits[0]) | (x > limits[1])), at_limit)
         x = np.clip(x, *limits)
         if len(beyond):
-            # The others are then fitted beside the end of its range, where it stays.
+            # The other parameters are then fitted while it stays at the limit.
             layout, at_limit = layout.held_at(x, beyond), np.concatenate([at_limit, beyond])
         settled = change < 1.0 and not len(beyond)
         if settled:
@@ -207,13 +207,13 @@ def calibrate(
         blocks += current_blocks(layout, channel, x)
         if steps < NOISE_STEPS:
             noise = noise_of_turns(left, solution.freedom_used)
-    assert held is not None  # noqa: S101 - of the first step
+    assert held is not None  # noqa: S101 - set in the first step
     if must_settle and not settled:
         raise CalibrationError(
             f"the fit does not converge: step {MOST_STEPS} is {change:.2g} times the limit",
             remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
         )
-    left.clear()  # a number a sample, before the residuals are two
+    left.clear()  # free one number per sample before the residuals need two
     return Calibration(
         layout=layout,
         x=x,
@@ -239,10 +239,10 @@ def _approached(
     left: Sequence[Floats],
     motion_of: MotionOf,
 ) -> tuple[Floats, list[Block]]:
-    """Approach a machine that is millimetres off by Gauss-Newton steps with a usual bar's noise.
+    """Approach a machine with errors of millimetres, by Gauss-Newton steps with a usual bar's noise.
 
-    Early residuals are curvature, which taken for noise would hide visible directions. The noise is therefore measured
-    only when steps no longer halve the residual.
+    Nonlinearity dominates early residuals; as noise it would hide determined directions. The noise is therefore
+    estimated only after steps no longer halve the residual.
     """
     noise = Noise(FIRST_NOISE_MM, 1.0).effective
     held = lost_directions(nominal, layout.known, noise)
@@ -261,7 +261,7 @@ def _rms_mm(left: Sequence[Floats]) -> float:
 
 
 def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> Floats:
-    """Return orthonormal rows of fitted directions that only priors bound, in scales, shape (r, f)."""
+    """Return fitted directions that only priors bound, as orthonormal rows in scaled parameters, shape (r, f)."""
     known = layout.known
     if not layout.bounded.any():
         return np.zeros((0, int(np.count_nonzero(~known.random))))
@@ -272,14 +272,14 @@ def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> Floats:
 def _share(layout: Layout, step: Floats, before: Floats, share: float) -> float:
     """Return the share of a step to take.
 
-    Full steps oscillate about shape parameters with small amplitude and about nearly invisible combinations. If
-    successive steps have ratio q after a share s, s / (1 - q) would have hit (Aitken's rule); the smallest of these is
-    taken.
+    Full steps oscillate in shape parameters with small amplitude and in nearly undetermined combinations. If the share
+    s gave successive steps with the ratio q, the share s / (1 - q) would have reached the minimum (Aitken's rule). The
+    smallest such share is used.
     """
     shaped = np.array([bool(p.grid) for term in layout.terms for p in term.parameters])
     now, last = step / layout.known.scale, before / layout.known.scale
     along = float(now @ last) / max(float(last @ last), 1e-300)
-    # Of a step that is settled, such as that of a shape while its amplitude is zero, the ratio is one of roundings.
+    # The ratio of converged steps is rounding, as for a shape parameter at zero amplitude.
     told = np.where(np.abs(last[shaped]) <= CONVERGED, np.inf, last[shaped])
     ratios = [along, *(now[shaped] / told).tolist()]
     ratio = min(ratios)
@@ -307,10 +307,10 @@ def _near(layout: Layout, start: Mapping[str, Floats], within: float | None, amp
 
 
 LISTED_WITHIN = 1e-3
-"""Share to which a value that is one of a list is known: gratings are made to parts in ten thousand, and warm."""
+"""Relative prior standard deviation of a value from a list: gratings are accurate to parts in ten thousand, and expand with temperature."""
 
 SMALLEST_SHAPE = 0.1
-"""Of its plausible size: a parameter of shape that starts at less is known to no less than a share of this."""
+"""Least start of a shape parameter for computing its relative prior, in units of its plausible size."""
 
 
 def _start_values(layout: Layout, start: Mapping[str, Floats]) -> Floats:
@@ -322,7 +322,7 @@ def _start_values(layout: Layout, start: Mapping[str, Floats]) -> Floats:
 
 
 def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> list[Observation | RunNodes]:
-    """Return runs as nodes if long and sources need only pose and time."""
+    """Return runs, reduced to nodes if they are long and sources need only pose and time."""
     if not needs <= AT_NODES:
         return list(observations)
     nodes = in_parallel(nodes_of, observations, _usual_length(observations))
@@ -336,7 +336,7 @@ def _motions_of(runs: Sequence[Observation | RunNodes]) -> MotionOf:
     known: dict[int, Motion] = {}
 
     def motion_of(run: Observation) -> Motion:
-        if id(run) not in short:  # all samples of one that its nodes do not do for
+        if id(run) not in short:  # a run that its nodes cannot replace needs all samples
             return run.motion()
         if id(run) not in known:
             known[id(run)] = run.motion()
@@ -351,9 +351,9 @@ def linearise(
     x: Floats,
     motion_of: MotionOf = Observation.motion,
 ) -> tuple[list[Block], list[Floats]]:
-    """Compress every run about x, shape (k,), and return the blocks with measured minus predicted lengths, shape (n,) [mm].
+    """Return every run's information block, linearised about x, shape (k,), with measured minus predicted lengths, shape (n,) [mm].
 
-    A solution of the blocks is x minus its nominal.
+    The blocks' unknown is x minus its nominal value.
     """
     model = layout.model(x)
 
@@ -382,20 +382,20 @@ def _predicted(
 
 
 def _settled(blocks: Sequence[Block], layout: Layout, noise: Noise, held: Floats) -> tuple[Solution, Noise]:
-    """Solve with the noise of the own residual; three rounds settle within a per mille."""
+    """Solve with the noise estimated from the solution's residual; three iterations converge to 0.1 %."""
     count = sum(block.count for block in blocks if block.noise is None)
     sigma = noise.sigma
     for _ in range(3):
         solution = solve(blocks, layout.known, sigma * np.sqrt(noise.correlation_samples), held)
         square = (solution.chi2 - solution.stated_chi2) * sigma**2 * noise.correlation_samples
-        spent = solution.freedom_used * noise.correlation_samples  # of smooth columns: they take out slow noise
+        spent = solution.freedom_used * noise.correlation_samples  # smooth columns absorb slow noise
         sigma = float(np.sqrt(max(square, 0.0) / max(count - spent, 1.0)))
         sigma = max(sigma, SMALLEST_NOISE_MM)
     return solution, Noise(sigma, noise.correlation_samples)
 
 
 SMALLEST_NOISE_MM = 1e-7
-"""No bar is better; keeps noise-free simulations from dividing by zero."""
+"""Least noise of a bar, which prevents division by zero in noise-free simulations."""
 
 
 @with_one_thread
@@ -410,7 +410,7 @@ def of_residuals(
     observations: Sequence[Observation],
     work: Callable[[Observation, Floats], Found],
 ) -> list[Found]:
-    """Return `work` of each run and its measured minus predicted length, shape (n,) [mm], one at a time."""
+    """Apply `work` to each run and its measured minus predicted lengths, shape (n,) [mm], one run at a time."""
     needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))
     runs = looked_at(observations, needs)
 
@@ -464,5 +464,5 @@ def _check_enough(observations: Sequence[Observation]) -> None:
 
 
 def machine_sources(sources: Sequence[ErrorSource]) -> tuple[ErrorSource, ...]:
-    """Return machine sources visible in circles."""
+    """Return the machine sources that affect circles."""
     return tuple(source for source in sources if source.belongs_to is Owner.MACHINE and not source.of_currents)

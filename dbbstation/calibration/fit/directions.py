@@ -1,4 +1,4 @@
-"""Lost directions of parameters, in words."""
+"""Describe lost directions of parameters in words."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 RECOGNISED = 0.02
-"""Share of a known pattern that may lie outside the lost directions for it to count as lost."""
+"""Largest share of a known pattern outside the lost directions if it counts as lost."""
 
 ALONE = 1e-6
-"""How far below 1 a parameter's part of a direction may be for the direction to be that parameter."""
+"""If a parameter's component in a direction is within this of 1, the direction is named after it."""
 
 SHOWS_IN_CIRCLES = 0.1
-"""Part of a direction outside the drives' parameters from which it says something of circles."""
+"""Least component outside the drives' parameters of a direction that concerns circles."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidPattern:
-    """A rigid pattern of errors, by source and parameter order."""
+    """A pattern of strut and base-joint errors that circles may not determine."""
 
     text: str
     strut_mm: Floats
@@ -33,7 +33,7 @@ class RigidPattern:
 
 
 def patterns(base_joints_mm: Floats, axis_of_strut: Floats) -> list[RigidPattern]:
-    """Return rigid motions of the base, common strut length and uniform size, in order of trial."""
+    """Return known patterns, in order of trial: rigid motions of the base, common strut length, size, joint with strut."""
     none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
     found = [
         RigidPattern(f"all six base joints together along {axis}", none, np.tile(np.eye(3)[k], (STRUTS, 1)))
@@ -57,7 +57,7 @@ def patterns(base_joints_mm: Floats, axis_of_strut: Floats) -> list[RigidPattern
 
 
 def in_words(layout: Layout, held: Floats) -> tuple[str, ...]:
-    """Return a text for every held direction."""
+    """Return one description per held direction."""
     fitted = np.flatnonzero(~layout.known.random)
     names = [layout.names[column] for column in fitted]
     scale = layout.known.scale[fitted]
@@ -72,14 +72,14 @@ def in_words(layout: Layout, held: Floats) -> tuple[str, ...]:
             texts.append(pattern.text)
             inside = remaining @ vector
             inside /= np.linalg.norm(inside)
-            # What is named is taken out of the space, and the rest is searched on.
+            # Remove the described direction and continue with the remaining space.
             remaining = _orthonormal(remaining - np.outer(inside, inside @ remaining))[: len(remaining) - 1]
     texts += [_largest_parts(row, names) for row in remaining]
     return tuple(texts)
 
 
 def of_circles(layout: Layout, held: Floats) -> Floats:
-    """Return directions without their parts in motor currents, shape (g, f), and drop purely electrical ones."""
+    """Return directions without their components in drive parameters, shape (g, f); purely electrical directions are dropped."""
     fitted = np.flatnonzero(~layout.known.random)
     drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
     if not drives or len(held) == 0:

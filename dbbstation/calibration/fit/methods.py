@@ -1,4 +1,4 @@
-"""The paper's three methods [CAL IV]: one solver with different knowledge of ball positions."""
+"""The paper's three methods [CAL IV], which differ only in the knowledge of ball positions."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 BY_HAND_MM = 0.3
-"""How far from the tool tip a ball stands that was put up under the spindle by hand and not measured, one standard
-deviation per axis: hundreds of times what circles tell, so that nothing is learnt from it [mm]."""
+"""Prior standard deviation per axis of an unmeasured ball set up under the spindle by hand [mm]: hundreds of times the
+resolution of circles, so the prior adds no information."""
 
 CENTRED_MM = 2e-5
-"""Centres this near the fixed ball cannot have been measured, however well balls stand [mm]."""
+"""Centres so near the fixed ball cannot be measured ones, however accurate the set-up [mm]."""
 
 CENTRED_SHARE = 0.3
-"""Of the stated scatter of mountings and CMM: thirty coordinates that scatter by less have a chance of 1e-12. What
-centre compensation leaves, the square of the centre over the radius, is less."""
+"""Suspicious centres, relative to the stated scatter of mountings and CMM: thirty coordinates with less scatter have a
+probability of 1e-12. Centre compensation leaves less, the squared centre over the radius."""
 
 LEAST_CIRCULARITY_UM = 0.5
-"""A circle that is truer than this may well stand where it should: a simulation of a nominal machine [µm]."""
+"""A smaller circular deviation indicates a simulated nominal machine, whose centres may be exact [µm]."""
 
 
 HEIGHT_MM = 0.02
-"""The same for the height about which a level bar turns. A tenth of a millimetre changes its reading by 0.03 µm; left
-free, such heights would only trade with the tilt of circles in second order [mm]."""
+"""Prior standard deviation of such a ball's height, for a level bar [mm]. A tenth of a millimetre changes the reading
+by 0.03 µm; free heights would only correlate with the tilt of circles in second order."""
 
 
 class Method(StrEnum):
-    """Source of the balls' places."""
+    """Methods, by the origin of ball positions."""
 
     JIG = "jig"
     CONV_A = "conv-a"
@@ -48,10 +48,10 @@ class Method(StrEnum):
 
 
 def as_known(method: Method, machine: Machine, observations: Sequence[Observation]) -> list[Observation]:
-    """Return runs with a method's knowledge of their balls.
+    """Return the runs with ball positions and priors of a method.
 
     Args:
-        observations: raw; conventional methods ignore known ball positions.
+        observations: raw circles; conventional methods ignore known ball positions.
 
     Raises:
         CalibrationError: an unknown but needed ball position; centred circles.
@@ -109,7 +109,7 @@ def _check_read(observations: Sequence[Observation]) -> None:
 
 
 def _check_not_centred(observations: Sequence[Observation]) -> None:
-    """Refuse centred recordings: all are truer than a ball's set-up."""
+    """Refuse centred recordings: all centres are more exact than a ball's set-up allows."""
     if not observations:
         return
     seen = [figures(observation.raw) for observation in observations]

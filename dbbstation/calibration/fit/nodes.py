@@ -1,9 +1,9 @@
-"""Long runs as a few hundred nodes, without loss.
+"""Reduce long runs to a few hundred nodes without loss of information.
 
-A reading that depends on pose and time is smooth along the circle. Within six degrees it and its derivatives are
-polynomials of degree five to parts in 1e8, given at six nodes. With W from nodes to samples, J = W Jn, and W = Q R by
-sector, J^T J and J^T residual of the samples are those of R Jn and Q^T residual. Estimates, covariance and sum of
-squares are exactly the samples'. See docs/decisions.md, 2.
+A reading that depends on pose and time is smooth along the circle. Within six degrees, polynomials of degree five
+represent it and its derivatives to parts in 1e8, from values at six nodes. W interpolates from nodes to samples: J = W
+Jn. With W = Q R per sector, R Jn and Q^T residual give the same J^T J and J^T residual. Estimates, covariance and sum
+of squares are therefore equal. See docs/decisions.md, 2.
 """
 
 from __future__ import annotations
@@ -25,44 +25,44 @@ SECTORS = 60
 """Sectors of a turn, six degrees each."""
 
 AT_ONCE = 6
-"""Sectors that are worked out together; a divisor of their number."""
+"""Sectors computed together; a divisor of their number."""
 
 PER_SECTOR = 6
-"""Nodes of a sector, at the zeros of Chebyshev's polynomial."""
+"""Nodes per sector, at the zeros of the Chebyshev polynomial."""
 
 LONG = 4
-"""Samples per node from which nodes are less work."""
+"""Fewest samples per node that make nodes faster."""
 
 SMOOTH = 1e-6
-"""Greatest share of the last Chebyshev coefficient in a smooth quantity. The next, which is what the nodes miss, is a
-hundred times smaller where the quantity goes with the circle's first harmonics; a step leaves a tenth of itself."""
+"""Largest relative size of the last Chebyshev coefficient of a smooth quantity. For the circle's first harmonics the
+next coefficient, the interpolation error, is a hundred times smaller. A step gives a tenth of its height."""
 
 NOTHING = 1e-9
-"""Size of what cannot be told from zero: a picometre in a reading, or the effect of a millimetre by so much."""
+"""Negligible size: a picometre in a reading, or its equivalent per millimetre in a derivative."""
 
 _ANGLES = (np.arange(PER_SECTOR) + 0.5) * np.pi / PER_SECTOR
 _PLACES = -np.cos(_ANGLES)
-"""Nodes within a sector that reaches from -1 to 1, rising."""
+"""Nodes within a sector from -1 to 1, in ascending order."""
 
 _WEIGHTS = (-1.0) ** np.arange(PER_SECTOR) * np.sin(_ANGLES)
-"""Of the barycentric formula [Berrut and Trefethen, SIAM Review 46 (2004) 501, eq 5.3]."""
+"""Weights of the barycentric formula [Berrut and Trefethen, SIAM Review 46 (2004) 501, eq 5.3]."""
 
 _TO_POWERS = np.linalg.inv(np.vander(_PLACES, increasing=True))
-"""Values at the nodes to coefficients of powers of the place, lowest first; the condition is that of six nodes, a hundred."""
+"""Matrix from values at the nodes to polynomial coefficients, lowest power first; its condition number is a hundred."""
 
 _LAST = 2.0 / PER_SECTOR * np.cos((PER_SECTOR - 1) * np.arccos(_PLACES))
-"""Values at the nodes times this: the last Chebyshev coefficient."""
+"""Weights of the values at the nodes in the last Chebyshev coefficient."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunNodes:
-    """A run and its nodes.
+    """A run reduced to nodes.
 
     Attributes:
         coarse: the run with nodes as samples; its lengths are meaningless.
         roots: R of each sector, shape (sectors, nodes, nodes).
         seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].
-        unseen: norm of the residual beyond smooth readings [mm].
+        unseen: norm of the readings' component that no smooth curve explains [mm].
     """
 
     run: Observation
@@ -72,7 +72,7 @@ class RunNodes:
     unseen: float
 
     def samples_of(self, values: Floats) -> Floats:
-        """Return values at all samples, shape (n,), from those at the nodes, shape (m,)."""
+        """Return values at all samples, shape (n,), from values at the nodes, shape (m,)."""
         sector, place = _in_sectors(self.run.raw.phi_deg)
         powers = values.reshape(SECTORS, PER_SECTOR) @ _TO_POWERS.T
         found = powers[sector, -1]
@@ -88,12 +88,12 @@ class RunNodes:
         length_mm: Floats,
         shift: Floats,
     ) -> Block:
-        """Compress the run's samples.
+        """Return the information block of all samples.
 
         Args:
             columns: shape (k,).
             jacobian: at the nodes, shape (m, k).
-            shift: jacobian times this is added to measured less predicted length, shape (k,).
+            shift: parameter change, shape (k,); jacobian times shift is added to measured less predicted lengths.
         """
         nominal = self.run.raw.circle.bar_mm
         rows = self.roots @ jacobian.reshape(SECTORS, PER_SECTOR, -1)
@@ -105,7 +105,7 @@ class RunNodes:
 
 
 def nodes_of(run: Observation) -> RunNodes | None:
-    """Return a run's nodes; None for short runs and those commanded by samples."""
+    """Return a run's nodes; None for short runs and for runs with commands per sample."""
     raw = run.raw
     if len(raw) < LONG * SECTORS * PER_SECTOR or run.commanded is not None:
         return None
@@ -123,7 +123,8 @@ def nodes_of(run: Observation) -> RunNodes | None:
     most = max(int(count.max()), PER_SECTOR + 1)
     ends = np.concatenate([[0], np.cumsum(count)])
     triangle = np.empty((SECTORS, PER_SECTOR + 1, PER_SECTOR + 1))
-    # Some sectors at a time: weights of all nodes at all samples would take several times what the recording takes.
+    # Sectors are processed in groups: weights of all nodes at all samples would need several times the recording's
+    # memory.
     for begin in range(0, SECTORS, AT_ONCE):
         some = order[ends[begin] : ends[begin + AT_ONCE]]
         own = sector[some]
@@ -148,20 +149,20 @@ def _in_sectors(phi_deg: Floats) -> tuple[Integers, Floats]:
 
 
 def smooth(values: Floats) -> bool:
-    """Return whether quantities at nodes, shape (m, k), are polynomials that join between sectors.
+    """Return whether quantities at nodes, shape (m, k), are polynomials in each sector and continuous between sectors.
 
     Deviations below a billionth are rounding.
     """
     by_sector = values.reshape(SECTORS, PER_SECTOR, -1)
     last = np.abs(np.einsum("p,spk->sk", _LAST, by_sector)).max(axis=0)
-    # A step between the outermost nodes of two neighbours shows in neither of them.
+    # Polynomials of two neighbouring sectors do not show a step between their outermost nodes.
     begin, end = np.einsum("ep,spk->esk", _interpolation(np.array([-1.0, 1.0])), by_sector)
     step = np.abs(begin[1:] - end[:-1]).max(axis=0)
     return bool(np.all(np.maximum(last, step) <= SMOOTH * np.abs(values).max(axis=0) + NOTHING))
 
 
 def _interpolation(place: Floats) -> Floats:
-    """Return the polynomials that are one at one node, at places from -1 to 1, shape (n, nodes)."""
+    """Return the Lagrange polynomials of the nodes at places from -1 to 1, shape (n, nodes)."""
     distance = place[:, None] - _PLACES
     exact = distance == 0.0
     terms = _WEIGHTS / np.where(exact, 1.0, distance)

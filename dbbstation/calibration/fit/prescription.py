@@ -1,7 +1,7 @@
-"""Parameters held at nominal in place of lost directions, as in the standard circular test [CAL III-A-2].
+"""Parameters held at nominal instead of lost directions, as in the standard circular test [CAL III-A-2].
 
-Six directions are lost there. Any six prescribed parameters define coordinates and explain the circles equally; the
-machine's place in space follows from them.
+The standard test loses six directions. Any six prescribed parameters define coordinates, and with them the machine's
+place in space; all choices fit the circles equally.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 Name: TypeAlias = tuple[str, str]
-"""A parameter by source and its name there."""
+"""A parameter, by source and name."""
 
 PREFERRED = "base-joints"
-"""Parameters that are prescribed where nobody chooses: places of base joints define coordinates as a 3-2-1 seat does."""
+"""Source of the parameters that are prescribed by default: base joints define coordinates like a 3-2-1 location."""
 
 LEAST_SHARE = 1e-3
-"""How much of a lost direction prescribed parameters must hold for the rest to stay where it is."""
+"""Least part of a lost direction that the prescribed parameters must fix."""
 
 
 def prescribed(layout: Layout, lost: Floats, wanted: Sequence[Name]) -> Floats:
-    """Return rows that hold parameters in place of lost directions.
+    """Return rows that hold parameters instead of lost directions.
 
     Args:
-        lost: orthonormal rows in scales, shape (h, f).
-        wanted: parameters, equally many; empty: the best base joints.
+        lost: orthonormal rows in scaled parameters, shape (h, f).
+        wanted: parameters, as many as lost directions; empty to choose the best base-joint coordinates.
 
     Raises:
-        CalibrationError: a wrong number, a parameter not fitted, or a lost direction left free.
+        CalibrationError: wrong number, a parameter that is not fitted, or a lost direction that stays free.
     """
     fitted = _fitted(layout)
     if not wanted:
@@ -67,7 +67,7 @@ def prescribed(layout: Layout, lost: Floats, wanted: Sequence[Name]) -> Floats:
 
 
 def names_of(layout: Layout, held: Floats) -> tuple[Name, ...]:
-    """Return parameters of unit rows, shape (h, f)."""
+    """Return the parameters that unit rows, shape (h, f), hold."""
     fitted = _fitted(layout)
     return tuple(fitted[int(np.argmax(np.abs(row)))] for row in held)
 

@@ -1,1 +1,1 @@
-"""Find, name and free foreign runs and displaced balls."""
+"""Detect and identify outlying runs and displaced balls, and free their parameters."""

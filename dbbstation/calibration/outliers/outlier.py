@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     Step = tuple["Outlier", list[Observation], Calibration]
 
 STANDS_OUT = 4.0
-"""A run is an outlier whose residual is this many times the usual one ..."""
+"""A run is an outlier if its residual is this many times the usual residual ..."""
 
 LEAST_UM = 3.0
-"""... and more than a bar's noise could [µm]."""
+"""... and larger than a bar's noise can be [µm]."""
 
 
 class OutlierKind(StrEnum):
@@ -42,20 +42,20 @@ SOURCE_OF = {
     OutlierKind.WRONG_PLACE: "ball-coordinate",
     OutlierKind.BAR: "bar-offset",
 }
-"""Name of the error source that is out of size; a run that is no circle of this machine is none."""
+"""Error source with a value beyond its stated size; a run that is no circle of this machine has no such source."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outlier:
-    """An outlier kept out of the fit.
+    """An outlier whose influence on the fit is removed.
 
     Attributes:
-        test: or session, for a bar.
-        size_um: rms of a run, displacement of a ball, error of a bar's length.
+        test: name of the test, or of the session for a bar.
+        size_um: residual rms of a run, displacement of a ball, or length error of a bar.
         uncertainty_um: standard; None for a run.
         shift_um: of a ball, machine axes; None for a run.
-        sure: False if one mounting cannot separate a bad seat from a wrong CMM row.
-        alike: error sources of about equal explanation.
+        sure: False if a single mounting cannot distinguish a badly seated ball from a wrong CMM row.
+        alike: other error sources that explain it about equally well.
         freed: mountings with free ball, or session with free bar.
     """
 

@@ -1,4 +1,4 @@
-"""Find outlying runs and balls one at a time and free them."""
+"""Detect outlying runs and balls one at a time, and refit without their influence."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 MOST = 8
-"""Outliers that are looked for; more are no outliers but another machine or plan."""
+"""Most outliers; more indicate another machine or plan."""
 
 
 def calibrate_robust(
@@ -25,13 +25,13 @@ def calibrate_robust(
     balls: bool = True,
     begun: tuple[Calibration, tuple[Outlier, ...]] | None = None,
 ) -> tuple[Calibration, tuple[Outlier, ...]]:
-    """Fit, and fit again without the outliers.
+    """Fit, and refit after each detected outlier.
 
     Args:
-        begun: earlier result without balls, to continue.
+        begun: earlier result, before balls were freed, to continue from.
 
     Raises:
-        CalibrationError: as `fit`.
+        CalibrationError: as raised by `fit`.
     """
     calibration, before = begun or (fit(list(observations)), ())
     runs, found = list(calibration.observations), list(before)

@@ -1,4 +1,4 @@
-"""A run's residual, and its part beyond a shift of the ball."""
+"""Residuals of runs, and their part that no ball shift explains."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def left_of(calibration: Calibration) -> list[tuple[Observation, Floats]]:
-    """Return every run with its residual, shape (n,) [mm]."""
+    """Yield every run with its residual, shape (n,) [mm]."""
     return list(zip(calibration.observations, calibration.residual_mm, strict=True))
 
 

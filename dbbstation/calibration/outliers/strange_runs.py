@@ -1,4 +1,4 @@
-"""Find runs that are not circles of this machine, and reinstate explained ones."""
+"""Detect runs that are no circles of this machine, and reinstate runs that new physics explains."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 FALLS, AT_NOISE = 4.0, 4.0
-"""A test is an outlier if without it the others' mean square falls by the first, to less than the second in units of
-the noise. Physics that the model lacks stays in the others."""
+"""A test is an outlier if its omission reduces the others' mean square by the factor `FALLS`, to less than `AT_NOISE`
+times the noise. Missing physics would remain in the other tests."""
 
 ALONE = 1.2
-"""One run of a test is to blame where leaving it out does nearly all that leaving the test out does."""
+"""A single run is the outlier if its omission leaves at most this multiple of the mean square without the whole test."""
 
 
 def strange_runs(calibration: Calibration) -> list[int]:
-    """Return indices of a test's foreign runs; may be empty."""
+    """Return the indices of one test's outlying runs; may be empty."""
     return _strange_test(calibration) or _strange_run(calibration)
 
 
 def _strange_test(calibration: Calibration) -> list[int]:
-    """Return indices of a test without which all others fit; may be empty.
+    """Return the runs of a test whose omission lets all others fit, as indices; may be empty.
 
-    Two directions under a wrong test bend the fit and hardly stand out.
+    Both directions under a wrong test bias the fit, so their own residuals are hardly larger.
     """
-    # Run by run: all residuals in one array are a number a sample more.
+    # Per run, because one array of all residuals would need another number per sample.
     squares_um2 = [rms_um(residual) ** 2 for residual in calibration.residual_mm]
     if np.sqrt(np.average(squares_um2, weights=list(map(len, calibration.residual_mm)))) < LEAST_UM:
         return []
@@ -83,7 +83,7 @@ def _strange_from_um(rests_um: Floats) -> float:
 def in_place_after_all(
     calibration: Calibration, runs: Sequence[Observation], outliers: Sequence[Outlier]
 ) -> tuple[list[Observation], tuple[Outlier, ...]]:
-    """Return the sound runs and remaining outliers under newly known physics."""
+    """Return the runs to fit and the remaining outliers, after new physics entered the model."""
 
     def named(run: Observation) -> tuple[str, str]:
         return run.setup.session, run.label
@@ -102,7 +102,7 @@ def in_place_after_all(
 
 
 def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> Step:
-    """Leave runs of one test out, and identify them by the fit of the others."""
+    """Fit without some runs of one test, and identify them by this fit."""
     kept = [run for i, run in enumerate(runs) if i not in strange]
     again = fit(kept)
     run = runs[strange[0]]

@@ -1,4 +1,4 @@
-"""Find and free displaced balls and bars of wrong length."""
+"""Detect and free displaced balls and bars of wrong length."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 SIGMAS = 5.0
-"""Of the stated scatter, or of the usual one where that is more, by which a ball must be off its place."""
+"""Displacement of an outlying ball, in units of the stated or the usual scatter, whichever is larger."""
 
 _TAIL = 2.0 * float(ndtr(-SIGMAS))
 
 SAME_SIGMAS = 3.0
-"""Two puttings-up of a ball that differ by less stand at the same wrong place."""
+"""Mountings of a ball that differ by fewer standard deviations are at the same wrong place."""
 
 
 def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Return the runs with a new mounting for one whose ball moved within its mounting; None if no ball moved, or the mounting has one run."""
+    """Give the run whose ball moved within its mounting a separate mounting, and refit; None without such a run."""
     k = _moved_in(calibration)
     if k is None:
         return None
@@ -63,11 +63,12 @@ def _moved_in(calibration: Calibration) -> int | None:
 
 
 def off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Free the ball with the greatest displacement in usual units."""
+    """Free the ball with the largest displacement, in units of the usual scatter; None if no ball is an outlier."""
     seats = [seat for seat in seats_of(calibration) if seat.freedom > 0]
     if not seats:
         return None
-    # By chance half of them lie beyond their median: a model that lacks physics scatters all balls.
+    # By chance half of the values exceed the median; missing physics scatters all balls, so the limit grows with the
+    # median.
     usual = max(1.0, float(np.median([seat.square / float(chdtri(seat.freedom, 0.5)) for seat in seats])))
     worst = max(seats, key=lambda seat: seat.square / seat.freedom)
     beyond = float(chdtri(worst.freedom, _TAIL))
@@ -84,7 +85,7 @@ def free_ball(
     *,
     together: bool | None = None,
 ) -> Step:
-    """Free the ball of a mounting, with its other mountings if displaced alike."""
+    """Free the ball of a mounting, and in its other mountings if their displacements agree."""
     worst = next(seat for seat in seats if seat.mounting == mounting)
     alike = [seat for seat in seats if seat.ball == worst.ball and seat is not worst]
     if together is None:
@@ -103,7 +104,7 @@ def free_ball(
 
 
 def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None:
-    """Free an outlier; None if the runs cannot be fitted then.
+    """Free an outlier and refit; None if the fit fails.
 
     Args:
         source: `mounting`, `ball-coordinate` or `bar-offset`.
@@ -120,7 +121,7 @@ def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None
 
 
 def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
-    """Free the bar length of a session."""
+    """Free the bar length of a session and refit."""
     of = [run for run in runs if run.setup.session == session]
     why = f", and ± {1e3 * of[0].setup.bar_uncertainty_mm:.2f} was stated: put it on its calibrator again"
     freed = [
@@ -131,7 +132,7 @@ def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
 
 
 def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
-    """Return a freed outlier with the values of another fit; leave other outliers unchanged."""
+    """Return a freed outlier with values from another fit; other outliers are returned unchanged."""
     if outlier.kind is OutlierKind.BAR:
         found = _bar(calibration, outlier.freed[0], outlier.why)
     elif outlier.freed:
@@ -186,7 +187,7 @@ def _same(a: MountingOffset, b: MountingOffset) -> bool:
 
 
 def _freed(run: Observation) -> Observation:
-    """Return the run with a free ball, in height only if visible."""
+    """Return the run with a free ball; its height is free only if the circle shows it."""
     size = np.zeros(3) + run.setup.mounting_repeatability_mm
     seen = 3 if run.raw.circle.elevation_deg != 0.0 else 2
     size[:seen] = UNKNOWN_MM

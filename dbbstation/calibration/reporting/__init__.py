@@ -1,1 +1,1 @@
-"""A fit as figures: circles, plane, maps, plain numbers."""
+"""Report a fit: figures of circles and plane, maps, numbers."""

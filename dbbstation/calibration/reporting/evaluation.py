@@ -24,23 +24,23 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
 
 PLANE_HALF_WIDTH_MM = 190.0
-"""The 380 x 380 mm over which the paper quotes flatness and parallelism."""
+"""Half the square of 380 mm over which the paper states flatness and parallelism."""
 
 STRAIGHT_POINTS = 39
-"""Points along X at which parallelism is looked at: every 10 mm."""
+"""Points along X for parallelism: every 10 mm."""
 
 _RING = PLANE_HALF_WIDTH_MM * np.array([(-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)])
-"""X and Y of the points over which flatness is taken [mm]."""
+"""X and Y of the points for flatness [mm]."""
 
 _ALONG = np.column_stack(
     [np.linspace(-PLANE_HALF_WIDTH_MM, PLANE_HALF_WIDTH_MM, STRAIGHT_POINTS), np.zeros(STRAIGHT_POINTS)]
 )
-"""X and Y of the move along X whose sideways deviation is parallelism [mm]."""
+"""X and Y of the move along X whose lateral deviation is parallelism [mm]."""
 
 
 @dataclass(frozen=True)
 class CircleDeviations:
-    """Figures of one circle [CAL Table III]: centre deviation, also from the first test's centre, mean radial error, circularity."""
+    """Figures of one circle [CAL Table III]: centre deviation (also relative to the first test's centre), mean radial error, circularity."""
 
     centre_deviation_um: float
     mean_radial_error_um: float
@@ -70,7 +70,7 @@ class EvaluatedRun(OfRun):
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a model makes of recordings."""
+    """Figures of recordings under the nominal machine and under a model."""
 
     runs: tuple[EvaluatedRun, ...]
     residual_rms_um: float
@@ -111,7 +111,7 @@ def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[li
     def of_run(observation: Observation, residual_mm: Floats) -> tuple[CircleFigures, float, int]:
         return _figures_of(observation, residual_mm), float(residual_mm @ residual_mm), len(residual_mm)
 
-    # Run by run: residuals are a number a sample.
+    # Per run, because residuals need one number per sample.
     found, squares, counts = zip(*of_residuals(model, observations, of_run), strict=True)
     return list(found), 1e3 * float(np.sqrt(sum(squares) / sum(counts)))
 
@@ -141,7 +141,7 @@ def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel
     Only pose-dependent sources count.
 
     Args:
-        corrected: the control's calibrated belief; the deviation is then its residual.
+        corrected: calibrated model that the control corrects; the figures then describe its residual error.
 
     Raises:
         KinematicsError: the plane is outside the workspace.

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
 
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost", "covariance"})
-"""Parts of a result that the model file holds in places of their own."""
+"""Parts of a result that a model file stores elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +71,11 @@ class CalibrationFigures:
     """All figures of a fit, and its outliers.
 
     Attributes:
-        noise_um: of a reading, from neighbours.
-        misfit: beyond noise and mountings.
-        gaps: remaining knowledge of them, in words.
-        directions_regularised: known by tolerances only, in words.
-        parameters_prescribed: held in place of directions, as `source.parameter`.
+        noise_um: of a reading, from neighbouring samples.
+        misfit: residual beyond noise and mountings.
+        gaps: texts on the measurements that would determine lost directions.
+        directions_regularised: descriptions of directions that only tolerances determine.
+        parameters_prescribed: held instead of directions, as `source.parameter`.
     """
 
     runs: tuple[EvaluatedRun, ...]
@@ -134,8 +134,8 @@ def calibration_figures(
     )
 
 
-def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  # noqa: ANN401 - what the file takes
-    """Return the numbers that a model file keeps."""
+def report_of(figures: CalibrationFigures, **more: Any) -> dict[str, object]:  # noqa: ANN401 - types of the model file
+    """Return the figures that a model file stores."""
     return {**more, **{key: value for key, value in plain(figures).items() if key not in ELSEWHERE_IN_MODEL}}
 
 
@@ -153,7 +153,7 @@ def covariance_of(identified: IdentifiedModel) -> Covariance:
 def _uncertainties(calibration: Calibration) -> Floats:
     variance = np.maximum(calibration.solution.variance, 0.0)
     variance += calibration.layout.formula_variance(calibration.x)
-    if calibration.prescribed:  # they define coordinates, and all parameters are known in these
+    if calibration.prescribed:  # prescribed parameters define coordinates, in which all parameters are known
         return np.sqrt(variance)
     return known_u(variance, np.sum(calibration.null_space**2, axis=0))
 

@@ -1,4 +1,4 @@
-"""The model that is kept of a calibration."""
+"""Make the model that is stored after a calibration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def identified_model(
     calibration: Calibration, report: Mapping[str, Any], sessions: Mapping[str, str]
 ) -> IdentifiedModel:
-    """Return the model to keep, with covariance of the machine's part, and provenance."""
+    """Return the model to store, with the covariance of machine parameters and the origin of the data."""
     machines = [term for term in calibration.layout.terms if term.source.belongs_to is Owner.MACHINE]
     rows = np.concatenate([np.r_[term.columns] for term in machines])
     names = calibration.layout.names

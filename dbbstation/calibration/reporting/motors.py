@@ -1,4 +1,4 @@
-"""Motor currents of a calibration."""
+"""Results of a calibration on motor currents."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Motor:
     Attributes:
         motor: 1 to 6.
         force_per_current: of the strut [N/A].
-        torque_per_current: at the screw [Nm/A]; None without its lead.
+        torque_per_current: at the screw [Nm/A]; None if its lead is unknown.
     """
 
     motor: int
@@ -49,10 +49,10 @@ class Motor:
 
 @dataclass(frozen=True)
 class CurrentsFigures:
-    """Motor currents.
+    """Results of all motors.
 
     Attributes:
-        weight_taken_as_known_n: of the platform, the basis of forces.
+        weight_taken_as_known_n: of the platform; all forces are relative to it.
         centre_of_gravity: by coordinate and channel, `circles`, `currents`, `both` [mm]; None if undetermined.
     """
 
@@ -65,7 +65,7 @@ class CurrentsFigures:
 def motor_currents(calibration: Calibration) -> CurrentsFigures | None:
     """Return gain, friction, noise and residual of motors, and the centre of gravity by channel.
 
-    Return None for circles alone; undetermined numbers are None.
+    Without fitted currents the result is None; undetermined numbers are None.
     """
     found = calibration.currents
     if found is None:

@@ -1,4 +1,4 @@
-"""Circles before and after by test, and their centres over the plate [CAL Fig 6]."""
+"""Circles by test, before and after calibration, and their centres over the plate [CAL Fig 6]."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ SECTORS = 180
 
 @dataclass(frozen=True, eq=False)
 class CircleBeforeAfter:
-    """One run, by rising angle, shape (s,) each.
+    """One run's deviations, in ascending order of angle, shape (s,) each.
 
     Attributes:
-        before_um: measured less nominally predicted length; less nominal bar length for plain circles.
-        after_um: measured less the model's length; balls and bar as stated.
+        before_um: measured length less the nominal prediction; for plain circles less the nominal bar length.
+        after_um: measured length less the model's prediction, with balls and bar as stated.
     """
 
     direction: Direction
@@ -41,11 +41,11 @@ class CircleBeforeAfter:
 
 @dataclass(frozen=True, eq=False)
 class CircleTest:
-    """One test, all its runs together.
+    """One test with all its runs.
 
     Attributes:
         ball_mm: by CMM, machine frame, shape (3,).
-        centre_um: from the ball, mean of runs, before and after, rows of x, y, shape (2, 2).
+        centre_um: mean centre of its runs from the ball; rows before and after, columns x and y, shape (2, 2).
     """
 
     name: str
@@ -57,7 +57,7 @@ class CircleTest:
 
 @dataclass(frozen=True, eq=False)
 class BallShift:
-    """The fit's displacement of a ball.
+    """A ball's displacement found by the fit.
 
     Attributes:
         shift_um: found less stated place in X and Y, shape (2,).
@@ -90,7 +90,7 @@ def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
 
 
 def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:
-    """Return shifts of balls at stated places, not under the spindle or freed."""
+    """Return the shifts of balls at stated places, without freed balls and balls under the spindle."""
     tests: dict[str, list[str]] = {}
     for observation, name in zip(calibration.observations, names_of_tests(calibration.observations), strict=True):
         tests.setdefault(observation.setup.mounting, []).append(name)

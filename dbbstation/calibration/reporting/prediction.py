@@ -1,4 +1,4 @@
-"""Measured and predicted circularity, run by run [GRAV Table 3]."""
+"""Compare measured and predicted circularity per run [GRAV Table 3]."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.trace.circle import RawCircle
 
 UNDULATIONS = 30
-"""Per revolution, up to which form counts: the peak to valley of a bar's noise would hide what a model gets wrong."""
+"""Highest undulations per revolution of form; otherwise the peak-to-valley noise of a bar would hide model errors."""
 
 SAMPLES_PER_UNDULATION = 4
 
@@ -31,7 +31,7 @@ class PredictedCircle:
     """One run.
 
     Attributes:
-        before_um: of the nominal residual; as measured for a plain circle.
+        before_um: circularity of the nominal residual; for a plain circle as measured.
     """
 
     measured_um: float
@@ -69,17 +69,17 @@ def predicted_circles(
 
 
 def smooth_circularity_um(raw: RawCircle, length_mm: Floats) -> float:
-    """Return circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
+    """Return the circularity [µm] of lengths, shape (n,) [mm], at a circle's angles, up to 30 undulations per revolution."""
     return smooth_circularities_um(raw, [length_mm])[0]
 
 
 def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[Floats]) -> list[float]:
-    """Return G of several series of lengths, each of shape (n,) [mm], in µm."""
+    """Return G [µm] of several series of lengths, shape (n,) each [mm]."""
     return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
 
 
 def smooth_lengths_mm(raw: RawCircle, length_mm: Floats) -> Floats:
-    """Return lengths up to 30 undulations per revolution, shape (n,) [mm]."""
+    """Return lengths without undulations above 30 per revolution, shape (n,) [mm]."""
     return _smooth_mm(raw, [length_mm])[0]
 
 

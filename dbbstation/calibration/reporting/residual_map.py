@@ -26,7 +26,7 @@ class ResidualMap:
     """Mean smooth residuals over test and angle.
 
     Attributes:
-        um: by direction, tests by angle from +X towards +Y, NaN for gaps, shape (tests, 36) each [µm].
+        um: arrays by direction, shape (tests, 36) each [µm]: rows are tests, columns angles from +X towards +Y; NaN for gaps.
     """
 
     tests: tuple[str, ...]
@@ -40,7 +40,7 @@ class ResidualMap:
 
 @with_one_thread
 def residual_map(observations: Sequence[Observation], residual_mm: Sequence[Floats]) -> ResidualMap:
-    """Return residuals averaged over ten degrees, noise removed."""
+    """Return residuals without noise, averaged over ten degrees."""
     names = names_of_tests(observations)
     rows = {name: k for k, name in enumerate(dict.fromkeys(names))}
     um = {direction: np.full((len(rows), SECTORS), np.nan) for direction in Direction}
@@ -50,7 +50,7 @@ def residual_map(observations: Sequence[Observation], residual_mm: Sequence[Floa
 
 
 def names_of_tests(observations: Sequence[Observation]) -> list[str]:
-    """Return each run's test, numbered if repeated, with session if several."""
+    """Return each run's label: its test, with a number if repeated and the session if there are several."""
     repeated = any(o.repeat > 1 for o in observations)
     several = len({o.setup.session for o in observations}) > 1
     return [

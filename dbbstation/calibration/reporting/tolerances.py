@@ -1,4 +1,4 @@
-"""The shop's tolerances against a model's figures of runs."""
+"""Compare the shop's tolerances with a model's figures of runs."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class EvaluatedTolerance:
     """A tolerance, and the worst run under the nominal machine and under the model.
 
     Attributes:
-        before: nominal; None without applicable run.
-        after: under the model; None without applicable run.
+        before: worst run under the nominal machine; None without applicable run.
+        after: worst run under the model; None without applicable run.
     """
 
     quantity: str
@@ -43,7 +43,7 @@ class EvaluatedTolerance:
 def evaluated_tolerances(
     tolerances: Iterable[Tolerance], runs: Sequence[EvaluatedRun]
 ) -> tuple[EvaluatedTolerance, ...]:
-    """Apply tolerances to runs, nominal and under the model."""
+    """Compare tolerances with runs under the nominal machine and under the model."""
     return tuple(
         EvaluatedTolerance(
             quantity=tolerance.figure.value,

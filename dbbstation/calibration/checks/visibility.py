@@ -92,7 +92,9 @@ def visibility(calibration: Calibration) -> Observability:
     whole = spread_over(calibration.circle_blocks, fitted)[:, :-1] * scale
     free = complement(calibration.solution.held)
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
-    singular = singular[singular > ROUNDING * singular[0]]  # circles contain no information on sources that change currents only
+    singular = singular[
+        singular > ROUNDING * singular[0]
+    ]  # circles contain no information on sources that change currents only
     readings = sum(block.count for block in calibration.circle_blocks)
     return Observability(
         singular_values_mm=tuple(singular.tolist()),

@@ -1,1 +1,1 @@
-"""Figures of measured circles after ISO 230-4, with uncertainties, without a model."""
+"""Figures of measured circles by ISO 230-4, with uncertainties, without a model."""

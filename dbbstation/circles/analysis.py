@@ -1,4 +1,4 @@
-"""All figures of one circle, or of both directions, after ISO 230-4."""
+"""Figures of one circle, or of both directions, by ISO 230-4."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 EDITION = "ISO 230-4:2005"
-"""Whose words the figures have. What they mean is written out in docs/circles.md; none of its editions was at hand."""
+"""Edition whose terms the figures use. docs/circles.md defines them; the text of the standard was not available."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class CircleAnalysis:
     Attributes:
         centre_mm: least-squares less commanded, X and Y.
         radius_error_um: least-squares less nominal radius.
-        mean_radial_error_um: mean reading less nominal bar length [CAL Table III].
-        steps: at visible reversals of X and Y.
-        closure: end less begin of the turn; None for too few samples.
+        mean_radial_error_um: mean reading less nominal length [CAL Table III].
+        steps: at reversals of X and Y on the turn.
+        closure: end less beginning of the turn; None for too few samples.
         passes: None without overlap.
-        feed_mm_min: by the overlap, with standard uncertainty; or None.
+        feed_mm_min: from the overlap, with standard uncertainty; or None.
         residual_um: from the least-squares circle, unfiltered, in time order, shape (n,).
     """
 
@@ -74,17 +74,17 @@ class CircleAnalysis:
 
     @cached_property
     def g_um(self) -> float:
-        """Return the circular deviation G, minimum zone [µm]; only figures need it, no finding does."""
+        """Return the circular deviation G by minimum zone [µm]."""
         return 1e3 * self.path.zone().width_mm
 
 
 @with_one_thread
 def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter = Filter.NONE) -> CircleAnalysis:
-    """Work out all figures of a circle.
+    """Compute all figures of a circle.
 
     Args:
-        recording: for feed, overlap and losses; None: the turn alone.
-        chosen: of G, F and H; other figures are unfiltered.
+        recording: for feed, overlap and losses; None for the turn alone.
+        chosen: filter of G, F and H; other figures are unfiltered.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -150,7 +150,7 @@ def feed_shown(recording: Recording, circle: Circle, noise_mm: float = 0.0) -> t
     """Return the overlap's feed and standard uncertainty [mm/min], or None.
 
     Args:
-        noise_mm: of a sample, for slow figures.
+        noise_mm: noise of a sample for slow figures.
 
     Raises:
         TraceError: feed-in or feed-out is missing.
@@ -167,7 +167,7 @@ class PairAnalysis:
     Attributes:
         one: first in time.
         g_um: bi-directional circular deviation G(b), minimum zone.
-        d_um: mean bi-directional radial deviation D: common least-squares less nominal radius.
+        d_um: mean bi-directional radial deviation D: common least-squares radius less nominal radius.
         h_um: circular hysteresis H: greatest radial difference at one angle.
     """
 
@@ -183,7 +183,7 @@ class PairAnalysis:
 
 @with_one_thread
 def analyse_pair(one: CircleAnalysis, other: CircleAnalysis) -> PairAnalysis:
-    """Work out the figures of both directions of a circle.
+    """Compute the figures of both directions of a circle.
 
     Raises:
         TraceError: the points do not determine a circle.

@@ -1,4 +1,4 @@
-"""Uncertainty budgets of circle figures: one term per cause, and unstated causes."""
+"""Uncertainty budgets of circle figures, with unstated causes."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ NOT_STATED: tuple[str, ...] = (
     "how fast the gauge follows",
     "heat of the machine between runs",
 )
-"""Causes that neither recording nor session can show; a bar's certificate or its maker can."""
+"""Causes that neither recording nor session shows, only the bar's certificate or maker."""
 
 
 @dataclass(frozen=True)
 class SetUpKnowledge:
-    """Stated facts of bar and ball; None if not stated.
+    """Stated uncertainties of bar and ball; None if not stated.
 
     Attributes:
         u_temperature_um: standard uncertainty of corrected growth.
         u_ball_um: standard uncertainty in X and Y, coordinate and mounting.
-        u_form_um: standard uncertainty of a reading by the form of both balls.
+        u_form_um: standard uncertainty of a reading due to the form of both balls.
     """
 
     u_bar_um: float | None = None
@@ -65,7 +65,7 @@ class Budget:
     """Standard uncertainty of one figure.
 
     Attributes:
-        u_um: standard uncertainty; None if a cause of unknown size counts.
+        u_um: standard uncertainty; None if a contribution is unknown.
         value_um: without noise's contribution.
     """
 
@@ -96,16 +96,16 @@ def _budget(
 
 
 TOO_FEW = f"fewer than {FEWEST_SAMPLES} samples do not separate noise from form"
-"""Why a figure of few samples has no uncertainty: its noise is unknown."""
+"""Why a figure of few samples has no uncertainty."""
 
 NO_PLACE = "not absolute, because the ball's place is unknown"
-"""Why the centre about a ball that was put up under the spindle has no uncertainty."""
+"""Why the centre about a ball set up under the spindle has no uncertainty."""
 
 NO_HEIGHT = "not absolute, because a raised bar does not tell the radius from the height of the tool tip"
-"""Why the radius of a raised bar has no uncertainty: a tip that is higher by dz makes it longer by dz tan e [cone of the bar]."""
+"""Why the radius of a raised bar has no uncertainty: a tool tip higher by dz lengthens it by dz tan e."""
 
 RANGES = (BudgetQuantity.G, BudgetQuantity.G_LS, BudgetQuantity.F_MAX, BudgetQuantity.F_MIN)
-"""Figures of one circle that are extremes of its path."""
+"""Figures that are extremes of one circle's path."""
 
 
 def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowledge) -> Budget:
@@ -126,7 +126,7 @@ def budget_of(one: CircleAnalysis, quantity: BudgetQuantity, known: SetUpKnowled
     terms = {
         BudgetTerm.NOISE: along * slow_noise_um(one, 1) * np.sqrt(2.0 / len(one.raw)),
         BudgetTerm.ANGLE: abs(across_um) * np.radians(one.raw.start_uncertainty_deg),
-        # A drift c over the turn is a sawtooth, whose first harmonic is c / pi across the start.
+        # A drift c over the turn is a sawtooth; its first harmonic is c / pi, perpendicular to the start.
         BudgetTerm.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
     }
     missing = [*NOT_STATED]
@@ -200,7 +200,7 @@ def budgets(
 def _with_form(budget: Budget, known: SetUpKnowledge) -> Budget:
     """Return a budget with the form of both balls, if stated.
 
-    A range of readings is off by at most either ball's form; hysteresis compares the same places of both.
+    A range of readings errs by at most the form of either ball. Hysteresis compares the same places of both.
     """
     if known.u_form_um is None:
         return budget

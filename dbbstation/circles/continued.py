@@ -1,8 +1,8 @@
-"""Noise of one turn at low undulations, extrapolated from above by possible memories.
+"""Extrapolate one turn's noise to low undulations, for possible correlation lengths.
 
-Noise with a memory of more than six degrees has the same slope above 30 undulations. Lines below bound it: noise has at
-most their power, and many lines at the expected power are noise. Each line is noise, or form of any size [spike and
-slab; Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
+All noise correlated over more than six degrees has the same slope above 30 undulations. Lower lines bound its power:
+noise cannot exceed them, and many lines at the expected power are noise. Each line is noise alone, or noise with form
+of any size [spike and slab; Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023].
 """
 
 from __future__ import annotations
@@ -18,37 +18,38 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 CORNERS = np.geomspace(1.0, 240.0, 33)
-"""Corners of the spectrum that are tried, in undulations, from a memory of a sixth of a turn to none that shows."""
+"""Tried corner frequencies in undulations: correlation over a sixth of a turn to no visible correlation."""
 
 EXPONENTS = np.array([0.5, 0.75, 1.0, 1.25, 1.5])
-"""Exponents of power laws that are tried, 1/f noise among them. Drifts have larger ones, do not close, and are a term of their own."""
+"""Tried exponents of power laws, including 1/f noise. Drifts have larger exponents, do not close, and are a separate term."""
 
 SLOWEST = 1e-2
-"""Cycles per turn down to which power laws go on: a session has about a hundred turns, and the bar is on its calibrator before or after.
-The radius under 1/f noise has u by 0.6 of this where they end at a tenth of a cycle, by 1.3 where at a thousandth."""
+"""Lowest frequency of power laws in cycles per turn: a session has about a hundred turns, and the calibrator bounds
+slower changes. For 1/f noise, u of the radius is 0.6 times as large with a tenth of a cycle, 1.3 times with a
+thousandth."""
 
 NOISE_ALONE = 0.5
-"""Chance beforehand that a line below 30 undulations is noise alone. A wrong choice is as bad in both directions, hence one half."""
+"""Prior probability that a line below 30 undulations is noise alone. Both errors are equally bad, hence one half."""
 
 FORM_DECADES = 6.0
-"""Decades of power over which form is as likely as not, all alike."""
+"""Decades of the uniform prior of a form's log power."""
 
 NOTHING_UM2 = 1e-24
-"""Least power of noise: less than the rounding of any length makes, 3e-11 µm at 150 mm. A path that was worked out and not measured
-has no more, nor has the difference of two that are the same [µm²]."""
+"""Least noise power [µm²], below the rounding of any length, 3e-11 µm at 150 mm. Computed paths and differences of
+equal paths have less."""
 
 FIRST_FORM = 2
-"""The first line that is form. Those before are radius and centre, which were taken off."""
+"""First line of form; the lines before, radius and centre, are removed."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContinuedNoise:
-    """Noise power at lines 0, 1, ... low, by memory.
+    """Noise power at lines 0, 1, ... low, for each noise model.
 
     Attributes:
-        powers: shape (memories, low + 1) [µm²].
-        weights: sum one, shape (memories,).
-        freedoms: degrees of freedom of each, shape (memories,).
+        powers: shape (models, low + 1) [µm²].
+        weights: posterior probabilities, shape (models,).
+        freedoms: degrees of freedom, shape (models,).
     """
 
     powers: Floats
@@ -57,19 +58,19 @@ class ContinuedNoise:
 
     @property
     def usual(self) -> Floats:
-        """Return the geometric mean over memories, shape (low + 1,) [µm²]."""
+        """Return the geometric mean over models, shape (low + 1,) [µm²]."""
         return np.asarray(np.exp(self.weights @ np.log(self.powers)))
 
     @property
     def mean(self) -> Floats:
-        """Return the mean over memories, the variance of slow figures, shape (low + 1,) [µm²]."""
+        """Return the mean over models, the variance of slow figures, shape (low + 1,) [µm²]."""
         return np.asarray(self.weights @ self.powers)
 
     def drawn(self, rng: np.random.Generator, draws: int) -> Floats:
         """Return drawn powers, shape (draws, low + 1) [µm²].
 
-        Each draw has one memory and a strength of flat log prior [scaled inverse chi-square; Gelman et al., Bayesian Data
-        Analysis, sec. 2.6].
+        Each draw has one model, and a strength with a flat log prior [scaled inverse chi-square; Gelman et al.,
+        Bayesian Data Analysis, sec. 2.6].
         """
         which = rng.choice(len(self.weights), draws, p=self.weights)
         strength = self.freedoms[which] / rng.chisquare(self.freedoms[which])
@@ -77,10 +78,10 @@ class ContinuedNoise:
 
 
 def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> ContinuedNoise:
-    """Extrapolate the noise of one turn.
+    """Extrapolate one turn's noise to lines 0, 1, ... low.
 
     Args:
-        below: power at lines 0, 1, ... low, with form, shape (low + 1,) [µm²].
+        below: power at these lines, with form, shape (low + 1,) [µm²].
         above: noise power above, shape (h,) [µm²].
         freedom: of each line.
     """
@@ -91,7 +92,7 @@ def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> Conti
         return ContinuedNoise(white, np.ones(1), np.array([freedom * len(above)]))
     powers = np.maximum(found.powers, NOTHING_UM2)
     ratio = np.maximum(below[FIRST_FORM:], NOTHING_UM2) / powers[:, FIRST_FORM:]
-    alone = NOISE_ALONE * ratio * np.exp(-np.minimum(ratio, 700.0))  # both as densities of the logarithm of the power
+    alone = NOISE_ALONE * ratio * np.exp(-np.minimum(ratio, 700.0))  # both are densities of the logarithm of the power
     with_form = (1.0 - NOISE_ALONE) * -np.expm1(-ratio) / (FORM_DECADES * np.log(10.0))
     likely = found.likely - _ALIKE + np.log(alone + with_form + np.finfo(float).tiny).sum(axis=1)
     weights = np.exp(likely - likely.max())
@@ -100,7 +101,7 @@ def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> Conti
 
 
 def _processes(harmonic: Floats) -> Floats:
-    """Return the power of memories and power laws, shape (corners + exponents, h).
+    """Return the power of first-order processes and power laws, shape (corners + exponents, h).
 
     At lines 0 and 1 a power law is filtered by the window of one turn.
     """
@@ -111,10 +112,10 @@ def _processes(harmonic: Floats) -> Floats:
 
 
 def _through_a_turn(line: int) -> Floats:
-    """Return the power of laws f^-a from `SLOWEST` at a line, shape (exponents,).
+    """Return the power of laws f^-a, cut off at `SLOWEST`, at a line, shape (exponents,).
 
-    Mean of both rotations, each through sinc², the window of one turn [Priestley, Spectral Analysis and Time Series,
-    1981, sec. 6.2].
+    The result is the mean over positive and negative frequencies, each filtered by sinc², the window of one turn
+    [Priestley, Spectral Analysis and Time Series, 1981, sec. 6.2].
     """
     cycles = np.concatenate([np.geomspace(SLOWEST, 0.3, 2001)[:-1], np.linspace(0.3, 30.0, 30001)])
     window = np.sinc(cycles - line) ** 2 + np.sinc(cycles + line) ** 2
@@ -124,4 +125,4 @@ def _through_a_turn(line: int) -> Floats:
 _THROUGH_A_TURN = (_through_a_turn(0), _through_a_turn(1))
 
 _ALIKE = np.log(np.repeat([len(CORNERS), len(EXPONENTS)], [len(CORNERS), len(EXPONENTS)]))
-"""Both kinds of noise are as likely beforehand, each shared out evenly."""
+"""Log prior: both kinds of noise are equally probable, and so are the models within a kind."""

@@ -1,4 +1,4 @@
-"""Figures of circles without noise's contribution: G, F, H, G(b)."""
+"""Estimate G, F, H and G(b) without the contribution of noise."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 CLEAR = 2.0
-"""Standard uncertainties from which a drift over the turn counts as form: less is noise."""
+"""Standard uncertainties above which a drift over the turn counts as form, not noise."""
 
 
 def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | None:
-    """Return G, G(LS), Fmax or Fmin; None for too few samples."""
+    """Return the estimate of G, G(LS), Fmax or Fmin; None for too few samples."""
     if not one.noise.known:
         return None
     found = _FOUND.setdefault(one, {})
@@ -66,10 +66,10 @@ def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
 
 
 def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
-    """Return the white noise per sample of equal effect on a figure [µm].
+    """Return the white noise per sample that affects a figure equally [µm].
 
     Args:
-        one: a circle; with too few samples only rounding counts.
+        one: with too few samples only rounding counts.
         undulations: 0 for radius and mean, 1 for a centre.
     """
     if not one.noise.known:
@@ -95,12 +95,12 @@ def _taken_apart(one: CircleAnalysis) -> FormAndNoise:
 
 
 OF_A_CIRCLE = 2
-"""Lines of the spectrum that the least-squares circle takes: radius and centre, whose noise the deviations from it do not have."""
+"""Lines of the spectrum that the least-squares circle removes: radius and centre."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Form by samples, shape (n,) [µm], and noise draws about its own and the common least-squares circle."""
+    """Form at samples, shape (n,) [µm], with noise drawn about the own and the common least-squares circle."""
 
     form_um: Floats
     alone: DrawnPath
@@ -120,11 +120,11 @@ def _drawn(one: CircleAnalysis) -> _Drawn:
 
 
 _DRAWN: WeakKeyDictionary[CircleAnalysis, _Drawn] = WeakKeyDictionary()
-"""Worked out once: tables, budgets and tolerances ask for it."""
+"""Cache, shared by tables, budgets and tolerances."""
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
-    """Return G(b), G(b)(LS) or H; None for too few samples."""
+    """Return the estimate of G(b), G(b)(LS) or H; None for too few samples."""
     if not (pair.one.noise.known and pair.other.noise.known):
         return None
     found = _OF_PAIRS.setdefault(pair, {})
@@ -143,7 +143,7 @@ def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
     split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
     for one, deviation_um in zip((pair.one, pair.other), split, strict=True):
         drawn = _drawn(one)
-        # Seen from the circle of both, radius and centre of each are form.
+        # About the common circle, each direction's radius and centre are form.
         beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
         paths.append(drawn.beside.with_form(drawn.form_um + beside_um))
     if quantity is BudgetQuantity.G_BOTH:

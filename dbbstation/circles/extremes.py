@@ -1,10 +1,10 @@
-"""Ranges of noisy paths without noise's contribution, with uncertainty.
+"""Estimate ranges of noisy paths without the contribution of noise.
 
-Noise widens a range by an amount that depends on the form. The measured range is compared with paths of this form at
-other sizes plus noise of the measured spectrum (parametric bootstrap [Efron and Tibshirani, An Introduction to the
-Bootstrap, ch. 12 to 14]). The size with this mean range is the estimate; sizes with it at the 2.5th and 97.5th percentile
-bound the interval [confidence interval by inversion of a test, Casella and Berger, Statistical Inference, 9.2.1], from
-zero if noise alone suffices.
+Noise widens a range by an amount that depends on the form. Simulated paths combine this form, scaled, with noise of the
+measured spectrum (parametric bootstrap [Efron and Tibshirani, An Introduction to the Bootstrap, ch. 12 to 14]). The
+estimate is the size whose mean range equals the measured range. Sizes that give it at the 2.5th and 97.5th percentile
+bound the interval [confidence interval by inversion of a test, Casella and Berger, Statistical Inference, 9.2.1]. The
+interval starts at zero if noise alone suffices.
 """
 
 from __future__ import annotations
@@ -27,28 +27,26 @@ if TYPE_CHECKING:
     Statistic = Callable[[Floats, Floats, Floats], Floats]
 
 DRAWS = 256
-"""Paths that are drawn. Their standard deviation is known to 4.5 %."""
+"""Number of drawn paths, which determine their standard deviation to 4.5 %."""
 
 SECTORS = 360
-"""Parts of the turn whose greatest and least sample are kept of each drawn path, at the most: its form hardly changes within a
-degree."""
+"""Most sectors whose extreme samples are kept of each drawn path: form hardly changes within a degree."""
 
 POINTS_PER_UNDULATION = 8
-"""Samples that are kept for each of the undulations that a filter lets pass: what lies between two of them lies on a smooth
-curve."""
+"""Samples kept per undulation that a filter passes: the path is smooth between them."""
 
 QUANTILE = 1.96
-"""Standard deviations of the end of a 95 % interval [normal distribution]."""
+"""Standard deviations at the ends of a 95 % interval [normal distribution]."""
 
 STEPS = np.array([-np.inf, -14.0, -9.0, -6.0, -4.0, -2.5, -1.0, 0.5, 2.0, 3.5])
-"""Sizes that are tried, as what was read and so many standard deviations of one sample's noise, down to none. Normal noise of a range of
-many thousand samples adds less than nine of them, long tails add more."""
+"""Tried sizes: the measured range plus so many standard deviations of a sample's noise; -inf means zero. In a range of
+many thousand samples normal noise adds less than nine; long tails add more."""
 
 CERTAIN = 3.0
-"""Standard deviations beyond which no further size is tried."""
+"""Standard deviations at which the search for sizes ends."""
 
 SEED = 4
-"""Of the draws: the same recording gives the same figures."""
+"""Seed of the draws: a recording always gives the same figures."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Estimate:
     """A figure without the noise's contribution.
 
     Attributes:
-        u_um: standard uncertainty by noise: the longer half of the 95 % interval over 1.96.
+        u_um: standard uncertainty due to noise: the longer half of the 95 % interval over 1.96.
     """
 
     value_um: float
@@ -66,16 +64,16 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class DrawnPath:
-    """One path with drawn noise by sectors.
+    """One path's form and drawn noise, by sectors.
 
     Attributes:
         form_um: mean in each sector, shape (s,).
         highest_um: greatest noise, shape (draws, s).
         lowest_um: least noise, shape (draws, s).
-        theta_deg: of the sectors, rising, shape (s,).
-        least: noise's share if its whole spectrum were as low as its end.
+        theta_deg: of the sectors, ascending, shape (s,).
+        least: relative noise if the whole spectrum were as low as its end.
         order: samples by angle, shape (m,).
-        starts: of sectors among them, shape (s,).
+        starts: each sector's first index in `order`, shape (s,).
     """
 
     form_um: Floats
@@ -88,7 +86,7 @@ class DrawnPath:
     starts: Integers
 
     def with_form(self, form_um: Floats) -> DrawnPath:
-        """Return the noise with another form in time order, shape (n,) [µm]."""
+        """Return the noise with another form, given in time order, shape (n,) [µm]."""
         return replace(self, form_um=_means(form_um, self.order, self.starts))
 
 
@@ -99,20 +97,20 @@ def drawn_paths(
     seed: int,
     taken: Sequence[int] = (0,),
 ) -> tuple[DrawnPath, ...]:
-    """Draw noise of a path for several numbers of removed spectral lines.
+    """Draw a path's noise, once per number of removed spectral lines.
 
     Args:
-        apart: form and noise of its deviations, in time order; the form filtered already.
+        apart: form, already filtered, and noise of the deviations in time order.
         theta_deg: angles of its samples, shape (n,) [deg].
-        passed: share of the noise's amplitude that the figure's filter lets pass, by line, shape (n // 2 + 1,).
-        taken: lines of the noise, from 0, that the fit removes.
+        passed: amplitude that the filter passes, by line, shape (n // 2 + 1,).
+        taken: numbers of lines, from 0, that the fit removes.
     """
     count = len(theta_deg)
     order, starts, middle_deg = _sectors(theta_deg, passed)
     rng = np.random.default_rng([SEED, seed])
     extremes = [np.empty((2, DRAWS, len(starts))) for _ in taken]
     waves = _waves(max(taken), order, count)
-    for block in np.split(np.arange(DRAWS), BLOCKS):  # long recordings would take much memory at once
+    for block in np.split(np.arange(DRAWS), BLOCKS):  # in blocks, to save memory
         lines = drawn_lines(apart, passed, len(block), rng)
         noise = np.fft.irfft(lines, count, axis=1)
         for each, first in zip(extremes, taken, strict=True):
@@ -139,7 +137,7 @@ def drawn_paths(
 
 def _sectors(theta_deg: Floats, passed: Floats) -> tuple[Integers, Integers, Floats]:
     count = len(theta_deg)
-    # Undulations up to which the filter passes a hundredth of the noise's power.
+    # Undulations of which the filter passes at least a hundredth of the power.
     points = POINTS_PER_UNDULATION * int(np.flatnonzero(passed > PASSED).max(initial=1))
     theta = np.mod(theta_deg, FULL_TURN_DEG)
     if points < min(count, SECTORS):
@@ -195,19 +193,19 @@ def _least_share(power_um2: Floats, passed: Floats) -> float:
 
 
 PASSED = 0.1
-"""Share of the amplitude below which an undulation of the noise no longer counts for where the extremes lie."""
+"""Least passed amplitude of undulations that affect the place of extremes."""
 
 BLOCKS = 4
 
 
 def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> Estimate:
-    """Return a range without noise's contribution.
+    """Return a range without the contribution of noise.
 
     One recording cannot separate correlated noise from short form. If the spectrum rises above its end, the interval covers the results of the whole spectrum and of its end.
 
     Args:
         paths: one or both directions, from one circle.
-        statistic: of extremes, shape (draws, s), at angles, shape (s,); homogeneous of degree one.
+        statistic: figure of extremes, shape (draws, s), at angles, shape (s,); homogeneous of degree one.
     """
     if not max(path.sigma_um for path in paths) > 0.0:
         return Estimate(as_read_um, 0.0, as_read_um)
@@ -232,7 +230,7 @@ def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
 
 
 ALIKE = 0.95
-"""Share of the noise that the end of its spectrum has, from which on the whole spectrum counts as alike: by chance the end of 240
+"""If the end of the spectrum has at least this relative noise, the spectrum counts as uniform: by chance the end of 240
 lines is lower by a twentieth."""
 
 
@@ -266,7 +264,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
         return _Interval(as_read_um, as_read_um, as_read_um, 0.0)
     sigma_um = max(path.sigma_um for path in paths)
     tried: dict[float, Floats] = {}
-    # Upwards until no draw worth counting shows less than what was read, downwards until none shows more.
+    # Increase until hardly a draw is below the measured range; decrease until hardly a draw is above.
     for steps, side in ((STEPS[STEPS > 0.0], -1.0), (STEPS[STEPS < 0.0][::-1], 1.0)):
         for step in steps:
             size = max(as_read_um + float(step) * sigma_um, 0.0)
@@ -280,7 +278,7 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     mean, spread = shown.mean(axis=1), shown.std(axis=1)
     curves = (mean, *np.quantile(shown, [0.975, 0.025], axis=1))
     value, low, high = (float(np.interp(as_read_um, np.maximum.accumulate(curve), sizes)) for curve in curves)
-    # No interval is shorter than what the readings' own scatter makes of it.
+    # The scatter of the readings bounds the interval from below.
     return _Interval(value, low, high, 0.5 * float(np.interp(value, sizes, spread)))
 
 

@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats
 
 CHANCE = 0.01
-"""Chance at which noise alone has one line anywhere in its spectrum that counts as form."""
+"""Probability that noise alone has a line that counts as form."""
 
 NEIGHBOURS = 15
-"""Lines over which the power of the noise is averaged: it changes slowly along the spectrum."""
+"""Lines on each side over which noise power is averaged, because it changes slowly along the spectrum."""
 
 
 @dataclass(frozen=True, eq=False)
 class FormAndNoise:
-    """A series of deviations round a turn, separated.
+    """Form and noise of deviations round a turn.
 
     Attributes:
-        form_um: without noise as far as separable, shape (n,).
-        power_um2: of noise by line 0, 1, ... n // 2, as variance of white noise of equal power.
-        continued: the first of these lines, under form, by memory.
+        form_um: deviations without separable noise, shape (n,).
+        power_um2: noise at lines 0, 1, ... n // 2, as the variance of white noise of equal power.
+        continued: extrapolated noise at the low lines.
     """
 
     form_um: Floats
@@ -42,10 +42,10 @@ class FormAndNoise:
 
 
 def form_and_noise(deviation_um: Floats) -> FormAndNoise:
-    """Separate a series of deviations.
+    """Separate form and noise of a series of deviations.
 
-    Noise is measured above 30 undulations per revolution and extrapolated below (`dbbstation.inference.harmonics`),
-    where a line's form share is 1 - S / P, power P over noise S. Outstanding lines above are form.
+    Noise is measured above 30 undulations per revolution and extrapolated below (`dbbstation.inference.harmonics`).
+    There, a line of power P over noise S has the form share 1 - S / P. Outstanding lines above are form.
 
     Args:
         deviation_um: about equally spaced over a turn, shape (n,).
@@ -62,25 +62,26 @@ def form_and_noise(deviation_um: Floats) -> FormAndNoise:
     noise = np.concatenate([continued.usual, _averaged(floor)])
     share = np.maximum(power - noise, 0.0) / np.maximum(power, np.finfo(float).tiny)
     share[: low + 1] *= power[: low + 1] > STANDS_OUT * noise[: low + 1]
-    share[0] = 1.0  # a mean is no noise where the radius is known to less than a sample's noise
+    share[0] = 1.0  # the radius has less noise than a sample, so the mean counts as form
     share[low + 1 :] *= standing
     if low > 1 and not (share[2:].any() or sharp.any()):
         strongest = 2 + int(np.argmax(power[2 : low + 1] / np.maximum(noise[2 : low + 1], np.finfo(float).tiny)))
-        share[strongest] = 1.0  # nothing stands out: what form there may be most likely has this one
+        share[strongest] = 1.0  # without outstanding lines, the strongest is most probably form
     white = np.where(share > 0.0, 0.0, lines / np.sqrt(count * np.maximum(noise, np.finfo(float).tiny)))
     white[: low + 1] = 0.0
     return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise, continued, pushes_of(white, count))
 
 
 STANDS_OUT = 3.0
-"""Power of a line of noise is exponentially distributed: one in twenty is three times its mean. Lines below that are taken for noise
-alone, as what noise leaves in the form would be counted twice."""
+"""Limit of noise, in mean powers. A noise line's power is exponentially distributed: one in twenty exceeds three means.
+Weaker lines count as noise alone; otherwise noise left in the form would count twice."""
 
 
 def _sharp(quick_um: Floats, low: int) -> Floats:
     """Return short local form, such as a reversal spike, shape (n,).
 
-    A Gaussian filter of four times the low undulations is applied; exceedances of even noise are form. Medians of three readings suppress single outliers.
+    A Gaussian filter with four times the low cut-off smooths the deviations; values beyond the noise limit are form.
+    Medians of three readings suppress single outliers.
     """
     count = len(quick_um)
     passed = np.exp2(-((np.arange(count // 2 + 1.0) / (4.0 * low)) ** 2))
@@ -98,12 +99,12 @@ def _sharp(quick_um: Floats, low: int) -> Floats:
 
 
 MEDIAN_OF_NORMAL = 0.6745
-"""Median of the size of a standard normal value."""
+"""Median absolute value of a standard normal variable."""
 
 
 def _floor(power: Floats) -> tuple[Floats, Flags]:
     standing = np.zeros(len(power), dtype=bool)
-    limit = np.log(max(len(power), 1) / CHANCE)  # the power of a line of noise is exponentially distributed
+    limit = np.log(max(len(power), 1) / CHANCE)  # a noise line's power is exponentially distributed
     floor = power
     for _ in range(_ROUNDS):
         usual = _averaged(np.where(standing, np.nan, power))
@@ -131,7 +132,7 @@ def drawn_lines(apart: FormAndNoise, passed: Floats, draws: int, rng: np.random.
     """Return drawn noise spectra, as of `numpy.fft.rfft`, shape (draws, n // 2 + 1) [µm].
 
     Args:
-        passed: filter's amplitude by line, shape (n // 2 + 1,).
+        passed: amplitude that the filter passes, by line, shape (n // 2 + 1,).
     """
     lines = np.fft.rfft(apart.pushes.drawn(rng, draws, len(apart.form_um)), axis=1)
     below = apart.continued.drawn(rng, draws)

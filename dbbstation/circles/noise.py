@@ -1,4 +1,4 @@
-"""A circle's noise by its own spectrum above the machine's form."""
+"""Estimate a circle's noise from its spectrum above the machine's form."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 FEWEST_SAMPLES = 100
-"""Samples of a turn below which its spectrum holds no noise apart from its form."""
+"""Fewest samples of a turn whose spectrum separates noise from form."""
 
 
 ROUNDING = float(np.sqrt(12.0))
-"""Step of rounded readings over the standard deviation of what rounding does to them [GUM 4.3.7]."""
+"""Step of rounded readings over the standard deviation of rounding [GUM 4.3.7]."""
 
 LEAST_UM = 1e3 * SMALLEST_SHAPE_MM / ROUNDING
-"""Noise of a bar as fine as there is none: recordings that were computed have less, and any difference would be found [µm]."""
+"""Least noise, below any real bar [µm]. Computed recordings have less, and any difference would be significant."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class CircleNoise:
     """Noise of one circle.
 
     Attributes:
-        slow_um: white noise per sample of equal effect on slow figures; NaN for too few samples.
-        resolution_um: reading step; zero if invisible.
+        slow_um: white noise per sample that affects slow figures equally; NaN for too few samples.
+        resolution_um: reading step; zero if undetectable.
         freedom: degrees of freedom of `slow_um`.
     """
 
@@ -47,20 +47,20 @@ class CircleNoise:
 
     @property
     def least_um(self) -> float:
-        """Return the least noise of any reading, its rounding [µm]."""
+        """Return the least noise of a reading, due to rounding [µm]."""
         return max(self.resolution_um / ROUNDING, LEAST_UM)
 
     @property
     def sigma_um(self) -> float:
-        """Return the standard deviation to use [µm]."""
+        """Return the noise's standard deviation for tests [µm]."""
         return float(np.hypot(np.nan_to_num(self.slow_um), self.least_um))
 
 
 def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> CircleNoise:
     """Return a circle's noise.
 
-    Floor and first-order process above 30 undulations per revolution are extrapolated below
-    (`dbbstation.inference.harmonics`), because correlated readings make slow figures noisier.
+    A floor and a first-order process are fitted above 30 undulations per revolution and extrapolated below
+    (`dbbstation.inference.harmonics`), because correlation makes slow figures noisier.
 
     Args:
         deviation_um: in time order, without drift, shape (n,).
@@ -74,7 +74,7 @@ def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> Circl
     square = coefficients(deviation_um, np.radians(phi_deg), high)[1:] ** 2
     spectrum = noise_spectrum((square[:high] + square[high:])[low:], low, 2.0)
     lines = np.abs(np.fft.rfft(deviation_um)[low + 1 :]) ** 2 / len(deviation_um)
-    # Power of a line is exponentially distributed, with two degrees of freedom and a mean square of twice its mean's square.
+    # A line's power is exponentially distributed: two degrees of freedom, mean square twice the squared mean.
     known = 4.0 * float(lines.sum()) ** 2 / max(float(np.sum(lines**2)), np.finfo(float).tiny)
     return CircleNoise(
         slow_um=float(np.sqrt(spectrum.power[0])),
@@ -87,13 +87,13 @@ def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> Circl
 
 def _step_mm(reading_mm: Floats) -> float:
     values = np.unique(np.round(reading_mm / _FINEST_MM).astype(np.int64))
-    if len(values) < 2 or len(values) > len(reading_mm) / _VISITS:  # noqa: PLR2004 - one value has no step
+    if len(values) < 2 or len(values) > len(reading_mm) / _VISITS:  # noqa: PLR2004 - one value gives no step
         return 0.0
     return _FINEST_MM * float(np.gcd.reduce(np.diff(values)))
 
 
 _FINEST_MM = 1e-6
-"""Decimals of run files [mm]."""
+"""Resolution of run files [mm]."""
 
 _VISITS = 3.0
-"""Times that each value comes, on average, where readings are coarser than what they show."""
+"""Average repetitions of a value when the reading step exceeds the noise."""

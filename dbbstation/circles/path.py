@@ -1,4 +1,4 @@
-"""A circle's path for figures: about the ball, in its plane, filtered."""
+"""A circle's filtered path about the ball, in its plane."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Filter(IntEnum):
-    """Cut-off in undulations per revolution (UPR): Gaussian, but sharp at 30 for predictions and tolerances."""
+    """Filter with a cut-off in undulations per revolution (UPR): Gaussian, but sharp at 30 for predictions and tolerances."""
 
     NONE = 0
     UPR_15 = 15
@@ -30,12 +30,12 @@ class Filter(IntEnum):
 
     @classmethod
     def of_word(cls, word: str) -> Filter:
-        """Return the filter of an option's word: a cut-off, or `none`."""
+        """Return the filter for an option's value: a cut-off, or `none`."""
         return cls(0 if word == "none" else int(word))
 
     @property
     def words(self) -> str:
-        """Return the words beside a figure."""
+        """Return its description beside figures."""
         if self is Filter.UPR_30:
             return "30 UPR, cut off sharply"
         return f"Gaussian, {self.value} UPR" if self else "none"
@@ -59,14 +59,14 @@ class Filter(IntEnum):
 
 
 SAMPLES_PER_UNDULATION = 4
-"""Samples per undulation that the sharp filter passes, at the least."""
+"""Least samples per undulation of the sharp filter."""
 
 
 @dataclass(frozen=True, eq=False)
 class CirclePath:
-    """One circle or both directions in its plane.
+    """The path of one direction or both, in the circle's plane.
 
-    A raised bar's circle is horizontal with radius R cos e: bar lengths become distances from the ball's vertical.
+    A raised bar's circle is horizontal, with radius R cos e, so bar lengths are converted to distances from the ball's vertical.
 
     Attributes:
         theta_deg: about the ball, from +X towards +Y, shape (n,).
@@ -79,7 +79,7 @@ class CirclePath:
 
     @property
     def points_mm(self) -> Floats:
-        """Return the path's points from the ball, shape (n, 2) [mm]."""
+        """Return the path's points relative to the ball, shape (n, 2) [mm]."""
         theta = np.radians(self.theta_deg)
         return np.column_stack([self.about_ball_mm * np.cos(theta), self.about_ball_mm * np.sin(theta)])
 
@@ -91,7 +91,7 @@ class CirclePath:
 def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
     """Return a raw circle's path.
 
-    The filter acts on deviations from the least-squares circle and leaves centre and radius.
+    The filter changes deviations from the least-squares circle, but neither centre nor radius.
 
     Raises:
         TraceError: the points do not determine a circle.
@@ -105,7 +105,7 @@ def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
 
 
 def both(one: CirclePath, other: CirclePath) -> CirclePath:
-    """Return two paths as one path about their common least-squares circle, with equal weights.
+    """Join two paths about their common least-squares circle, with equal weights.
 
     Raises:
         TraceError: the points do not determine a circle.

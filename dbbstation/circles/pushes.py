@@ -1,8 +1,8 @@
-"""The distribution of a circle's innovations: normal, or with longer or shorter tails.
+"""Distribution of a circle's noise innovations: normal, or with longer or shorter tails.
 
-A range depends on tails as on standard deviation. Student's t (single outliers) and exp(-|x|^b) (locally louder noise)
-compete with the normal by likelihood. The kurtosis is unreliable: with five degrees of freedom it has no standard error,
-and 720 samples show 2.6 instead of 6.
+A range depends on the tails. Likelihood decides between the normal distribution, Student's t (single outliers) and
+exp(-|x|^b) (locally louder noise). The kurtosis is unreliable: for t with five degrees of freedom it has no standard
+error, and 720 samples give 2.6 instead of 6.
 """
 
 from __future__ import annotations
@@ -21,42 +21,42 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 NORMAL = 0.5
-"""Chance beforehand that pushes are normal; the rest is shared out among the tails that are tried. A wrong choice is as bad in both
-directions, hence one half."""
+"""Prior probability of normal innovations; the tried tails share the other half. Both errors are equally bad, hence one
+half."""
 
 EXPONENTS = (1.0, 1.25, 1.5)
-"""Exponents b of exp(-|x|^b) that are tried, from Laplace's distribution, 1, towards the normal one, 2."""
+"""Tried exponents b of exp(-|x|^b), from the Laplace distribution (1) towards the normal (2)."""
 
 SHORTER = 3.0
-"""Standard errors below the kurtosis of a normal distribution from which shorter tails count. Chance that shortens an interval is worse
-than chance that makes it longer."""
+"""Standard errors below the normal kurtosis at which shorter tails count. Wrongly shortening an interval is worse than
+lengthening it."""
 
 LEAST_BETA = 0.5
-"""Parameter of the flattest distribution that is drawn, that of a sine: no noise has less kurtosis."""
+"""Parameter of the flattest drawn distribution, the arcsine distribution: no noise has less kurtosis."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pushes:
-    """The innovations' distribution, unit variance.
+    """Distribution of innovations with unit variance.
 
     Attributes:
-        weights: of normal, Student's t by `TAILS`, and `EXPONENTS`, shape (1 + t + e,), sum one.
-        excess: kurtosis less 3 if below; else zero.
+        weights: probabilities of the normal, Student's t by `TAILS`, and `EXPONENTS`, shape (1 + t + e,).
+        excess: kurtosis less 3 if significantly negative; else zero.
     """
 
     weights: Floats
     excess: float = 0.0
 
     def drawn(self, rng: np.random.Generator, draws: int, count: int) -> Floats:
-        """Return drawn innovations, each series with own tails, shape (draws, count).
+        """Draw innovations, shape (draws, count); each series has one kind of tails.
 
-        Shorter tails are symmetrical beta, whose kurtosis less 3 is -6 / (2 a + 3) [Pearson's type II].
+        Shorter tails are drawn from the symmetrical beta distribution with excess -6 / (2 a + 3) [Pearson's type II].
         """
         if self.excess < 0.0:
             shape = max(-3.0 / self.excess - 1.5, LEAST_BETA)
             return np.asarray((2.0 * rng.beta(shape, shape, (draws, count)) - 1.0) * np.sqrt(2.0 * shape + 1.0))
         normal = rng.standard_normal((draws, count))
-        apart = rng.spawn(1)[0]  # the same normal pushes wherever there are no tails
+        apart = rng.spawn(1)[0]  # a separate generator, so series with normal tails do not depend on the others
         which = apart.choice(len(self.weights), draws, p=self.weights)
         for number, freedom in enumerate(TAILS, start=1):
             own = np.flatnonzero(which == number)
@@ -74,11 +74,11 @@ _OTHERS = len(TAILS) + len(EXPONENTS)
 _NORMAL_ALONE = np.array([1.0] + [0.0] * _OTHERS)
 
 NO_TAILS = Pushes(_NORMAL_ALONE)
-"""Normal pushes."""
+"""Normal innovations."""
 
 
 def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
-    """Return the innovations' distribution by noise lines."""
+    """Estimate the innovations' distribution from noise lines."""
     pushes = np.fft.irfft(white, count)
     square = float(np.mean(pushes**2))
     if not square > 0.0:
@@ -87,7 +87,7 @@ def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
     excess = float(np.mean(scaled**4)) - 3.0
     # The standard error of a normal kurtosis is sqrt(24 / n) [Kendall and Stuart, The Advanced Theory of Statistics, vol. 1, ch. 12].
     if excess < -SHORTER * float(np.sqrt(24.0 / count)):
-        # What is missing makes it more normal: fourth cumulants of the rest keep the square of the share that is there.
+        # Removed lines make the series more normal: its fourth cumulant scales with the square of the remaining share.
         there = float(np.count_nonzero(white)) / len(white)
         return Pushes(_NORMAL_ALONE, excess / there**2)
     likely = np.array(
@@ -103,7 +103,7 @@ def pushes_of(white: NDArray[np.complex128], count: int) -> Pushes:
 
 
 def _exponential_likelihood(new: Floats, exponent: float) -> float:
-    """Return the log likelihood of exp(-|x|^b) at its best scale, over the normal density's height."""
+    """Return the maximum log likelihood of exp(-|x|^b) over its scale, relative to the normal density's height."""
     scale = float(exponent * np.mean(np.abs(new) ** exponent)) ** (1.0 / exponent)
     height = np.log(exponent) - np.log(2.0 * scale) - float(gammaln(1.0 / exponent)) + 0.5 * np.log(2.0 * np.pi)
     return float(len(new) * (height - 1.0 / exponent))

@@ -25,7 +25,7 @@ class BudgetQuantity(StrEnum):
 ABSOLUTE = frozenset(
     {BudgetQuantity.F_MAX, BudgetQuantity.F_MIN, BudgetQuantity.RADIUS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.D}
 )
-"""Figures that rest on the bar's length, not on its changes alone."""
+"""Figures that depend on the bar's absolute length."""
 
 FIRST = 2
-"""The first undulation that is form: one per revolution is the centre."""
+"""First undulation of form: one per revolution is the centre."""

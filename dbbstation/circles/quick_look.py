@@ -1,4 +1,4 @@
-"""Classical signatures of serial axes in any circle, by least squares.
+"""Fit the classical signatures of serial axes to a circle by least squares.
 
 On a hexapod they are symptoms, not causes.
 """
@@ -25,38 +25,37 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 SECTORS = 2880
-"""Means over an eighth of a degree replace the samples of a longer recording: the shortest shape here, a cyclic error of 40
-periods over the diameter, loses 0.3 % of its amplitude."""
+"""Longer recordings are averaged over an eighth of a degree. The shortest signature, a cyclic error of 40 periods over
+the diameter, loses 0.3 % of its amplitude."""
 
 SPIKES_DEG = (1.5, 2.1, 3.0, 4.2, 6.0, 8.5, 12.0)
-"""Lengths that reversal spikes may have, the same at all four ends; figures are means over them [deg]."""
+"""Tried lengths of reversal spikes, equal at all four ends [deg]; figures are means over them."""
 
 FINER = (2.0**0.2, 2.0**0.06)
-"""Ratios of lengths that are tried about the likeliest one, one round after the other."""
+"""Ratios between tried lengths about the most likely one, in successive rounds."""
 
 FREE = 10
-"""Undulations per revolution, from 3, that the turn may have in both senses alike without being a signature: the form that any
-machine has. It is fitted beside them and not reported. Without it a signature would be fitted to it."""
+"""Highest undulations, from 3 per revolution, of the form common to both directions. The form of any machine is fitted
+with the signatures, so they do not absorb it, and not reported."""
 
 PERIODS = np.arange(6.0, 40.01, 0.25)
-"""Periods of a cyclic error over the diameter that are tried. Fewer cannot be separated from that form. A quarter of a period is the
-width of a peak of that scan."""
+"""Tried periods of a cyclic error over the diameter. Fewer periods cannot be separated from form. A peak of the scan is
+a quarter of a period wide."""
 
 AT_END_DEG = 0.3
-"""Stretch either side of an end of an axis that does not count: on which side of a step a sample lies is known no better
-than the start of the turn and the place of the ball [deg]."""
+"""Excluded arc on each side of an axis end [deg]: start angle and ball place leave the side of a step uncertain."""
 
 SEEN = 4.0
-"""Standard uncertainties from which a figure counts as seen: by chance one look of 11 figures in 1400 has one (normal)."""
+"""Standard uncertainties of a significant figure: by chance one of 1400 results with 11 figures has one (normal)."""
 
 ONE_SIDED = 1.645
 """Standard deviations of a 95 % bound [normal distribution]."""
 
 CHANCE = 1e-3
-"""Chance at which noise alone shows a cyclic error somewhere in the scan."""
+"""Probability that noise alone gives a cyclic error in the scan."""
 
 FEWEST = 200
-"""Samples of a turn below which there is no quick look: a spike of 1.5 degrees must have one."""
+"""Fewest samples of a turn: a spike of 1.5 degrees must contain one."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Symptom:
     Attributes:
         place: end or axis; empty for both.
         value: None if undetermined.
-        below: 95 % bound if not seen, else None.
+        below: 95 % bound if not significant, else None.
     """
 
     signature: Signature
@@ -84,8 +83,8 @@ class QuickLook:
     """All signatures of one circle.
 
     Attributes:
-        left_rms_um: beyond signatures, with noise.
-        sigma_um: white noise per sample of equal effect.
+        left_rms_um: residual rms, with noise.
+        sigma_um: white noise per sample that affects signatures equally.
     """
 
     symptoms: tuple[Symptom, ...]
@@ -116,14 +115,15 @@ class _Fit:
 def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     """Fit signatures to one or both directions.
 
-    Centre and radius of each turn and a common form of 3 to 10 undulations are fitted too. The residual counts as noise
-    white up to 30 undulations per revolution. One direction alone cannot separate squareness from servo mismatch, and the result then lacks both.
+    The fit includes each turn's centre and radius, and a common form of 3 to 10 undulations. The residual counts as
+    noise that is white up to 30 undulations per revolution. One direction cannot separate squareness from servo
+    mismatch; the result then lacks both.
 
     Args:
         turns: one or two of opposite sense.
 
     Returns:
-        None where a turn has too few samples.
+        None if a turn has too few samples.
     """
     if min(len(one.raw) for one in turns) < FEWEST:
         return None
@@ -176,12 +176,12 @@ def _best(fits: Sequence[_Fit]) -> _Fit:
 def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[Floats, Floats]:
     """Return values and standard uncertainties averaged over spike lengths, shapes (k,).
 
-    Weights are marginal likelihoods exp(-squares / 2 s²) times the root of the covariance determinant [law of total
+    Weights are marginal likelihoods: exp(-squares / 2 s²) times the root of the covariance determinant [law of total
     variance; Hoeting et al., Stat. Sci. 14 (1999), eqs 2, 3]. A single best length would fit noise.
     """
     squares = np.array([one.left_um @ one.left_um for one in fits]) / sigma_um**2
     spread = np.array([np.linalg.slogdet(one.unit_covariance)[1] for one in fits])
-    # Lengths are tried closer to each other where they are likely: each stands for its part of the logarithmic scale.
+    # Likely lengths are tried more densely, so each is weighted by its part of the logarithmic scale.
     part = np.gradient(np.log([one.spike_deg for one in fits]))
     log_weight = 0.5 * (spread - squares) + np.log(np.maximum(part, np.finfo(float).tiny))
     weight = np.exp(log_weight - log_weight.max())
@@ -225,7 +225,7 @@ def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
         np.split(fit.left_um, ends),
         [np.radians(turn.theta_deg) for turn in turns],
         range(len(turns)),
-        # Radius and centre of each turn are counted by the test itself.
+        # The test itself subtracts each turn's radius and centre.
         freedom_used=float(fit.basis.shape[1] - 2 * len(turns)),
     )
     per_undulation = float(np.mean([len(turn.theta_deg) for turn in turns])) / (2.0 * LOW)
@@ -276,7 +276,7 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     coarse = max((trial(float(periods)) for periods in PERIODS), key=lambda one: one.gained)
     near = diameter_mm / coarse.period_mm
     step = float(PERIODS[1] - PERIODS[0])
-    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - takes a quarter of a second; few ask for a quick look
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - a quarter of a second, needed only here
 
     fine = minimize_scalar(lambda periods: -trial(periods).gained, bounds=(near - step, near + step), method="bounded")
     found = max(coarse, trial(float(fine.x)), key=lambda one: one.gained)
@@ -287,14 +287,14 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     along = size / max(amplitude, np.finfo(float).tiny)
     across = np.array([-along[1], along[0]])
     u = float(np.sqrt(along @ covariance @ along))
-    # Half of the squares gained is exponentially distributed in each trial [two degrees of freedom].
+    # Half of the reduction of squares is exponentially distributed in each trial [two degrees of freedom].
     limit = 2.0 * float(np.log(2 * len(PERIODS) / CHANCE)) * sigma_um**2
     if gained <= limit:
-        # The strongest of so many waves is no estimate of one that nobody sees; it bounds what may be there.
+        # The strongest of many insignificant waves is no estimate, but an upper bound.
         below = amplitude + ONE_SIDED * u
         symptom = Symptom(Signature.CYCLIC, axis, None, None, below, "µm", seen=False, text=f"below {below:.2g} µm")
         return _Wave(symptom, waves, gained)
-    # Noise across a wave makes it longer by its variance over twice its size.
+    # Noise perpendicular to a wave's phasor lengthens it by variance over twice its size.
     size_um = float(np.sqrt(max(amplitude**2 - across @ covariance @ across, 0.0)))
     symptom = Symptom(Signature.CYCLIC, axis, size_um, u, None, "µm", seen=True, text=f"every {found.period_mm:.1f} mm")
     return _Wave(symptom, waves, gained)

@@ -16,22 +16,22 @@ if TYPE_CHECKING:
     from dbbstation.trace.circle import RawCircle
 
 AXES_DEG = (0.0, 90.0, 180.0, 270.0)
-"""Where the machine's X and Y turn round."""
+"""Angles at which the machine's X and Y reverse."""
 
 NEAR_DEG, FAR_DEG = 1.5, 12.0
-"""Stretch either side of a place on which lines are drawn to it: near enough for a straight line to follow the lower
-harmonics, off the place itself, where a drive takes its time over the step [deg]."""
+"""Arc on each side of a place for the fitted lines [deg]: near enough for straight lines to follow low harmonics, but
+outside the transition."""
 
 HIGHEST_HARMONIC = 10
-"""Undulations per revolution up to which amplitudes are given."""
+"""Highest undulations per revolution with a reported amplitude."""
 
 FEWEST = 6
-"""Samples of a stretch that a line is drawn through."""
+"""Fewest samples of a fitted line."""
 
 
 @dataclass(frozen=True)
 class ReversalStep:
-    """The path's rise behind a place, along the travel.
+    """The path's step at a place, along the travel.
 
     Attributes:
         height_um: outwards positive.
@@ -56,7 +56,7 @@ class Harmonic:
 
 
 def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: float) -> ReversalStep | None:
-    """Return the step at a place by lines on both sides; None with few samples, or at the turn's ends, whose step is the closure.
+    """Return the step at a place from lines on both sides; None for few samples or at the turn's ends, whose step is the closure.
 
     Args:
         deviation_um: shape (n,).
@@ -72,7 +72,7 @@ def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: fl
 
 
 def closure_of(raw: RawCircle, deviation_um: Floats, sigma_um: float) -> ReversalStep | None:
-    """Return the turn's end less its begin; None for too few samples."""
+    """Return the turn's end less its beginning; None for too few samples."""
     beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
     if beginning is None or end is None:

@@ -1,7 +1,7 @@
-"""Known shapes of single faults of serial axes X and Y.
+"""Known shapes of single faults of serial axes.
 
-Radial deviations outwards over θ from +X towards +Y at radius R; d is +1 for a growing angle. Errors e_x, e_y deviate by
-e_x cos θ + e_y sin θ to first order.
+Radial deviations, outwards positive, over θ from +X towards +Y at radius R; d is +1 for increasing θ. To first order,
+errors e_x, e_y cause e_x cos θ + e_y sin θ.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Signature(StrEnum):
 
 
 ENDS = {"+X": 0.0, "+Y": 90.0, "-X": 180.0, "-Y": 270.0}
-"""Where an axis turns round [deg]."""
+"""Angles at which an axis reverses [deg]."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class SignatureColumn:
 
 
 def shapes_of(theta_deg: Floats, circle: Circle, spike_deg: float) -> dict[SignatureColumn, Floats]:
-    """Return the deviations that unit sizes cause [µm], shape (n,) each; docs/circles.md has the formulas.
+    """Return the deviations by unit signatures [µm], shape (n,) each; docs/circles.md has the formulas.
 
     Args:
         theta_deg: shape (n,).
@@ -75,7 +75,7 @@ def shapes_of(theta_deg: Floats, circle: Circle, spike_deg: float) -> dict[Signa
 
 
 def cyclic_shapes(theta_deg: Floats, circle: Circle, axis: str, period_mm: float) -> Floats:
-    """Return sine and cosine of a unit error periodic in an axis's position from the centre, shape (n, 2) [µm].
+    """Return the deviations by unit sine and cosine errors, periodic in an axis's position from the centre, shape (n, 2) [µm].
 
     Args:
         theta_deg: shape (n,).

@@ -1,4 +1,4 @@
-"""A circle's undulations beside noise."""
+"""A circle's undulations, compared with noise."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 HIGHEST = 60
-"""Undulations per revolution up to which amplitudes are given: twice as many as a machine's form usually reaches."""
+"""Highest undulations per revolution with an amplitude, twice as many as usual in a machine's form."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class FormSpectrum:
 def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
     """Return a circle's undulations.
 
-    White noise s has two coefficients of size s each: amplitude 2 s / sqrt(n), rms.
+    White noise s per sample has the rms amplitude 2 s / sqrt(n), from two coefficients.
     """
     count = len(one.raw)
     highest = min(HIGHEST, count // SAMPLES_PER_HARMONIC)

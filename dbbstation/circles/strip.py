@@ -1,4 +1,4 @@
-"""Minimum zones of many drawn paths at once."""
+"""Compute minimum zones of many drawn paths at once."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ MOST_ROUNDS = 40
 """Rounds of the exchange; traces with noise need five to ten."""
 
 REACHED = 1e-3
-"""Share of the width by which bounds may be apart."""
+"""Largest relative difference between the bounds."""
 
 
 def strip_widths(outer: Floats, inner: Floats, theta_deg: Floats) -> Floats:
     """Return minimum-zone widths of nearly round paths, shape (draws,), in their unit.
 
     A centre offset (a, b) changes radii by a cos θ + b sin θ; second order is below a nanometre at 0.4 mm. Four
-    alternating points determine the Chebyshev approximation, exchanged one at a time [Remez 1934; Cheney, Introduction to
-    Approximation Theory, ch. 3] between a growing lower and an upper bound.
+    alternating points determine the Chebyshev approximation. They are exchanged one at a time [Remez 1934; Cheney,
+    Introduction to Approximation Theory, ch. 3] until lower and upper bound agree.
 
     Args:
         outer: greatest deviation, shape (draws, angles).
         inner: least deviation, shape (draws, angles).
-        theta_deg: rising, shape (angles,).
+        theta_deg: ascending, shape (angles,).
     """
     theta = np.radians(theta_deg)
     points = _first_points(outer, inner, theta_deg)
@@ -93,7 +93,7 @@ def _put(four: Integers, new: int, kind: int) -> None:
         if four[k] == new:
             return
         most = max(most, four[k])
-    # Whether it lies on the arc from the first of the other kind to the second, in the order of the angles round the turn.
+    # Whether the new point is on the arc from the first point of the other kind to the second.
     size = 1 + most
     is_inside = (new - first) % size <= (second - first) % size
     four[(2 if is_inside else 0) if kind == 0 else (1 if is_inside else 3)] = new

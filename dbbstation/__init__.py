@@ -34,7 +34,7 @@ _PUBLIC = {
     "simulate": "dbbstation.tasks.simulate",
     "write_model": "dbbstation.tasks.models",
 }
-"""Public names, and the module of each; their types stand in `__init__.pyi`."""
+"""Public names, and the module of each; `__init__.pyi` has their types."""
 
 __all__ = [
     "ArgumentError",
@@ -71,7 +71,7 @@ def __getattr__(name: str) -> object:
 
 
 class _Package(ModuleType):
-    """Keeps a public function with the name of a folder: importing `dbbstation.circles.path` would replace the function `circles`."""
+    """Keeps public functions that share the name of a folder: otherwise an import of `dbbstation.circles.path` would replace the function `circles`."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _PUBLIC and isinstance(value, ModuleType)):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Named(Protocol):
-    """What has a name."""
+    """A thing with a name."""
 
     name: ClassVar[str]
 
@@ -81,7 +81,7 @@ def installed(group: str, base: type[Base], faults: list[Problem]) -> list[Found
 
 @dataclass(frozen=True)
 class Loaded:
-    """What an entry point of an installed package names."""
+    """The object that an entry point of an installed package names."""
 
     value: object
     named: str
@@ -90,7 +90,7 @@ class Loaded:
 
 
 def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
-    """Return everything of an entry point group; add what cannot be loaded to `faults`."""
+    """Return all objects of an entry point group; add objects that cannot be loaded to `faults`."""
     found = []
     for point in importlib.metadata.entry_points(group=group):
         package = "a package" if point.dist is None else f"the package {point.dist.name}"
@@ -104,7 +104,7 @@ def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
 
 
 def files_of_packages(group: str, own: Iterable[Path], *, called: str) -> dict[str, Path]:
-    """Return YAML files by name, sorted: the program's own, and those in the folders of packages that entry points name.
+    """Return the program's YAML files, and those in packages that entry points name, sorted by name.
 
     Args:
         called: kind in words, with its article.
@@ -149,7 +149,7 @@ def added(
 
 
 FOREIGN = (Exception, SystemExit)
-"""What code of somebody else can raise: also the end of the program, which is for the user alone to ask."""
+"""Errors that foreign code can raise, including the end of the program, which only the user may request."""
 
 
 def in_words(error: BaseException) -> str:
@@ -180,7 +180,7 @@ def looked_up(
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return the nearest name as a question, or all that are known."""
+    """Return the nearest name as a question, or all known names."""
     names = list(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     return f"did you mean {near[0]}?" if near else f"known are {', '.join(names)}"

@@ -1,4 +1,4 @@
-"""Every error that a user can cause: what is wrong, where, and what to do."""
+"""Every error that a user can cause: it states what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """One fault in one place of a file; `line` and `column` count from 1, 0 where unknown."""
+    """One fault at one place of a file; `line` and `column` count from 1, 0 if unknown."""
 
     file: str
     line: int
@@ -36,18 +36,18 @@ class Problem:
 
 
 MOST_FAULTS = 20
-"""Faults of one kind that are listed one by one."""
+"""Greatest number of listed faults of one kind."""
 
 
 MOST_LISTED = 200
-"""Faults of all kinds that an error lists: ten kinds, or ten files."""
+"""Greatest number of faults that an error lists: ten kinds, or ten files."""
 
 LONGEST_SAID = 1000
-"""Characters of what a fault says: four times the longest list of known keys."""
+"""Greatest number of characters of a fault: four times the longest list of known keys."""
 
 
 def few(problems: Sequence[Problem], count: int | None = None) -> list[Problem]:
-    """Return the problems, or the first of very many with a count of the others.
+    """Return the problems; of very many, return the first ones and the count of the others.
 
     Args:
         count: total, if only the first `MOST_FAULTS` + 1 were made.
@@ -76,7 +76,7 @@ class StationError(Exception):
         super().__init__(what, where, remedy)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Let the error be pickled: its arguments have names."""
+        """Let the error be pickled although its arguments have names."""
         return _as_it_was, (type(self), self.args, self.__dict__)
 
     def __str__(self) -> str:
@@ -109,7 +109,7 @@ class InputError(StationError):
 
 
 class ArgumentError(StationError, ValueError):
-    """A value that a task does not take; `where` is the parameter."""
+    """A value that a task does not accept; `where` is the parameter."""
 
     def __init__(self, parameter: str, what: str, remedy: str = "") -> None:
         super().__init__(what, where=parameter, remedy=remedy)
@@ -140,8 +140,8 @@ class ModelError(StationError):
 
 
 class CalibrationError(StationError):
-    """The recordings do not carry the fit that was asked for."""
+    """The recordings do not determine the requested fit."""
 
 
 class InstrumentError(StationError):
-    """The port, the wire or the instrument."""
+    """An error of the port, the wire or the instrument."""

@@ -20,7 +20,7 @@ from dbbstation.sources.trial import tried
 
 
 def prepare() -> None:
-    """Call everything that is compiled, on a few poses.
+    """Call all compiled functions, on a few poses.
 
     Raises:
         InputError: the installation is not complete.

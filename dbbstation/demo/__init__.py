@@ -1,1 +1,1 @@
-"""The whole job on a virtual machine, and four corrections of it under LinuxCNC."""
+"""The whole job on a virtual machine, and four corrections of this machine under LinuxCNC."""

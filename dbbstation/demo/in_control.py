@@ -38,24 +38,26 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 COMPONENT = "dbbdemokins"
-"""A module that no shop has: it is removed afterwards."""
+"""Name of the temporary component, unlike any component of a shop."""
 
 DIAGNOSED = "joint.yaml"
 
 OTHER_HOLDERS = 1
-"""Added to the seed for the session that is diagnosed: its holders, balls and bar are others than those of the ways, which share theirs."""
+"""Added to the seed for the diagnosed session: its holders, balls and bar differ from those of the four corrections,
+which share theirs."""
 
 VOLUME = "--volume=-200,200,-200,200,-1150,-870"
-"""Over which parameters are refitted: most of what the circles of [CAL Table II] take up; its corners are in the travel."""
+"""Volume for refitted parameters: most of the volume of the circles of [CAL Table II]; its corners are in the
+travel."""
 
 FASTER = 4
-"""LinuxCNC's clock over the real one: two slow cores keep up."""
+"""Speed of LinuxCNC's clock relative to real time; two slow cores are fast enough."""
 
 _SECONDS = re.compile(r"LinuxCNC took ([\d.]+) s")
 
 
 def refuse_without_linuxcnc() -> None:
-    """Refuse a computer that cannot give LinuxCNC a kinematics.
+    """Refuse a computer that cannot run LinuxCNC with a kinematics.
 
     Raises:
         StationError: says what is missing.
@@ -159,7 +161,7 @@ def _session(
     machine: str = "machine.yaml",
     programs: str = "programs",
 ) -> None:
-    """Measure a machine that goes where LinuxCNC drives it; what an interrupted measurement left is removed."""
+    """Measure a machine on the paths that LinuxCNC drives; remove an interrupted measurement first."""
     shutil.rmtree(job.folder / name, ignore_errors=True)
     of_this = DemoJob(job.folder, ["--plan", "plan.yaml", "--machine", machine], job.tell, job.progress)
     with job.emulated(["--truth", truth, "--seed", str(seed), "--programs", f"driven/{driven.name}"]) as place:
@@ -176,7 +178,7 @@ def _way(job: DemoJob, name: str, driven: Path, seed: int, **more: str) -> Contr
 
 
 def home_mm_of(machine: Machine) -> Floats:
-    """Return the driven lengths in the middle of the travel, where the machine is switched on, shape (6,)."""
+    """Return the driven lengths at the middle of the travel, where the machine is switched on, shape (6,)."""
     return (strut_lengths(machine.hexapod, middle(machine)) - machine.reference_length_error_mm)[0]
 
 
@@ -185,13 +187,13 @@ def _middle_mm(machine: Machine) -> float:
 
 
 def made_kins(machine: Machine, name: str, *hal: str) -> ControlKins:
-    """Return how LinuxCNC is set up for a generated component."""
+    """Return LinuxCNC's set-up for a generated component."""
     enabled = f"net on motion.motion-enabled => {name}.enabled"
     return ControlKins(name, home_mm_of(machine), np.zeros(STRUTS), _middle_mm(machine), (enabled, *hal))
 
 
 def genhexkins(machine: Machine, values: Values | None) -> ControlKins:
-    """Return how LinuxCNC is set up for its own kinematics, with nominal joints or refitted values."""
+    """Return LinuxCNC's set-up for its own kinematics, with nominal joints or refitted values."""
     none, longer = np.zeros((STRUTS, 3)), machine.reference_length_error_mm
     of = values or Values(none, none, longer, np.array(machine.travel.strut_mm), np.zeros((STRUTS, 2)))
     corrected = longer + home_mm(of, machine)

@@ -1,4 +1,4 @@
-"""The whole job on a virtual machine over a serial line, by the user's commands."""
+"""Do the whole job on a virtual machine over a serial line, with the user's commands."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 
 INSTRUMENT = "streaming-encoder"
 RATE = ["--rate-hz", "20"]
-"""Samples of a circle: some 1500."""
+"""Sampling rate: some 1500 samples per circle."""
 
 COMPLIANCE_UM_KN = 9.68
-"""Strut compliance with which the reference machine's circles bend as [GRAV Table 4] reports."""
+"""Strut compliance that gives the reference machine the circular deviations of [GRAV Table 4]."""
 
 QUICK = ("a", "h", "n")
 """Tests of a quick demonstration: one at each height, two of them tilted."""
@@ -46,7 +46,7 @@ QUICK = ("a", "h", "n")
 PATIENCE_S = 60.0
 
 _CIRCLE = re.compile(r"(\d+) of (\d+): (test .*)")
-"""What `measure` says when a circle begins."""
+"""Pattern of the line that `measure` prints when a circle begins."""
 
 SETTINGS = """# The shop's settings of this demonstration: what its circles have to keep.
 format: dbb-settings/1
@@ -54,7 +54,8 @@ tolerances:
   - {quantity: circular-deviation, largest: 8.0, unit: µm}
   - {quantity: centre-deviation, largest: 15.0, unit: µm}
 """
-"""Tolerances that the compensated machine keeps and the nominal one does not: holders put balls back to a few micrometres."""
+"""Tolerances that the compensated machine meets and the nominal one exceeds; holders reproduce balls to a few
+micrometres."""
 
 
 def run_demo(
@@ -64,7 +65,7 @@ def run_demo(
     progress: Progress,
     tests: Collection[str] | None = None,
 ) -> DemoResult:
-    """Do the whole job into a folder.
+    """Do the whole job and write its files into a folder.
 
     Args:
         folder: made anew.
@@ -120,7 +121,7 @@ def write_truth(path: Path, machine_file: Path, seed: int) -> None:
 
 
 def write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
-    """Write the plan of these tests alone; return its path."""
+    """Write a plan with these tests only; return its path."""
     tests = tuple(test for test in whole.plan.tests if test.name in names)
     write_text(path, plan_text(replace(whole, plan=whole.plan.model_copy(update={"tests": tests}))))
     return path
@@ -154,7 +155,7 @@ class DemoJob:
         return done.stdout
 
     def measure(self, place: _Place, session: str, programs: list[str]) -> None:
-        """Measure the virtual machine over its line."""
+        """Measure the virtual machine over its serial line."""
         arguments = ["measure", *self.what, "--instrument", INSTRUMENT, "--out", session, *programs]
         line = ["--port", place.port, "--auto", place.control, *RATE]
         bar = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]

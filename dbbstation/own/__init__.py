@@ -1,4 +1,4 @@
-"""What you may subclass: simulators, error sources, physics of a table or of a port, dialects of NC programs."""
+"""Classes for you to subclass: simulators, error sources, physics of a table or of a port, dialects of NC programs."""
 
 from __future__ import annotations
 

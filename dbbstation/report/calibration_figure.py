@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 WIDTH_IN = 11.0
 COLUMNS = 5
-"""Circles side by side."""
+"""Number of circles side by side."""
 
 LONGEST_MM = 60.0
-"""The longest arrow on the plate [mm of the plate]."""
+"""Length of the longest arrow [mm of the plate]."""
 
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 

@@ -1,4 +1,4 @@
-"""Causes in a report by contribution, and circles without the first."""
+"""The causes in a report, by contribution, and the circles without the first cause."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from dbbstation.results.ranked import Ranked
 
 MOST_DRAWN = 6
-"""Tests whose circles are drawn without the first cause: those on which it acts most."""
+"""Number of tests whose circles are drawn without the first cause: the tests on which it acts most."""
 
 
 class CauseRow(NamedTuple):
-    """A row of texts; pairs are contribution and expanded uncertainty."""
+    """A row of texts. Each pair is a contribution and its expanded uncertainty."""
 
     cause: str
     verdict: str

@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session import SessionFolder
 
 MOST_NAMED = 3
-"""What is lacking that the title names; the first page names all."""
+"""Greatest number of missing facts in the title; the first page names all."""
 
 
 @dataclass(frozen=True)
 class Certified:
-    """What a report is."""
+    """Whether a report is a certificate, and the missing facts."""
 
     lacking: tuple[str, ...]
     place: str
 
     @property
     def title(self) -> str:
-        """Return `Certificate of circular tests`, or `Not a certificate` with what it lacks."""
+        """Return `Certificate of circular tests`, or `Not a certificate` with the missing facts."""
         if not self.lacking:
             return "Certificate of circular tests"
         more = len(self.lacking) - MOST_NAMED
@@ -38,7 +38,7 @@ class Certified:
 
 
 def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> Certified:
-    """Return what a report needs to be a certificate."""
+    """Return whether a report is a certificate, and the missing facts."""
     lacking = dict.fromkeys(text for session in sessions for text in _lacking(session, job))
     if not place.strip():
         lacking["place unknown"] = None
@@ -77,7 +77,7 @@ def _early(session: SessionFolder) -> list[str]:
 
 
 def sealed_after(session: SessionFolder) -> list[tuple[RunEntry, timedelta]]:
-    """Return accepted runs with the time from start to seal; a virtual machine has a clock of its own."""
+    """Return accepted runs with the time from start to seal; a virtual machine has a separate clock."""
     at = {} if session.virtual or session.seal is None else sealed_at(session.folder)
     runs = session.in_state(RunState.ACCEPTED) if at else ()
     dated = [(run, run.started, at.get((run.test, run.direction.value, run.repeat))) for run in runs]
@@ -99,4 +99,4 @@ def _dates(session: SessionFolder) -> Iterator[str]:
 
 
 LONGEST_BAR = timedelta(days=366)
-"""Time from a bar's calibration to a certified run: beyond a year it is another bar by wear of its balls and knocks."""
+"""Longest time from a bar's calibration to a certified run: wear and knocks of a year change the bar."""

@@ -1,4 +1,4 @@
-"""Figure of a comparison: where sessions and runs differ."""
+"""Figure of a comparison: the differences of sessions and runs."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _NOT_NOTED = "not noted"
 
 
 def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: str) -> tuple[tuple[str, str], ...]:
-    """Return name and value of each condition, or "not noted"."""
+    """Return each condition's name and value; a missing value is "not noted"."""
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
     accepted = len(session.in_state(RunState.ACCEPTED))
     return (
@@ -70,7 +70,7 @@ def _late(session: SessionFolder) -> str:
 
 
 ANCHOR_SHOWN = 16
-"""Digits of an anchor on the first page; the conditions have all."""
+"""Number of digits of an anchor on the first page; the conditions contain all."""
 
 
 def when_measured(runs: Iterable[RunEntry]) -> str:

@@ -63,7 +63,7 @@ def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tup
 
 
 def quality_of_fit(identified: IdentifiedModel) -> str:
-    """Return a fit's residual beside noise, in words; may be empty."""
+    """Return a sentence on a fit's residual and noise; may be empty."""
     report = identified.report
     keys = ("nominal_rms_um", "residual_within_mounting_rms_um", "noise_um")
     nominal, left, noise = (report.get(key) for key in keys)
@@ -76,7 +76,7 @@ def quality_of_fit(identified: IdentifiedModel) -> str:
 
 
 def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
-    """Return what a model's recordings could not see, or saw least."""
+    """Return sentences on what a model's recordings could not determine, or determined least."""
     seen = as_objects(identified.report.get("observability"))
     return (
         *map(unseen_sentence, identified.directions_lost),
@@ -85,15 +85,17 @@ def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
 
 
 NUMBER_DIGITS = 10
-"""Of a report's number: of a million reports two are alike once in two thousand [birthday problem, 16^10]."""
+"""Digits of a report's number: two of a million reports have the same number once in two thousand [birthday problem,
+16^10]."""
 
 REASONS_SHOWN = 3
-"""Reasons of a verdict on the first page, the table of tolerances has all: U and the room for a signature have to fit the page too."""
+"""Greatest number of reasons on the first page, which also needs space for U and a signature; the table of tolerances
+has all."""
 
 
 @dataclass(frozen=True, eq=False)
 class Modelled:
-    """A model beside the circles."""
+    """A model in addition to the circles."""
 
     identified: IdentifiedModel
     evaluation: EvaluationResult | None
@@ -160,7 +162,7 @@ def certified_of(reported: Reported) -> Certified:
 
 
 def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance) -> ReportContent:
-    """Return the template's content beside numbers."""
+    """Return the template's content other than numbers."""
     found, modelled = reported.found, reported.modelled
     bad = {one.worst.test for one in numbers.tolerances if one.worst is not None and not one.within}
     bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}

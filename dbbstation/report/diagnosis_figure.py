@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 
 
 PER_WAVE = 24
-"""Points that a wave is drawn with."""
+"""Number of points of a drawn wave."""
 
 SENSES = {-1.0: "shortening", 1.0: "lengthening"}
 
 
 def draw_unexplained(part: SubFigure, curve: Curve) -> None:
-    """Draw one curve; signs of travel are two points with bars."""
+    """Draw one curve; the two directions of travel are points with bars."""
     axes: Axes = part.subplots()
     at, value, sigma = _between(curve)
     if curve.unit == "sign":
@@ -64,11 +64,11 @@ def _whose(curve: Curve) -> str:
 
 
 WHOSE = {EVERY: EVERY, SIGNED: EVERY, PULL: "every strut by a pull", TOWARDS: "every strut by a pull towards a place"}
-"""What moves, as a title says it; bodies have their own names."""
+"""The moving part, for titles; bodies have their own names."""
 
 
 def _between(curve: Curve) -> tuple[Floats, ...]:
-    """Return places, values and uncertainties, shape (n,) each, interpolated for waves [µm]."""
+    """Return positions, values and uncertainties, shape (n,) each [µm]; waves are interpolated."""
     at, value, sigma = np.array([(p.at, p.value_um, p.uncertainty_um) for p in curve.points]).T
     if curve.period_mm is None or len(at) < 3:  # noqa: PLR2004 (amplitudes need as many points)
         return at, value, sigma
@@ -87,7 +87,7 @@ def _cosine_and_sine(angle_rad: Floats) -> Floats:
 
 WIDTH_IN = 11.0
 TRACES = 4
-"""Tests whose traces are drawn."""
+"""Number of tests whose traces are drawn."""
 
 LINE_OF = {"": "-", "lengthening": "-", "shortening": "--"}
 MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}

@@ -1,4 +1,4 @@
-"""Common style, and maps over test and angle."""
+"""Common style of figures, and maps over test and angle."""
 
 from __future__ import annotations
 
@@ -41,25 +41,25 @@ STYLE: Any = {
     "legend.fontsize": 8,
     "legend.frameon": False,
 }
-"""Same input, same bytes; text stays text."""
+"""Style settings: the same input makes the same bytes, and text stays text."""
 
 MEASURED, BEFORE, AFTER = "#555555", "#d55e00", "#0072b2"
-"""Colours that the colour-blind tell apart [Okabe and Ito, Color Universal Design, 2008], and that differ in grey."""
+"""Colours that the colour-blind distinguish [Okabe and Ito, Color Universal Design, 2008], and that differ in grey."""
 
 SET = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Further colours of the same set, for heights of balls, or sessions."""
 
 DIVERGING = "RdBu_r"
-"""Red and blue about white, told apart by all but the totally colour-blind [Brewer, ColorBrewer]."""
+"""Red and blue about white, which all but the totally colour-blind distinguish [Brewer, ColorBrewer]."""
 
 QUARTERS = range(0, 361, 90)
 
 ROW_IN = 0.15
-"""Room of a row of a map [inch]."""
+"""Height of a row of a map [inch]."""
 
 
 def in_style() -> AbstractContextManager[None]:
-    """Draw what follows in the house style."""
+    """Draw all figures within the context in the common style."""
     return mpl.rc_context(STYLE)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.findings import DriveFindings
 
 MOST_POINTS = 3000
-"""Points of a line that are drawn: more make a large file and the same picture."""
+"""Greatest number of drawn points of a line: more points make a larger file and the same picture."""
 
 
 def drive_figure(diagnosis: DriveFindings, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.files.provenance import Provenance
 
 PNG_DOTS_PER_INCH = 200
-"""Sharp on paper at the figures' own size; a figure 10 inches wide has 2000 pixels."""
+"""Resolution that is sharp on paper at the figures' own size; a figure 10 inches wide has 2000 pixels."""
 
 
 class FigureFormat(StrEnum):
@@ -37,16 +37,16 @@ class Stamped:
 
 
 Wanted = FigureFormat | Stamped | OnePanel | None
-"""What is drawn: bytes in a format, one panel, or with None the figure itself."""
+"""The wanted output: bytes in a format, one panel, or with None the figure itself."""
 
 
 def figure_format(wanted: object) -> Wanted:
-    """Return a format, also from an extension such as `.svg`."""
+    """Return a format, from an extension such as `.svg` too."""
     return wanted if wanted is None or isinstance(wanted, Stamped | OnePanel) else FigureFormat(str(wanted))
 
 
 def in_format(figure: Figure, wanted: Wanted) -> Any:  # noqa: ANN401 - bytes or the figure
-    """Return the figure's bytes, reproducible and without date; the figure itself without a format."""
+    """Return the figure's bytes, reproducible and without date; without a format return the figure itself."""
     if wanted is None or isinstance(wanted, OnePanel):
         return figure
     kind = wanted.format if isinstance(wanted, Stamped) else wanted

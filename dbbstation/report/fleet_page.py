@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from dbbstation.results.fleet import FleetResult, FleetSession, Scored
 
 WIDTH, HEIGHT = 220, 22
-"""Size of a machine's strip of scores in its own units."""
+"""Size of a machine's strip of scores in drawing units."""
 
 REACH = 6.0
-"""Greatest score that a strip shows; one beyond stands at its end."""
+"""Greatest score that a strip shows; larger scores are drawn at its end."""
 
 
 @dataclass(frozen=True)

@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from dbbstation.results.history import HistoryEvent, HistoryResult, HistoryValue, QuantityHistory
 
 WIDTH, HEIGHT = 560, 190
-"""Size of a drawing in its own units."""
+"""Size of a drawing in drawing units."""
 
 LEFT, RIGHT, TOP, BOTTOM = 52, 10, 12, 24
-"""Room about the field for numbers and dates."""
+"""Margins of the field for numbers and dates."""
 
 _DIVISIONS = 2.2
-"""The field's height is at least so many divisions."""
+"""Least number of divisions of the field's height."""
 
 _MOST_YEARS = 12
-"""Years whose beginnings are marked one by one."""
+"""Greatest number of years that are marked one by one."""
 
 _FEW_DAYS = 400.0
-"""A history that is shorter has dates at its ends in place of years [days]."""
+"""A shorter history has dates at its ends instead of years [days]."""
 
 _DAY_S = 86400.0
 
@@ -65,7 +65,7 @@ class Drawing:
 
 
 def history_html(history: HistoryResult, provenance: Provenance, tolerances_from: str = "") -> bytes:
-    """Return reproducible HTML without script or outside references."""
+    """Return reproducible HTML without script and external references."""
     k = history.coverage_factor
     machines = [
         {

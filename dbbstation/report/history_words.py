@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from dbbstation.results.history import ChangedQuantity, MachineHistoryResult, QuantityHistory
 
 MOST_NAMED = 5
-"""Quantities of one change that are named in words; the table has all."""
+"""Greatest number of quantities that are named for one change; the table has all."""
 
 _COARSE = 0.1
-"""U from which on one decimal is enough: the micrometre's tenth, as in every other table."""
+"""Least U for which one decimal is enough: a tenth of a micrometre, as in every other table."""
 
 DASH = "–"
-"""Stands where there is no number."""
+"""Text for a missing number."""
 
 
 def rounded(value: float | None, u: float | None, coverage_factor: float) -> str:
@@ -33,7 +33,7 @@ def rounded(value: float | None, u: float | None, coverage_factor: float) -> str
 
 
 def verdict_in_words(one: QuantityHistory) -> str:
-    """Return a quantity's verdict with what it lacks."""
+    """Return a quantity's verdict in words, with the reason if there is none."""
     if one.why_not:
         return one.why_not if one.limit is not None or one.figure == "C" else f"{one.verdict}: {one.why_not}"
     lacking = one.sessions_lacking

@@ -1,4 +1,4 @@
-"""Pages as one HTML file; the template engine escapes all text."""
+"""Make pages as one HTML file; the template engine escapes all text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
-    """Return a reproducible report without outside references.
+    """Return a reproducible report without external references.
 
     Its one script enlarges polar traces; its policy forbids others.
     """
@@ -47,7 +47,7 @@ def environment() -> jinja2.Environment:
 
 
 def _css(text: str) -> str:
-    """Return a text for a string of a style sheet: all but letters, digits and blanks by their number."""
+    """Return a text for a string of a style sheet: all characters except letters, digits and blanks become numbers."""
     return "".join(c if c.isalnum() or c == " " else f"\\{ord(c):x} " for c in text)
 
 

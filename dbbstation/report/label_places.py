@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 STEP_IN = 0.05
-"""How much further from its place a label is tried next [inch]."""
+"""Distance between successive trial positions of a label [inch]."""
 
 _AROUND = np.radians(np.arange(0.0, 360.0, 22.5))
 
@@ -35,7 +35,7 @@ class Box:
         )
 
     def holds(self, other: Box) -> bool:
-        """Return whether the other lies within."""
+        """Return whether the other box is inside this one."""
         return (
             self.left <= other.left
             and self.bottom <= other.bottom

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 MOST_POINTS = 500
-"""Points of a cloud that are drawn: more make a large file and the same picture."""
+"""Greatest number of drawn points of a cloud: more points make a larger file and the same picture."""
 
 MOST_VARIABLES = 4
 BINS = 40

@@ -11,17 +11,17 @@ from dbbstation.errors import StationError
 from dbbstation.system.children import BoundExceededError, ProgramBounds, is_root, run_bounded
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
-"""Names under which a Chromium is installed, on the PATH."""
+"""Names of an installed Chromium on the PATH."""
 
 BROWSER_VARIABLE = "DBBSTATION_CHROMIUM"
-"""Environment variable that names one elsewhere."""
+"""Environment variable with the path of another Chromium."""
 
 BOUNDS = ProgramBounds(time_s=120.0, memory_mb=8000.0, output_mb=1000.0)
-"""A report of a hundred runs prints in seconds; a browser that takes longer waits for something that does not come."""
+"""Bounds of the browser: a report of a hundred runs prints in seconds; a browser that needs longer hangs."""
 
 
 def chromium() -> str:
-    """Return the Chromium.
+    """Return the path of the Chromium.
 
     Raises:
         StationError: none is installed.

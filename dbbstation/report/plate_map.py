@@ -1,4 +1,4 @@
-"""Places of a plan's tests for SVG."""
+"""Positions of a plan's tests for SVG."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import PlannedTest
 
 WIDTH = 420
-"""Width and height of the map in its own units."""
+"""Width and height of the map in drawing units."""
 
 _MARGIN = 70.0
 
 _SAME_MM = 1.0
-"""Balls whose places differ by less stand in one place: holders of several heights in one bore."""
+"""Largest distance of balls at one position, such as holders of several heights in one bore."""
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,11 @@ LONGEST_IN = 0.6
 """The longest arrow [inch]."""
 
 _ROOM_IN = 0.9
-"""Between the outermost balls and the edge: an arrow and a label [inch]."""
+"""Distance of the outermost balls from the edge: space for an arrow and a label [inch]."""
 
 _BALL_IN = 0.05
 _FAR_IN = 0.25
-"""A label further than this from its ball is tied to it by a line [inch]."""
+"""A line connects a label to its ball if their distance is greater [inch]."""
 
 
 def draw_map(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.results.circles import MeasuredCircle
 
 Drawn: TypeAlias = "tuple[MeasuredCircle, bool]"
-"""A run, and whether it is drawn thin."""
+"""A run, and whether its line is thin."""
 
 SMALL_PT = 7.0
 
@@ -32,7 +32,7 @@ CAPTION_IN = line_in(TEXT_PT) + line_in(SMALL_PT)
 """Height of a panel's two lines [inch]."""
 
 _SIDE_IN, _FOOT_IN = 0.55, 0.42
-"""Room for the numbers of the axes, at the left and below [inch]."""
+"""Margins for the numbers of the axes, at the left and below [inch]."""
 
 
 def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_um: float | None = None) -> None:
@@ -85,7 +85,7 @@ def draw_deviation(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) ->
 
 
 def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence[MeasuredCircle]]) -> None:
-    """Draw sessions' runs over the angle, a colour each."""
+    """Draw the runs of several sessions over the angle, one colour per session."""
     axes = _chart(sheet, box, [name], "deviation, µm")
     for colour, (session, of) in zip(_colours(len(runs)), runs.items(), strict=True):
         for k, one in enumerate(of):
@@ -105,7 +105,7 @@ def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence
 
 
 def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> None:
-    """Draw undulation amplitudes, and noise."""
+    """Draw the amplitudes of undulations, and the noise."""
     spectra = [(one.analysis, one.spectrum, thin) for one, thin in drawn if one.analysis is not None]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
     noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")

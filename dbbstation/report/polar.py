@@ -19,20 +19,21 @@ if TYPE_CHECKING:
     from dbbstation.results.circles import MeasuredCircle
 
 SIZE = 320
-"""Width and height of a polar figure in its own units."""
+"""Width and height of a polar figure in drawing units."""
 
 CIRCLE = 92.0
-"""Radius at which the nominal circle is drawn."""
+"""Radius of the nominal circle in the drawing."""
 
 REACH = 44.0
-"""How far from that the greatest deviation of a figure is drawn, either way."""
+"""Radial distance of a figure's greatest deviation from the nominal circle."""
 
 BINS = 240
-"""Stretches of a turn, of which each is drawn by its greatest and least deviation: narrower ones cannot be distinguished at the size
-of the figure, and a peak of a single reading is still there."""
+"""Number of bins of a turn. Each is drawn by its greatest and least deviation, so that the peak of a single reading
+remains. Narrower bins are indistinguishable at the figure's size."""
 
 MOST_DRAWN = 4
-"""Repeats of one direction that are drawn; more cover one another. The others are counted below the figure."""
+"""Greatest number of drawn repeats of one direction: more would cover one another. The number of the others is below
+the figure."""
 
 _STEPS = (1.0, 2.0, 5.0)
 
@@ -94,7 +95,7 @@ class Polar:
 
 
 def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
-    """Return a test's circles about their centres, before and now to one scale."""
+    """Return a test's circles about their centres, before and now with one scale."""
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
     paths = [
@@ -116,7 +117,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
 
 
 def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int = 0) -> Polar:
-    """Return paths of one circle to one scale."""
+    """Return the paths of one circle with one scale."""
     most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
     traces = tuple(
@@ -153,7 +154,7 @@ def step_of(most_um: float) -> float:
 
 
 def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple[MeasuredCircle, bool]]:
-    """Return drawn runs; all but a direction's last are thin."""
+    """Return the runs to draw; all except the last of a direction are thin."""
     drawn: list[tuple[MeasuredCircle, bool]] = []
     for direction in dict.fromkeys(one.entry.direction for one in runs):
         of = [one for one in runs if one.entry.direction is direction][-most:]
@@ -170,7 +171,7 @@ def _points(theta_deg: Floats, deviation_um: Floats, scale: float) -> str:
 
 
 def thinned(theta_deg: Floats, deviation_um: Floats) -> tuple[Floats, Floats]:
-    """Return each stretch's extremes, in order of angle."""
+    """Return the extremes of each bin, in order of angle."""
     order = np.argsort(theta_deg, kind="stable")
     theta, deviation = theta_deg[order], deviation_um[order]
     kept = np.arange(len(theta)) if len(theta) <= 2 * BINS else _extremes(np.radians(theta), deviation)

@@ -1,4 +1,4 @@
-"""A sheet with one figure; places in inches from the lower left."""
+"""A sheet with one figure; positions are in inches from the lower left."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 MARGIN_IN = 0.3
 TITLE_PT, NAME_PT, TEXT_PT = 11.0, 6.0, 8.0
-"""Sizes of the sheet's title, of the names of the title block's cells, of everything else [pt]."""
+"""Sizes of the sheet's title, of the names of the title block's cells, and of all other text [pt]."""
 
 POINTS_PER_INCH = 72.0
 _LINE = 1.3
-"""Height of a line of text over the size of its letters."""
+"""Ratio of a line's height to the size of its letters."""
 
 MOST_LINES = 3
-"""Lines of a cell of the title block; what is longer ends in an ellipsis, and stands in the session's file."""
+"""Greatest number of lines of a cell in the title block; longer text ends in an ellipsis."""
 
 _PAD_IN = 0.05
 _KEY_IN = 0.35
@@ -57,7 +57,7 @@ class Sheet:
     def __init__(
         self, width_in: float, room_in: float, title: str, keys: Sequence[Key], block: Sequence[Sequence[Cell]]
     ) -> None:
-        """Lay out all but the panels."""
+        """Lay out the sheet without its panels."""
         self.width_in = width_in
         self.inner_in = width_in - 2.0 * MARGIN_IN
         lines = wrapped(title, TITLE_PT, self.inner_in, MOST_LINES)
@@ -124,7 +124,7 @@ def width_of_in(text: str, size_pt: float) -> float:
 
 
 def wrapped(text: str, size_pt: float, width_in: float, most: int) -> list[str]:
-    """Return a text in lines, cut with an ellipsis."""
+    """Return a text in lines; an ellipsis replaces what does not fit."""
     rest, lines = " ".join(text.split()), list[str]()
     while rest and len(lines) < most:
         end = _fitting(rest, size_pt, width_in)

@@ -1,4 +1,4 @@
-"""The report page's content beside numbers."""
+"""The content of the report page other than numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ShownSession:
-    """A session as the page shows it."""
+    """Texts of a session for the page."""
 
     name: str
     measured: str
@@ -30,7 +30,7 @@ class ShownSession:
 
 @dataclass(frozen=True, eq=False)
 class ShownCauses:
-    """Causes as the page shows them."""
+    """Texts of the causes for the page."""
 
     session: str
     why_not: str
@@ -42,7 +42,7 @@ class ShownCauses:
 
 @dataclass(frozen=True)
 class ShownFindings:
-    """Findings as the page shows them."""
+    """Texts of the findings for the page."""
 
     wrong: Sequence[tuple[str, str, Finding]]
     undecided: Sequence[tuple[str, str, Sequence[str]]]
@@ -51,7 +51,7 @@ class ShownFindings:
 
 @dataclass(frozen=True, eq=False)
 class ShownModel:
-    """A model as the page shows it."""
+    """Texts of a model for the page."""
 
     problem: str
     failed: bool

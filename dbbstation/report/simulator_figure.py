@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison
 
 MOST_POINTS = 2000
-"""Points of a cloud that are drawn: more make a large file and the same picture."""
+"""Greatest number of drawn points of a cloud: more points make a larger file and the same picture."""
 
 
 def simulator_figure(answer: SimulatorComparison, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`

@@ -1,4 +1,4 @@
-"""Reproducible SVG bytes no longer than visible."""
+"""Write reproducible SVG with only the visible digits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NUMBER = re.compile(rb"-?\d+\.\d+")
 
 
 def as_svg(figure: Figure, metadata: Mapping[str, Any] | None = None) -> bytes:
-    """Return reproducible bytes.
+    """Return a figure as reproducible SVG.
 
     Args:
         metadata: Dublin Core names for Matplotlib.

@@ -18,7 +18,7 @@ from dbbstation.results.frame import Framed
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalibrationResult(Framed, CalibrationFigures):
-    """What a calibration found.
+    """Result of a calibration.
 
     Attributes:
         centre_u_um: greatest u of the tool's X, Y and Z at the circles' centres; None if unknown.

@@ -38,7 +38,7 @@ class CheckedFile:
 
 @dataclass(frozen=True)
 class DryRunResult:
-    """The trial of a plan's programs."""
+    """Dry run of a plan's programs."""
 
     plan: str
     machine: str
@@ -58,7 +58,7 @@ class SampledPlanResult:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What `check` found."""
+    """Findings of `check`."""
 
     files: tuple[CheckedFile, ...]
     dry_runs: tuple[DryRunResult, ...]

@@ -24,7 +24,7 @@ class LargestAndLeast:
 
 @dataclass(frozen=True)
 class PlaneVector:
-    """A place in the plane of the circle [µm]."""
+    """A vector in the plane of the circle [µm]."""
 
     x: float
     y: float
@@ -32,7 +32,7 @@ class PlaneVector:
 
 @dataclass(frozen=True)
 class ShownFeed:
-    """The feed by the recording, with its standard uncertainty [mm/min]."""
+    """The feed as computed from the recording, with standard uncertainty [mm/min]."""
 
     value: float
     u: float
@@ -126,7 +126,7 @@ class CircleFiguresResult:
 
 @dataclass(frozen=True, kw_only=True)
 class PairFigures:
-    """Figures of both directions together.
+    """Figures that combine both directions of a circle.
 
     Attributes:
         g_um: bidirectional circular deviation G(b), minimum zone.

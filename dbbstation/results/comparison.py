@@ -31,7 +31,7 @@ class VariableSpan:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedCause:
-    """What was found of one cause.
+    """Findings on one cause.
 
     Attributes:
         verdict: see docs/verdicts.md.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class KinematicsResult:
-    """What `control kinematics` wrote.
+    """Output of `control kinematics`.
 
     Attributes:
         model_sha256: of the model file; the component's pin `model` has its first 32 bits.
@@ -31,7 +31,7 @@ class KinematicsResult:
 
 @dataclass(frozen=True, kw_only=True)
 class LeftByWay:
-    """Errors of the tool over the volume by set-up of the control: position and tilt, rms and largest."""
+    """Errors of the tool over the volume with one set-up of the control: position and tilt, rms and largest."""
 
     way: str
     rms_um: float
@@ -52,7 +52,7 @@ class SourceLeftOver:
 
 @dataclass(frozen=True, kw_only=True)
 class ParametersResult:
-    """What `control parameters` wrote.
+    """Output of `control parameters`.
 
     Attributes:
         low: of the volume, X, Y, Z [mm], A, B, C [deg].

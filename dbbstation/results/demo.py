@@ -10,7 +10,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class MeasuredBeforeAfter:
-    """Measured figures of one circle [µm]; the last without the bar's noise."""
+    """Measured figures of one circle [µm]. The last one excludes the bar's noise."""
 
     centre_deviation_um: float
     mean_radial_error_um: float
@@ -46,7 +46,7 @@ class DemoResult:
 
 @dataclass(frozen=True)
 class ControlWay:
-    """What a bar measures of a machine under one way of correction.
+    """Measured figures of a machine with one kind of correction.
 
     Attributes:
         runs: of `evaluate`, as objects.

@@ -27,7 +27,7 @@ from dbbstation.results.levels_text import level_sentences, short_sentences
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """A figure under kinematic calibration (before) and joint model (after)."""
+    """A figure with the kinematic calibration (before) and with the joint model (after)."""
 
     before: float
     after: float
@@ -87,7 +87,7 @@ class DiagnosisFigures(Framed):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def said(self) -> tuple[str, ...]:
-        """Return whether anything differs, and its main variable, in two sentences for a report or a screen."""
+        """Return two sentences for a report or a screen: whether a difference exists, and its main variable."""
         return short_sentences(self.levels, "µm", "Measured circles and the kinematic model")
 
     @property
@@ -96,7 +96,7 @@ class DiagnosisFigures(Framed):
         return tuple(one for one in self.sources if one.verdict == "identified")
 
     def headline(self) -> str:
-        """Return the misfit and what is identified."""
+        """Return the misfit and the identified causes."""
         named = ", ".join(one.name for one in self.identified) or "nothing"
         if not self.mismatch:
             return f"the recordings agree with the kinematic model, {self.noise_um:.2f} µm noise"

@@ -40,5 +40,5 @@ class DriveResult(Framed, DriveFindings):
 
 
 def drive_result(found: DriveFindings, drawing: Callable[[object], bytes] | None = None) -> DriveResult:
-    """Return the findings as a displayable result."""
+    """Return the findings as a result with table and figure."""
     return DriveResult(**{one.name: getattr(found, one.name) for one in fields(found)}, drawing=drawing)

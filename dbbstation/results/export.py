@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ExportResult:
-    """A table that was written."""
+    """A written table."""
 
     table: str
     runs: int

@@ -10,10 +10,11 @@ from dbbstation.facts.serialise import Absent
 from dbbstation.results.frame import Framed
 
 State = Literal["done", "up-to-date", "failed"]
-"""Of a session: worked out now; known from an earlier call with the same inputs, options and program; failed."""
+"""State of a session: computed now; known from an earlier call with the same inputs, options and program; failed."""
 
 Kind = Literal["parameter", "figure", "cause"]
-"""Of a quantity: a parameter of the machine; a figure of a fit or of a circle; a parameter of a cause that was found."""
+"""Kind of a quantity: a parameter of the machine; a figure of a fit or of a circle; a parameter of an identified
+cause."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class FleetSession:
 
 @dataclass(frozen=True)
 class Scored:
-    """One quantity of one machine against its sisters.
+    """One quantity of one machine, compared with like machines.
 
     Attributes:
         usual: middle of the sisters; None if unknown.
@@ -140,7 +141,7 @@ class FleetComparison:
 
     @property
     def unlike(self) -> tuple[Scored, ...]:
-        """Return unlike values, the greatest score first."""
+        """Return the values that differ significantly, the greatest score first."""
         found = [one for one in self.scored if one.unlike]
         return tuple(sorted(found, key=lambda one: -abs(one.score or 0.0)))
 
@@ -168,7 +169,7 @@ class FleetResult(Framed):
         return tuple(one for one in self.sessions if one.state == "failed")
 
     def rows(self) -> list[dict[str, object]]:
-        """Return a row per value with its score; one row for a session without values."""
+        """Return one row per value with its score; a session without values has one row."""
         scored = {} if self.comparison is None else {one.key: one for one in self.comparison.scored}
         return [
             dict(zip(TABLE, _row(session, value, scored), strict=True))
@@ -220,7 +221,7 @@ def _row(session: FleetSession, value: FleetValue | None, scored: Mapping[tuple[
 
 @dataclass(frozen=True)
 class StoredFiles:
-    """A kept result: its key and further files."""
+    """A stored result: its key and further files."""
 
     key: str
     files: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What every result offers: JSON, table, figure, notebook view."""
+"""Common methods of all results: JSON, table, figure, notebook view."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ class Framed:
     notes: Annotated[tuple[str, ...], Kept] = field(default=(), repr=False)
 
     def rows(self) -> list[dict[str, object]]:
-        """Return the main table, a dictionary per row, units in names."""
+        """Return the main table, one dictionary per row, with units in the names."""
         raise NotImplementedError
 
     def sentences(self) -> list[str]:
-        """Return the answer in words, shown above a notebook's table; none if the table is the answer."""
+        """Return the sentences above a notebook's table; empty if the table is the answer."""
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain objects as the command's `--json` prints."""
+        """Return the plain objects that the command's `--json` prints."""
         return plain(self)
 
     def to_json(self, indent: int | None = 1) -> str:
-        """Return JSON without the command line's provenance."""
+        """Return the result as JSON, without the command line's provenance."""
         return json_of(self, indent)
 
     def to_frame(self) -> Any:  # noqa: ANN401 - pandas is no dependency
@@ -120,7 +120,7 @@ class Framed:
         return next(iter(self.sentences()), f"{len(self.rows())} rows")
 
     def summary(self) -> str:
-        """Return the answer in sentences and its table as text."""
+        """Return the sentences of the answer and its table as text."""
         rows = self.rows()
         names = _columns(rows)
         cells = [names, *([_shown(row.get(name)) for name in names] for row in rows)]
@@ -149,7 +149,7 @@ class Framed:
 
 
 def picked(one: object, *names: str) -> dict[str, object]:
-    """Return fields of an object by name."""
+    """Return some fields of an object by name."""
     return {name: getattr(one, name) for name in names}
 
 

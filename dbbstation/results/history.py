@@ -42,7 +42,7 @@ class ChangedQuantity:
 
 @dataclass(frozen=True)
 class HistoryChange:
-    """Changes of a machine from one session on.
+    """Changes of a machine since one session.
 
     Attributes:
         beside: other changes of that session, in words.
@@ -57,7 +57,7 @@ class HistoryChange:
 
 @dataclass(frozen=True)
 class HistoryEvent:
-    """An event of one quantity beyond scatter and uncertainty.
+    """A change of one quantity beyond scatter and uncertainty.
 
     Attributes:
         verdict: `changed` or `stands out`.
@@ -74,7 +74,7 @@ class HistoryEvent:
 
 @dataclass(frozen=True)
 class HistoryValue:
-    """One quantity in one session, with the chart's values; None if not watched.
+    """One quantity in one session, with the values of the chart; None if not watched.
 
     Attributes:
         z: standard normal without change.
@@ -182,7 +182,7 @@ class HistoryResult(Framed):
     model_warnings: Annotated[Mapping[str, tuple[str, ...]], Kept] = field(default_factory=dict)
 
     def rows(self) -> list[dict[str, object]]:
-        """Return a row per machine, quantity and session, None for gaps."""
+        """Return one row per machine, quantity and session; None for missing values."""
         of_quantity = ("quantity", "figure", "test", "direction", "of", "unit")
         charted = ("level", "z", "cusum_high", "cusum_low")
         return [

@@ -18,7 +18,7 @@ class TakenRun:
 
 @dataclass(frozen=True)
 class ImportResult:
-    """Recordings taken in.
+    """Imported recordings.
 
     Attributes:
         written: False for a dry run.

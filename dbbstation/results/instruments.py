@@ -40,7 +40,7 @@ class InstrumentsResult:
 
 
 def instrument_result(protocol: Protocol, profiles: Iterable[str], *, whole: bool = False) -> InstrumentResult:
-    """Return an instrument."""
+    """Return the description of an instrument."""
     return InstrumentResult(
         name=protocol.name,
         profile=protocol.profile,

@@ -10,7 +10,7 @@ from dbbstation.plan.repeatability import HolderResult
 
 @dataclass(frozen=True)
 class MeasuredBall:
-    """A measured ball: centre in the jig's frame and change against the former jig, None for a new ball."""
+    """A measured ball: its centre in the jig's frame and its change since the former jig file; None for a new ball."""
 
     centre_mm: tuple[float, ...]
     change_um: tuple[float, ...] | None
@@ -18,7 +18,7 @@ class MeasuredBall:
 
 @dataclass(frozen=True)
 class SheetResult:
-    """What `jig sheet` wrote."""
+    """Output of `jig sheet`."""
 
     jig: str
     balls: Mapping[str, MeasuredBall]
@@ -27,7 +27,7 @@ class SheetResult:
 
 @dataclass(frozen=True)
 class HoldersResult:
-    """What `jig holders` found."""
+    """Result of `jig holders`."""
 
     holders: Mapping[str, HolderResult]
     jig: str | None

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from dbbstation.inference.levels import DifferenceFound, Followed, LawForm, Levels
 
 LIKELY = 0.5
-"""Probability from which on a way is mentioned."""
+"""Least probability of a law that the text mentions."""
 
 MOST_LISTED = 4
-"""Variables or laws that are listed by name, at the most."""
+"""Greatest number of variables or laws that are listed by name."""
 
 BAR = 24
-"""Characters of the longest bar: a screen of 80 columns has as many for what it means."""
+"""Characters of the longest bar: a screen of 80 columns then has as many for its label."""
 
 WAYS = {"value": "by value", "direction": "by direction of travel", "late": "late", "in_time": "in time"}
 
@@ -32,7 +32,7 @@ def level_sentences(
     rows: str = "rows",
     what: str = "Measured and simulated values",
 ) -> list[str]:
-    """Return sentences on existence, variables and law of a difference, and correction.
+    """Return sentences on existence, variables and law of a difference, and on the correction.
 
     Args:
         values: numbers of laws, by law and number.
@@ -47,7 +47,7 @@ def level_sentences(
 
 
 def short_sentences(levels: Levels, unit: str, what: str) -> tuple[str, ...]:
-    """Return two sentences: whether anything differs, and its main variable with the error in held-out tests."""
+    """Return two sentences: whether a difference exists, and its main variable with the error in held-out tests."""
     first = next(_difference(levels.differs, unit, what, "tests"))
     largest = max(levels.follows, key=lambda one: one.rms, default=None)
     if largest is None:
@@ -57,7 +57,7 @@ def short_sentences(levels: Levels, unit: str, what: str) -> tuple[str, ...]:
 
 
 def bars(levels: Levels, unit: str) -> list[str]:
-    """Return a picture in text: the error in held-out tests before and after, by what it follows and where."""
+    """Return a chart as text: the error in held-out tests before and after, for each variable and place."""
     classes = [one for one in levels.follows if one.before is not None and one.after is not None]
     sizes = [(word, size, one) for one in classes for word, size in (("before", one.before), ("after", one.after))]
     per = BAR / max((size for _, size, _ in sizes if size), default=1.0)
@@ -68,7 +68,7 @@ def bars(levels: Levels, unit: str) -> list[str]:
 
 
 def place_of(one: Followed) -> str:
-    """Return what a class follows, and its strut, also from its JSON."""
+    """Return the variable and the strut of a class, also from the class's JSON."""
     variables = " and ".join(" or ".join(names) for names in one.variables)
     return ", ".join(text for text in (variables, getattr(one, "where", None)) if text)
 

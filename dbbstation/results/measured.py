@@ -35,7 +35,7 @@ class CompletedRun(RecordedRun):
 
 @dataclass(frozen=True)
 class MeasuredSession:
-    """A session."""
+    """A session after its measurement."""
 
     session: str
     state: str

@@ -42,14 +42,14 @@ class VariableResult:
 
 @dataclass(frozen=True)
 class OffsetResult(Value):
-    """Mean of measured less simulated value."""
+    """Mean of measured minus simulated values."""
 
     significant: bool
 
 
 @dataclass(frozen=True)
 class SearchBeginning:
-    """The end of a search from one beginning."""
+    """The result of a search from one initial noise model."""
 
     beside: str
     log_odds: float
@@ -77,7 +77,7 @@ class NoiseResult:
 
 @dataclass(frozen=True)
 class ResidualRms:
-    """Rms of measured less simulated values, in the table's unit."""
+    """Rms of measured minus simulated values, in the table's unit."""
 
     before: float
     after: float

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from dbbstation.model.machine_model import MachineModel
 
 LEAST_PRINTED = 1e-99
-"""Probabilities below are printed alike."""
+"""Smallest probability that is printed as a number."""
 
 
 def model_warnings(identified: IdentifiedModel) -> tuple[str, ...]:
@@ -27,7 +27,7 @@ def lacks_physics(report: Mapping[str, Any]) -> bool:
 
 
 def missing_physics_warnings(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the warning of missing physics; empty if chance explains the residual."""
+    """Return the warning about missing physics; empty if chance explains the residual."""
     if not lacks_physics(report):
         return ()
     misfit = report["misfit"]
@@ -40,12 +40,12 @@ def missing_physics_warnings(report: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def exceeds(rms_um: float, probability: float) -> str:
-    """Return how far a residual exceeds chance, in words."""
+    """Return in words how far a residual exceeds chance."""
     return f"the residual exceeds noise and mountings by {rms_um:.2f} µm rms (probability by chance {chance_in_words(probability)})"
 
 
 def chance_in_words(probability: float) -> str:
-    """Return an F test's probability as printed; the smallest underflow."""
+    """Return the printed probability of an F test; the smallest ones underflow."""
     return "below 1e-99" if probability < LEAST_PRINTED else f"{probability:.1g}"
 
 
@@ -64,7 +64,7 @@ def _lists(said: Mapping[str, Any]) -> list[Sequence[str]]:
 
 
 def unknown_cause_notes(model: MachineModel) -> list[str]:
-    """Return notes on a kept error of unknown cause."""
+    """Return notes on an error of unknown cause in the model."""
     return [
         f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
         for name in unknown_causes(model)

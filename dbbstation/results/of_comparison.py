@@ -1,4 +1,4 @@
-"""From a comparison of two sessions to its result."""
+"""Make the result of a comparison of two sessions."""
 
 from __future__ import annotations
 

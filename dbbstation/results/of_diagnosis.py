@@ -1,4 +1,4 @@
-"""From a diagnosis to its result."""
+"""Make the result of a diagnosis."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def diagnosis_result(
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:
-    """Return the part of a diagnosis kept in a model file: doubts about causes, and limits reached."""
+    """Return the part of a diagnosis for the model file: doubts about causes, and limits reached."""
     open_ones = (one for one in figures.sources if one.verdict == Verdict.AMBIGUOUS)
     groups = {frozenset((one.name, *one.ambiguous_with)): [one.name, *one.ambiguous_with] for one in open_ones}
     return {
@@ -129,4 +129,4 @@ def _of(outlier: Outlier) -> str:
 
 
 BALLS = ("mounting", "ball-coordinate")
-"""What cannot be told apart where a ball was put up once only."""
+"""Effects that cannot be separated if each ball was put up only once."""

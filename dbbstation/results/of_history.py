@@ -1,4 +1,4 @@
-"""From histories to their result."""
+"""Make the result of histories."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ FIGURES = {
     "R": "mean length of the bar less its nominal one",
     "C": "distance of the centre from the commanded one",
 }
-"""What the figures of circles mean."""
+"""Meaning of the figures of circles."""
 
 
 DECIDED_BY = {True: "stated-uncertainty", False: "control-chart"}
-"""What a verdict rests on: the stated uncertainties alone, or a chart that knows how the sessions scatter."""
+"""Basis of a verdict: the stated uncertainties alone, or a control chart with the scatter of the sessions."""
 
 
 def history_result(

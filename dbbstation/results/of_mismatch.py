@@ -1,4 +1,4 @@
-"""From a table's comparison to its result."""
+"""Make the result of a table's comparison."""
 
 from __future__ import annotations
 

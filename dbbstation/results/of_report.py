@@ -1,4 +1,4 @@
-"""From circles and tolerances to a report's figures, now and before."""
+"""Make a report's figures, now and before, from circles and tolerances."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def tolerances_by_test(
     both: tuple[Sequence[ToleratedCircle], Sequence[ToleratedCircle]],
     coverage_factor: float,
 ) -> Iterable[ToleranceOfTest]:
-    """Yield every tolerance against the circles of each of its tests."""
+    """Compare every tolerance with the circles of each of its tests."""
     for test in tests:
         now, before = ([one for one in circles if one.test == test] for circles in both)
         for one in tolerances:
@@ -33,14 +33,14 @@ def tolerances_by_test(
 def compared(
     tolerance: Tolerance, now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle], coverage_factor: float
 ) -> ComparedTolerance:
-    """Return one tolerance against circles now and before, if it applies."""
+    """Compare one tolerance with circles now and before, if it applies."""
     former = held_tolerance(tolerance, before, coverage_factor)
     told = None if former.worst is None else former
     return ComparedTolerance(**vars(held_tolerance(tolerance, now, coverage_factor)), before=told)
 
 
 def side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[MeasuredFigures]:
-    """Yield measured figures, with those of the same test, direction and repeat before."""
+    """Yield measured figures, each with the former figures of the same test, direction and repeat."""
     former = {one.key: _sizes(one) for one in before}
     for one in now:
         yield MeasuredFigures(
@@ -53,7 +53,7 @@ def _sizes(one: ToleratedCircle) -> dict[str, MeasuredSize]:
 
 
 def means_of(measured: Sequence[MeasuredFigures]) -> Iterable[MeasuredMean]:
-    """Yield mean and largest of each figure, also of circles measured both times."""
+    """Yield mean and largest of each figure, also over the circles that were measured both times."""
     both = [one for one in measured if one.before is not None]
     taken = both or measured
     for figure in OF_A_MODEL:

@@ -1,4 +1,4 @@
-"""From a simulator in the loop to its result."""
+"""Make the result of a simulator in the loop."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.read_off import CauseFinding
 
 HIDDEN = 0.1
-"""Share of an effect that parameters had taken up from which on it is reported."""
+"""Least reported share of an effect that fitted parameters had absorbed."""
 
 
 def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:

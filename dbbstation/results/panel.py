@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OnePanel:
-    """Axes that take one panel of a figure."""
+    """Axes that one panel of a figure is drawn into."""
 
     axes: Any
     name: str | None

@@ -67,7 +67,7 @@ class ProgramsResult(Framed):
 
     @property
     def text(self) -> str:
-        """Return the text of the program; of several, one after the other."""
+        """Return the text of the program, or of several programs one after the other."""
         return "".join(one.text for one in self.programs)
 
     @property

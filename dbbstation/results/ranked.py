@@ -29,7 +29,7 @@ class Ranked:
 
 
 def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
-    """Return the causes by contribution, a sentence each with the cure."""
+    """Return a sentence for each cause with its cure, in order of contribution."""
     told = []
     for rank, one in enumerate(ranked.effects, start=1):
         g, g_u = with_uncertainty(one.g_um, expanded_uncertainty(one.g_u_um, coverage_factor))

@@ -35,7 +35,7 @@ class MeasuredSize:
 
 @dataclass(frozen=True)
 class MeasuredFigures(OfRunInSession):
-    """Measured figures of one circle, with those of the same run before."""
+    """Measured figures of one circle, with the former figures of the same run."""
 
     now: Mapping[str, MeasuredSize]
     before: Mapping[str, MeasuredSize] | None
@@ -51,7 +51,7 @@ class MeanAndLargest:
 
 @dataclass(frozen=True)
 class MeasuredMean:
-    """Mean and largest of a figure, over circles measured both times if there are earlier ones."""
+    """Mean and largest of a figure. If there is an earlier session, they are over circles that were measured both times."""
 
     quantity: str
     circles: int
@@ -66,7 +66,7 @@ class NotEvaluated:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReportResult(Framed):
-    """The numbers of a report, and where it was written.
+    """The numbers of a report, and the file's path.
 
     Attributes:
         circles: figures after ISO 230-4.

@@ -1,4 +1,4 @@
-"""The verdict of a report, with reasons and what to do."""
+"""The verdict of a report, with reasons and advice."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.results.ranked import Ranked
 
 MOST_TOLD = 5
-"""Runs that the first page names; the findings name all."""
+"""Greatest number of runs on the first page; the findings name all."""
 
 
 def verdict_of(
@@ -32,7 +32,7 @@ def verdict_of(
     ranked: Ranked | None = None,
     evaluation: EvaluationResult | None = None,
 ) -> ReportVerdict:
-    """Return the verdict of tolerances held against measured circles."""
+    """Return the verdict on measured circles by their tolerances."""
     said = {one.conformity for one in held}
     repeat = (*_to_repeat(found.circles), *_of_the_model(found, identified, evaluation))
     if not said - {None}:

@@ -40,7 +40,7 @@ class SimulatedRun:
 
 @dataclass(frozen=True)
 class SimulationRms:
-    """Rms of measured less simulated values."""
+    """Rms of measured minus simulated values."""
 
     as_simulated: float
     refitted: float
@@ -78,7 +78,7 @@ class HeldOutSimulations(SimulationRms):
 
 @dataclass(frozen=True, kw_only=True)
 class PortTerm:
-    """What was found of one term.
+    """Findings on one term.
 
     Attributes:
         sigmas: norm of its effect over the standard deviation.
@@ -117,7 +117,7 @@ class SimulationsRun:
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatorResult(Framed):
-    """What a simulator lacks.
+    """The terms that a simulator lacks.
 
     Attributes:
         levels: existence, signals and ports, and term of a difference.

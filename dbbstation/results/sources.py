@@ -81,7 +81,7 @@ def source_description(source: ErrorSource, machine: Machine | None = None) -> S
 
 
 def role_of(source: ErrorSource) -> str:
-    """Return its role: always fitted, candidate of the diagnosis, or keeper of a curve."""
+    """Return a cause's role: always fitted, candidate of the diagnosis, or holder of a curve."""
     if source.name in {fitted.name for fitted in default_sources()}:
         return "fitted always"
     return "candidate" if source.candidate else "keeps what has no name"

@@ -1,4 +1,4 @@
-"""Measured circles against the shop's tolerances, with uncertainty."""
+"""Compare measured circles with the shop's tolerances, with uncertainty."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ToleratedCircle(OfRunInSession):
     others: Mapping[tuple[CircleFigure, int], Size] = field(default_factory=dict)
 
     def size(self, tolerance: Tolerance) -> Size | None:
-        """Return the figure of a tolerance, or None."""
+        """Return the figure that a tolerance limits, or None."""
         own = self.sizes.get(tolerance.figure)
         if own is not None and (tolerance.upr == TOLERATED or tolerance.figure not in FILTERED):
             return own
@@ -77,7 +77,7 @@ def tolerated_circles(
 
 
 def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Tolerance]) -> tuple[ToleratedCircle, ...]:
-    """Return the toleranced figures of both directions together."""
+    """Return the figures with tolerances that combine both directions."""
     wanted = dict.fromkeys((one.figure, one.upr) for one in tolerances if one.figure in OF_BOTH_DIRECTIONS)
     return tuple(
         ToleratedCircle(
@@ -118,7 +118,7 @@ def _sized(budget: Budget) -> Size:
 
 
 TOLERATED = Filter.UPR_30
-"""Filter of the circular deviation that a tolerance is for: the one that `evaluate` compares with predictions."""
+"""Filter of the circular deviation for tolerances, as in the predictions of `evaluate`."""
 
 
 def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
@@ -133,7 +133,7 @@ def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, S
 
 
 def _off_centre(x: Budget, y: Budget) -> Size:
-    """Return a centre offset's length, minus its bias by uncertainty; u along it from both axes."""
+    """Return the length of a centre offset without its bias by uncertainty, and its u from both axes."""
     off, u = np.array([x.value_um, y.value_um]), np.array([x.known_um, y.known_um])
     length = float(np.hypot(*off))
     # A centre that is not off has no direction: either axis may be the one that counts.

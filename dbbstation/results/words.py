@@ -1,4 +1,4 @@
-"""Sentences of answers, the same on terminal and screen."""
+"""Sentences of answers, identical on terminal and screen."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ STILL_OPEN = frozenset({"ambiguous", "not-testable"})
 
 
 def outlier_sentence(outlier: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return why a run or a ball takes no part."""
+    """Return why a run or a ball is left out of the fit."""
     return f"outlier, kept out of the fit: {outlier.text}"
 
 
 def unseen_sentence(text: str, *, nominal: bool = True) -> str:
-    """Return a direction that tests do not determine."""
+    """Return a sentence on a direction that the tests do not determine."""
     return f"not visible to these tests{', held at nominal' if nominal else ''}: {text}"
 
 
 def weak_sentence(weak: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return a direction that tests determine least, with its u."""
+    """Return a sentence on a direction that the tests determine least, with its u."""
     return f"least visible, to {weak.uncertainty:.1f} {weak.unit}: {weak.text}"
 
 
 def visibility_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
-    """Yield what the tests of a calibration determine, and what they do not."""
+    """Yield sentences on what the tests of a calibration determine, and what they do not."""
     yield f"{found.parameters_identified} parameters identified"
     yield from (unseen_sentence(text, nominal=not found.parameters_prescribed) for text in found.directions_lost)
     if found.directions_lost and not found.parameters_prescribed:
@@ -68,7 +68,7 @@ def fit_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or o
 
 
 def residual_lines(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
-    """Yield what nominal machine and model leave, beside the noise."""
+    """Yield the residuals of nominal machine and model, with the noise for comparison."""
     yield f"nominal machine leaves   {found.nominal_rms_um:8.2f} µm rms"
     yield f"model leaves             {found.residual_rms_um:8.2f} µm rms"
     yield f"... within each mounting {found.residual_within_mounting_rms_um:8.2f} µm rms"
@@ -76,7 +76,7 @@ def residual_lines(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or 
 
 
 def use_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return whether to use the model of a calibration, by its own figures."""
+    """Return whether the model of a calibration can be used, judged by its own figures."""
     check = found.plan_check
     if found.misfit.missing_physics:
         return (
@@ -98,7 +98,7 @@ def use_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
 
 
 def evaluated_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return whether to use an evaluated model, by what it leaves of recordings that it was not made of."""
+    """Return whether an evaluated model can be used, judged by its residual in recordings that did not enter its fit."""
     left, nominal = f"{found.residual_rms_um:.2f} µm rms", f"the nominal machine {found.nominal_rms_um:.2f}"
     if not found.held_out:
         return f"Use this model: cannot tell. It was made of these circles, of which it leaves {left}; evaluate another session"
@@ -118,7 +118,7 @@ def mismatch_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
 
 
 def ending_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
-    """Yield what of a diagnosis ended at a limit, whether a second search agrees, and what to measure next."""
+    """Yield sentences on limits that ended a diagnosis, on the agreement of a second search, and on the next measurement."""
     yield from (limit.text for limit in found.limits)
     if found.second_start_agrees is False:
         yield "A second search came to another set of causes: several explain these recordings, take it with care."

@@ -1,1 +1,1 @@
-"""Users' simulators: read, run in processes, written as code."""
+"""Users' simulators: reading, running in processes, writing found terms as code."""

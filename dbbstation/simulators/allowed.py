@@ -1,4 +1,4 @@
-"""Simulators that the user has allowed to run, by the hash of their files."""
+"""Check that the user has allowed a simulator, by the hash of its files."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _LOG = logging.getLogger(__name__)
 
 
 GROUP = "dbbstation.simulators"
-"""Entry points of this group name packages; every `.yaml` file in the folder of one is a simulator."""
+"""Entry points of this group name packages; every `.yaml` file in such a package's folder is a simulator."""
 
 
 def simulator_file(name_or_file: str) -> Path:
-    """Return the file of a simulator that is installed, or the `.yaml` file itself.
+    """Return the file of an installed simulator, or the named `.yaml` file.
 
     Raises:
         StationError: nothing has this name.
@@ -77,13 +77,13 @@ def require_allowed(path: Path, settings: Collection[str], *, allow: bool) -> st
 
 
 def key_of_simulator(path: Path, file: SimulatorFile) -> str:
-    """Return the SHA-256 of all files by which a simulator is known."""
+    """Return the SHA-256 of all files that define a simulator."""
     named = digests_of([path, *files_of_simulator(path, file)], path.parent)
     return hashlib.sha256(json.dumps(sorted(named)).encode()).hexdigest()
 
 
 def files_of_simulator(path: Path, file: SimulatorFile) -> list[Path]:
-    """Return the files that `model.yaml` names, and those beside them with the same ending; of Python, packages too."""
+    """Return the files that `model.yaml` names, and files beside them with the same ending; for Python also packages."""
     words = file.program and whole_command(file.program, path.parent)
     named = [Path(word) for word in words or () if Path(word).is_file()]
     named += [path.parent / one for one in (file.python, file.fmu) if one]

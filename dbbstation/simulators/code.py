@@ -67,7 +67,7 @@ def missing_code(answer: SimulatorComparison) -> str:
 
 
 def _told(text: str) -> str:
-    """Return a text safe for a docstring, because a model's name must not become code."""
+    """Return a text that is safe in a docstring, because a model's name must not become code."""
     return " ".join(text.split()).replace("\\", "/").replace('"', "'")
 
 
@@ -105,7 +105,7 @@ def _function(term: Term, verdict: str, values: Sequence[str]) -> list[str]:
 
 
 OWN = "own"
-"""What the code calls physics of the user's own."""
+"""Name of the user's own physics in the code."""
 
 
 def _own_numbers(term: Term) -> dict[str, float]:
@@ -124,7 +124,7 @@ def _curve(term: Term) -> list[str]:
 
 
 POINTS = 41
-"""Places at which a curve is written out."""
+"""Number of points at which a curve is written."""
 
 
 def _body(term: Term, a: str, shape: str) -> str:

@@ -1,4 +1,4 @@
-"""Simulators that take port inputs and return port signals."""
+"""Run simulators that read port inputs and return port signals."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.ports import Ports
 
 MOST_EXCHANGES = 100
-"""Rounds until what acts and what comes back agree, at the most."""
+"""Greatest number of iterations until port inputs and signals agree."""
 
 SETTLED = 1e-9
-"""Largest change of what acts at a port in a round, over its largest value, from which on it has settled: far below the hundredth of the
-residual that a dose is answered by."""
+"""Largest relative change of a port input in one iteration after which it has converged. It is far below the response
+to a test input, a hundredth of the residual."""
 
 RUNS_AWAY = 1e12
-"""Factor by which what acts may grow over what it was at first: beyond, the rounds run away."""
+"""Factor of growth of a port input over its first value beyond which the iteration diverges."""
 
 
 class ExchangedSimulator(Simulator):
-    """A simulator whose inputs are the terms at its ports."""
+    """A simulator with the terms as inputs at its ports."""
 
     def __init__(self, ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...]) -> None:
         self._ports, self._outputs = dict(ports), outputs

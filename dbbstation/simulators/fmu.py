@@ -1,4 +1,4 @@
-"""A simulator as FMU (FMI 2 or 3), run by the optional FMPy.
+"""Run a simulator as FMU (FMI 2 or 3), by the optional FMPy.
 
 Ports are FMU inputs of the port's name; signals are its variables.
 """
@@ -23,13 +23,14 @@ if TYPE_CHECKING:
 
 
 MOST_UNPACKED_MB, MOST_DESCRIBED_MB, MOST_FILES = 2000.0, 50.0, 20_000
-"""Bounds of what an FMU unpacks to: all of it, its description, and how many files. A vehicle model has some 100 MB."""
+"""Bounds of an unpacked FMU: its size, the size of its description, and the number of files. A vehicle model has some
+100 MB."""
 
 _DESCRIPTION = "modelDescription.xml"
 
 
 def fault_of_fmu(path: Path) -> str:
-    """Return why a file is not a valid FMU; empty if it is. Nothing is unpacked."""
+    """Return why a file is not a valid FMU; empty if it is valid. Nothing is unpacked."""
     try:
         with opened(path) as _, zipfile.ZipFile(path) as archive:
             sizes = {one.filename: one.file_size / 1e6 for one in archive.infolist()}

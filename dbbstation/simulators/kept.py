@@ -1,4 +1,4 @@
-"""Earlier simulations kept by content in the user's cache folder."""
+"""Keep simulations in the user's cache folder, by the content of their inputs."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 MOST_BYTES = 1_000_000_000
-"""Size of all that is kept at the most; what was used longest ago is forgotten first."""
+"""Greatest size of the cache [bytes]; simulations whose last use is longest ago are deleted first."""
 
 _PATIENCE_S = 5.0
-"""How long another process may write [s]."""
+"""Longest wait for another process that writes [s]."""
 
 
 class KeptSimulations:
-    """Kept simulations of one simulator and its recordings. A context.
+    """The stored simulations of one simulator and its recordings; a context manager.
 
     Attributes:
         problem: why nothing can be kept; may be empty.
@@ -43,7 +43,7 @@ class KeptSimulations:
             self._open()
 
     def close(self) -> None:
-        """Close the file; everything is written already."""
+        """Close the file; all simulations are already written."""
         if self._base is not None:
             self._base.close()
             self._base = None
@@ -106,7 +106,7 @@ class KeptSimulations:
 
 
 def simulations_folder() -> Path:
-    """Return where simulations are kept."""
+    """Return the folder of stored simulations."""
     import platformdirs  # noqa: PLC0415 - only who simulates looks for it
 
     return Path(platformdirs.user_cache_path("dbbstation", appauthor=False)) / "simulations"

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dbbstation.simulators.exchanged import ExchangedSimulator
 
 FEWEST_ROWS = 30
-"""Rows that all recordings need together at the least, as for tables."""
+"""Least number of rows of all recordings together, as for tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +157,7 @@ def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
 
 
 def know(files: Sequence[Path]) -> None:
-    """Run own physics once in this process, so that its terms can be unpickled."""
+    """Run the user's own physics once in this process, so that its terms can be unpickled."""
     for path in files:
         if module_name(path) not in sys.modules:
             classes_in_files([path], PortSource, CONTRACT, [])  # type: ignore[type-abstract]  # faults were told where it was loaded

@@ -1,4 +1,4 @@
-"""A simulator as program: it reads `inputs.csv` and `parameters.json` and writes `outputs.csv`."""
+"""Run a simulator as a program, which reads `inputs.csv` and `parameters.json` and writes `outputs.csv`."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 INPUTS, PARAMETERS, OUTPUTS = "inputs.csv", "parameters.json", "outputs.csv"
-"""Files in the folder in which the program is run."""
+"""Files in the program's working folder."""
 
 MOST_MEMORY_MB = 4000.0
-"""Memory of a program and all that it starts [MB]: what a laptop of 8 GB leaves beside this program."""
+"""Memory of a program and its child processes [MB]: the free memory of a laptop of 8 GB beside this program."""
 
 MOST_OUTPUT_MB = 500.0
 """Files and printed text of one run [MB]: a million rows of twenty columns."""
 
 LINES_TOLD = 3
-"""Last lines of what a program says on standard error that are reported where it fails."""
+"""Number of last lines on standard error that are reported if the program fails."""
 
 
 class ProgramSimulator(ExchangedSimulator):
-    """A program run once per simulation in an empty folder.
+    """A program that runs once per simulation, in an empty folder.
 
     Args:
         command: with whole paths of files beside the model file.
@@ -107,5 +107,5 @@ def _read(path: Path) -> dict[str, Floats]:
 
 
 def whole_command(words: tuple[str, ...], folder: Path) -> tuple[str, ...]:
-    """Return a command with whole paths of files beside the model file."""
+    """Return a command with full paths for files beside the model file."""
     return tuple(str((folder / word).absolute()) if (folder / word).is_file() else word for word in words)

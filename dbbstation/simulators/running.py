@@ -1,4 +1,4 @@
-"""Simulations in processes on all cores, each once, limited in time and number."""
+"""Run each simulation once, in processes on all cores, with limits of time and number."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
     from dbbstation.simulators.loading import LoadedSimulator
 
 MOST_SECONDS = 600.0
-"""Time that simulations may take in all, where no number of them is given: a coffee."""
+"""Total time of the simulations if their number is not limited [s]."""
 
 SHORTEST_S = 1e-4
-"""Time of a simulation at the least, for what fits into that: handing one to another process takes about as much."""
+"""Least assumed time of a simulation [s], about the time to pass it to another process."""
 
 TOGETHER = 8
-"""Simulations that are handed to a process at once, where there are many: handing over takes a millisecond."""
+"""Number of simulations that are passed to a process at once, because passing takes a millisecond."""
 
 
 class Runs:
-    """Simulations of one simulator; a context.
+    """Simulations of one simulator; a context manager.
 
     Args:
         count: of processes; None: one per core; 0: this one, without time limit.
@@ -80,7 +80,7 @@ class Runs:
         self._stack.__exit__(kind, error, trace)
 
     def __call__(self, asks: Sequence[SimulationRequest]) -> list[SimulationOutcome]:
-        """Return all answers, known ones reused.
+        """Return all answers; stored ones are reused.
 
         Raises:
             BudgetSpentError: more simulations than allowed.
@@ -117,13 +117,13 @@ class Runs:
 
     @property
     def left_s(self) -> float | None:
-        """Return the remaining time, about [s]; None without limit."""
+        """Return the approximate remaining time [s]; None without limit."""
         if self.most is None or not self.ran:
             return None
         return (self.most - self.ran) * self.seconds / self.ran
 
     def allow(self, first: Sequence[SimulationRequest]) -> float:
-        """Run a first simulation, set the allowed number if unset, and return its time [s]."""
+        """Run a first simulation and return its time [s]; set the allowed number if it is unset."""
         self(first)
         again = list(dict.fromkeys(first))
         if not self.ran:
@@ -175,7 +175,7 @@ class Runs:
 
 
 STARTING_S = 20.0
-"""Time that a process may take until it simulates."""
+"""Longest time until a process begins to simulate [s]."""
 
 
 def _several(

@@ -1,9 +1,9 @@
-"""Find machines unlike their sisters, at a stated rate of false alarms.
+"""Find machines that differ from like machines, at a stated rate of false alarms.
 
-Like machines scatter normally about a middle, plus own standard uncertainties. Weights and scatter follow [Paule and
-Mandel 1982, J. Res. NBS 87, 377; DerSimonian and Kacker 2007, Contemp. Clin. Trials 28, 105]. The farthest machine is
-removed repeatedly, up to a quarter, each tested against the rest; the last significant one gives the number [Rosner
-1983, Technometrics 25, 165]. For one machine this is the test of Grubbs.
+The values of like machines scatter normally about a mean, with added standard uncertainties. Weights and scatter follow
+[Paule and Mandel 1982, J. Res. NBS 87, 377; DerSimonian and Kacker 2007, Contemp. Clin. Trials 28, 105]. The most
+distant machine is removed repeatedly, up to a quarter, and tested against the remaining ones. The last significant test
+gives the number of unlike machines [Rosner 1983, Technometrics 25, 165]. For one machine this is the test of Grubbs.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ FALSE_ALARMS = 0.01
 """Probability that a fleet of like machines shows any unlike value."""
 
 FEWEST = 3
-"""Machines from which on one of them can be unlike: the others have a scatter."""
+"""Least number of machines for a comparison: the others then have a scatter."""
 
 MOST_UNLIKE = 4
-"""One machine in so many may be unlike: where more are, they are a kind of their own."""
+"""At most one machine in this number may be unlike; more unlike machines are a separate kind."""
 
 _STEPS = 100
-"""Newton's steps for the scatter; it comes from one side and takes a dozen."""
+"""Greatest number of Newton steps for the scatter; it converges from one side in about twelve."""
 
 _SETTLED = 1e-12
-"""Share of the variance below which a step changes nothing."""
+"""Relative change of the variance below which the iteration has converged."""
 
 _SMALLEST = 1e-300
-"""Probabilities below it are taken for it: the score that belongs to it is 37, far beyond every limit."""
+"""Smallest probability: smaller ones are replaced by it. Its score is 37, far beyond every limit."""
 
 _ROUNDED = 1e-12
-"""Share of a value below which two values differ by rounding only."""
+"""Relative difference of values that is only rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sisters:
-    """Machines against sisters, shape (q, n), NaN if unknown.
+    """Comparison of machines with like machines, shape (q, n), NaN if unknown.
 
     Attributes:
         score: standard normal for a like machine, by the like ones.
@@ -57,7 +57,7 @@ class Sisters:
 
 
 def held_against_sisters(values: Floats, u: Floats, false_alarms: float = FALSE_ALARMS) -> Sisters:
-    """Compare machines with their sisters: values and standard uncertainties, shape (q, n), NaN if unknown."""
+    """Compare machines with like machines, from values and standard uncertainties, shape (q, n), NaN if unknown."""
     unlike = unlike_machines(values, u, false_alarms)
     return _scored(values, u, unlike, _share(values, false_alarms))
 
@@ -91,7 +91,7 @@ def unlike_machines(values: Floats, u: Floats, false_alarms: float = FALSE_ALARM
 
 
 def _share(values: Floats, false_alarms: float) -> float:
-    """Return one quantity's false alarms [Bonferroni]."""
+    """Return the probability of a false alarm for one quantity [Bonferroni]."""
     compared = int((np.isfinite(values).sum(axis=1) >= FEWEST).sum())
     return false_alarms / max(compared, 1)
 
@@ -127,7 +127,7 @@ def _middle(values: Floats, variance: Floats, taken: Flags) -> tuple[Floats, Flo
 
 @dataclass(frozen=True, eq=False)
 class _Departure:
-    """One machine of each quantity against others, shape (q,)."""
+    """Difference of one machine from the others for each quantity, shape (q,)."""
 
     off: Floats
     spread: Floats
@@ -137,16 +137,16 @@ class _Departure:
 
     @property
     def beyond(self) -> Floats:
-        """Return the probability beyond, by Student's t; nan gives a half."""
+        """Return the probability of a larger difference by Student's t; NaN gives one half."""
         probability = stdtr(self.freedom, -np.abs(self.off) / self.spread)
         return np.asarray(np.where(np.isfinite(probability), probability, 0.5))
 
 
 def _departure(values: Floats, variance: Floats, others: Flags, machine: Integers) -> _Departure:
-    """Return one machine of each quantity against the others.
+    """Return the difference of one machine from the others for each quantity.
 
-    Scatter of unequal uncertainties has Satterthwaite's freedom by its Fisher information [Viechtbauer 2005, J. Educ.
-    Behav. Stat. 30, 261].
+    For unequal uncertainties, the scatter has Satterthwaite's degrees of freedom from its Fisher information
+    [Viechtbauer 2005, J. Educ. Behav. Stat. 30, 261].
     """
     rows = np.arange(len(values))
     middle, square = _middle(values, variance, others)

@@ -1,4 +1,4 @@
-"""Child processes: separate from their working folder, bounded, and ended with all their children."""
+"""Start child processes: separate from their working folder, bounded, and ended with all their children."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 _SESSION = hasattr(os, "setsid")
 _FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
-"""A group of its own, so that Ctrl-C at the terminal reaches only those who end the group."""
+"""Flags for a separate process group, so that Ctrl-C at the terminal reaches only the parent, which ends the group."""
 
 _LOOK_S = 0.2
-"""How often bounds are looked at [s]; a short run ends before the first look."""
+"""Interval of the checks of bounds [s]; a short run ends before the first check."""
 
 _TAIL_BYTES = 1 << 16
-"""Bytes of an output that are kept: its end says why a program failed."""
+"""Number of kept bytes of an output; its end states why a program failed."""
 
 _BLOCK_BYTES = 1 << 16
 
@@ -57,7 +57,7 @@ class ProgramEnd:
 
 
 class BoundExceededError(Exception):
-    """A program has used more than it may, and was ended."""
+    """A program exceeded a bound and was ended."""
 
     def __init__(self, what: str, *, of_time: bool = False) -> None:
         super().__init__(what)
@@ -115,7 +115,7 @@ def _watch(process: subprocess.Popen[bytes], folder: Path, bounds: ProgramBounds
 
 
 class _Output:
-    """Reads a program's output, so that it never waits, and keeps the end."""
+    """Reads a program's output, so that the program never waits, and keeps the end."""
 
     def __init__(self, stream: IO[bytes], most_mb: float) -> None:
         self.tail = b""
@@ -133,19 +133,19 @@ class _Output:
                     self.full.set()
 
     def close(self) -> None:
-        """Read the rest, but not if a process outside the group still holds the pipe."""
+        """Read the remaining output, unless a process outside the group still holds the pipe."""
         self._reader.join(_PATIENCE_S)
         if not self._reader.is_alive():
             self._stream.close()
 
 
 def is_root() -> bool:
-    """Return whether this user may do everything; False on Windows."""
+    """Return whether this user is root; False on Windows."""
     return hasattr(os, "geteuid") and os.geteuid() == 0
 
 
 def end_tree(process: subprocess.Popen[Any]) -> None:
-    """End a child process and all its children; does nothing if they have ended."""
+    """End a child process and all its children, if they still run."""
     # The number of a process that has ended may belong to somebody else's by now.
     tree = list(_tree(process.pid)) if process.poll() is None else []
     if hasattr(os, "killpg"):
@@ -162,7 +162,7 @@ def end_tree(process: subprocess.Popen[Any]) -> None:
 
 
 def _tree(pid: int) -> Iterator[psutil.Process]:
-    """Yield a process and all its children; none if it has ended."""
+    """Yield a running process and all its children."""
     with suppress(psutil.Error):
         root = psutil.Process(pid)
         yield from (*root.children(recursive=True), root)

@@ -1,4 +1,4 @@
-"""Files read and changed in place, through a file descriptor."""
+"""Read and change files in place, through a file descriptor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CHANGING = os.O_RDWR | _flags("O_NOFOLLOW")
 
 
 def open_to_read(path: Path) -> int:
-    """Return the number of a file that is open for reading.
+    """Open a file for reading and return its descriptor.
 
     Raises:
         OSError: the system refuses it.
@@ -39,7 +39,7 @@ def open_private(path: str, flags: int) -> int:
 
 
 def open_to_change(path: Path, *, create: bool = False, private: bool = False) -> int:
-    """Return the number of a file that is open for reading and writing; a link is refused.
+    """Open a file for reading and writing and return its descriptor; a link is refused.
 
     Args:
         private: only its owner may read a file that is made.
@@ -75,5 +75,5 @@ def write_at(handle: int, data: bytes, at: int) -> None:
 
 
 def open_nothing() -> int:
-    """Return a descriptor of the null device, open for both; it takes the lowest free number."""
+    """Return a descriptor of the null device, open for reading and writing; it has the lowest free number."""
     return os.open(os.devnull, os.O_RDWR)

@@ -1,4 +1,4 @@
-"""A terminal that vanishes: a closed window, a broken connection, a killed server."""
+"""Handle a terminal that vanishes: a closed window, a broken connection, a killed server."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _LOOK_MS = 500
 _PATIENCE_S = 10.0
-"""The screen has so long to end by itself; it may hang in writing to a terminal that is gone [s]."""
+"""Time for the screen to end by itself [s]; it may hang while it writes to a terminal that is gone."""
 
 _FAILED = 1
 """Exit code."""
@@ -25,7 +25,7 @@ _FAILED = 1
 
 @contextmanager
 def ended_when_hung_up(last: Callable[[], None]) -> Iterator[None]:
-    """Watch the terminal, and leave the program when it has gone; does nothing without a terminal, or on Windows.
+    """Watch the terminal and end the program when it is gone. Without a terminal, or on Windows, do nothing.
 
     The screen's own output stops at the first failing write and then blocks, and the kernel's signal may go to a shell
     that keeps it. Windows ends the programs of a closing console.

@@ -1,11 +1,11 @@
-"""Marks of damaged characters by a serial driver, on systems with termios."""
+"""Let a serial driver mark damaged characters, on systems with termios."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 
 LINE_ERRORS: tuple[type[Exception], ...] = ()
-"""What a port can raise beside OSError."""
+"""Errors that a port can raise in addition to OSError."""
 
 try:
     import termios

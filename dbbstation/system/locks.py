@@ -13,7 +13,8 @@ else:
     HAS_FLOCK = True
 
 _BEYOND = 1 << 30
-"""Byte that Windows locks. Other processes cannot read a locked byte, so it lies behind everything that the file holds."""
+"""Offset of the byte that Windows locks. Other processes cannot read a locked byte, so it is beyond the file's
+content."""
 
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
 

@@ -1,4 +1,4 @@
-"""Programs that have a port open, if the system tells."""
+"""Find programs that have a port open, if the system lists them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ _PROC = Path("/proc")
 
 
 def holders(port: str, proc: Path = _PROC) -> list[str]:
-    """Return name and number of every other process that has a port open, as `minicom (process 4711)`.
+    """Return name and number of every other process with this port open, such as `minicom (process 4711)`.
 
-    Linux tells of processes of the same user, and to root of all; elsewhere the list is empty.
+    Linux lists processes of the same user, and all processes for root. On other systems the list is empty.
     """
     target = os.path.realpath(port)
     others = [one for one in _entries(proc) if one.name.isdecimal() and int(one.name) != os.getpid()]

@@ -43,7 +43,7 @@ class PtyEnd:
         return bool(select.select([self._master], [], [], real_s)[0])
 
     def read(self) -> bytes:
-        """Return the bytes that have come."""
+        """Return the bytes that have arrived."""
         try:
             return os.read(self._master, 4096)
         except BlockingIOError:

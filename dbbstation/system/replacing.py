@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PATIENCE_S = 2.0
-"""A virus scanner or an indexer holds a new file about so long [s]."""
+"""Time for which a virus scanner or an indexer may hold a new file [s]."""
 
 _PAUSE_S = 0.02
 
@@ -23,9 +23,9 @@ _HELD = {5, 32, 33}
 
 
 def replace(path: Path, target: Path) -> None:
-    """Give a file the name of another one, which it replaces.
+    """Rename a file to the name of another file, which it replaces.
 
-    Windows replaces no read-only file, and none that a program has open.
+    Windows refuses to replace a read-only file, or a file that a program has open.
 
     Raises:
         OSError: the system refuses; both files are as before.
@@ -43,7 +43,7 @@ def replace(path: Path, target: Path) -> None:
 
 
 def rename(path: Path, target: Path) -> None:
-    """Give a file or a folder a name that is free.
+    """Rename a file or folder to an unused name.
 
     Raises:
         OSError: the system refuses.
@@ -79,7 +79,7 @@ def remove_tree(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make renames in a folder outlast a power cut. Windows opens no folders and writes its own journal of names."""
+    """Make renames in a folder survive a power cut. On Windows this does nothing: it cannot open folders, and its file system keeps a journal of names."""
     with contextlib.suppress(PermissionError, NotADirectoryError):
         handle = os.open(folder, os.O_RDONLY)
         try:

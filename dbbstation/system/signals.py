@@ -18,12 +18,13 @@ CTRL_C = signal.SIGINT
 KILLED_POLITELY = signal.SIGTERM
 
 CLOSED = tuple(getattr(signal, name) for name in ("SIGHUP", "SIGBREAK") if hasattr(signal, name))
-"""A terminal or a console window that is closed. Windows sends SIGBREAK then (Microsoft, "HandlerRoutine", CTRL_CLOSE_EVENT)."""
+"""Signal of a closed terminal or console window. Windows sends SIGBREAK (Microsoft, "HandlerRoutine",
+CTRL_CLOSE_EVENT)."""
 
 
 @contextmanager
 def answered(numbers: Sequence[signal.Signals], answer: Callable[[signal.Signals], object]) -> Iterator[None]:
-    """Answer signals with a function while the context lasts."""
+    """Call a function on signals while the context lasts."""
     before = {number: signal.signal(number, lambda got, _frame: answer(signal.Signals(got))) for number in numbers}
     try:
         yield
@@ -40,7 +41,7 @@ def interrupt_on(*numbers: signal.Signals) -> None:
 
 @contextmanager
 def politely_ended() -> Iterator[None]:
-    """Turn a polite kill and a closed terminal into KeyboardInterrupt, so that half-written files go, processes end, and the log is written.
+    """Turn a polite kill and a closed terminal into KeyboardInterrupt, so that partial files are removed, processes end, and the log is written.
 
     Signals ignored by `nohup` stay ignored.
     """
@@ -60,8 +61,8 @@ def politely_ended() -> Iterator[None]:
 def starting() -> Iterator[None]:
     """Make child processes ignore Ctrl-C for life, and load no module of the working folder.
 
-    Only this process answers Ctrl-C. A received folder may contain a `random.py`; PYTHONSAFEPATH keeps it out of the
-    first imports of a process (Python, "Command line and environment").
+    Only this process handles Ctrl-C. A folder from elsewhere may contain a `random.py`; PYTHONSAFEPATH keeps it out of
+    the first imports of a process (Python, "Command line and environment").
     """
     safe = os.environ.setdefault(_SAFE, _OURS) == _OURS
     ignored = threading.current_thread() is threading.main_thread()

@@ -1,1 +1,1 @@
-"""Texts of causes, digits of numbers, sorting, and safe output to a terminal."""
+"""Texts of causes, decimals of numbers, sorting, and safe output to a terminal."""

@@ -19,7 +19,7 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
 
 
 class Repeated(Protocol):
-    """One of the runs of a test and direction."""
+    """A run with its test, direction and repeat."""
 
     @property
     def test(self) -> str:
@@ -41,7 +41,7 @@ Run = TypeVar("Run", bound=Repeated)
 
 
 def repeats_in_order(runs: Iterable[Run]) -> tuple[Run, ...]:
-    """Return runs in their order, but repeats of a test and direction as counted."""
+    """Return runs in their order, with the repeats of a test and direction in numerical order."""
     given = tuple(runs)
     alike: dict[tuple[str, str], list[Run]] = defaultdict(list)
     for run in given:

@@ -8,7 +8,7 @@ MOST_DECIMALS = 3
 """Decimals of the finest figures, in µm: a nanometre."""
 
 SIGNIFICANT = 2
-"""Digits of an uncertainty that count."""
+"""Number of significant digits of an uncertainty."""
 
 
 def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | None:
@@ -17,7 +17,7 @@ def expanded_uncertainty(u: float | None, coverage_factor: float) -> float | Non
 
 
 LONGEST = 6
-"""Decimals or rounded zeros beyond which a number has an exponent."""
+"""Number of decimals or rounded zeros above which a number has an exponent."""
 
 
 def decimals_of(expanded: float) -> int:
@@ -26,13 +26,13 @@ def decimals_of(expanded: float) -> int:
 
 
 def _place(uncertainty: float) -> int:
-    """Return the decimal place of the last digit of an uncertainty that counts."""
+    """Return the decimal place of an uncertainty's last significant digit."""
     shown = float(f"{uncertainty:.{SIGNIFICANT - 1}e}")  # 0.0996 is written as 0.10
     return SIGNIFICANT - 1 - math.floor(math.log10(shown))
 
 
 def to_its_place(value: float, uncertainty: float) -> tuple[str, str]:
-    """Return a value and its uncertainty: two significant digits of this, the value to the same place [GUM 7.2.6]."""
+    """Return a value and its uncertainty, rounded to two significant digits of the uncertainty [GUM 7.2.6]."""
     if not (0.0 < uncertainty < math.inf and math.isfinite(value)):
         return f"{value:.4g}", f"{uncertainty:.2g}"
     place = _place(uncertainty)
@@ -44,7 +44,7 @@ def to_its_place(value: float, uncertainty: float) -> tuple[str, str]:
 
 
 def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tuple[str, str]:
-    """Return a value and its expanded uncertainty as printed, to the same decimals."""
+    """Return a value and its expanded uncertainty as text with the same decimals."""
     if expanded is None:
         return f"{value:z.{plain}f}", "-"
     decimals = decimals_of(expanded)

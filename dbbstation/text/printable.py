@@ -1,4 +1,4 @@
-r"""Text typed by others, made safe for a terminal: control characters are shown, not executed."""
+r"""Make foreign text safe for a terminal: control characters are shown, not executed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _DIRECTION = [0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x2
 """Marks and overrides of the direction of writing [Unicode TR9]."""
 
 _LINES = [0x2028, 0x2029]
-"""Ends of lines and paragraphs."""
+"""Characters that end lines and paragraphs."""
 
 _HALVES = range(0xD800, 0xE000)
 """Halves of surrogate pairs: no encoding can write them."""
@@ -23,11 +23,11 @@ def _shown(code: int) -> str:
 
 _ONE_LINE = {code: _shown(code) for code in (*_CONTROL, *_DIRECTION, *_LINES, *_HALVES)}
 TEXT = {code: shown for code, shown in _ONE_LINE.items() if chr(code) not in "\n\t"}
-"""What stands for each character that a text of several lines must not hold, as `str.translate` takes it."""
+"""Replacements of the characters that a text of several lines must not contain, for `str.translate`."""
 
 
 _MANY = re.compile(rf"([{re.escape(''.join(map(chr, [*_CONTROL, *_DIRECTION, *_LINES, *_HALVES])))}])\1{{8,}}")
-"""Nine and more of one character that is shown: a line of a file that a disk has filled up with zeros."""
+"""Pattern of nine or more equal escapes, as in a file that a disk has filled with zeros."""
 
 
 def _counted(many: re.Match[str]) -> str:

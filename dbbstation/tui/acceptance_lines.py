@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.service.former_sessions import Former, InForce
 
 _WIDE = 12
-"""Letters of a test's name that its column takes."""
+"""Width of the column of test names."""
 
 _ROW = f"{{test:{_WIDE}}}  " + "{figure:18} {before:>6} {now:>6} {limit:>6} {expanded:>5}  "
 
@@ -25,11 +25,11 @@ HEADING = _ROW.format(**texts.ACCEPTANCE_HEADING) + texts.ACCEPTANCE_HEADING["ve
 
 _STYLES = {"within": "$text-success", "exceeded": "$text-error", "cannot tell": "$text-warning"}
 _DIGEST = 8
-"""Digits of a SHA-256 that are shown: people compare them, nothing is looked up by them."""
+"""Number of shown digits of a SHA-256, which people only compare."""
 
 
 def test_line(one: ToleranceOfTest) -> Content:
-    """Return the row of a test and figure: worst circle before and now, limit, U, word."""
+    """Return the row of a test and figure: worst circle before and now, limit, U, and verdict."""
     row = _ROW.format(
         test=_short(one.test),
         figure=texts.FIGURE_NAMES[one.quantity],
@@ -59,7 +59,7 @@ def worst_lines(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as obj
 
 
 def in_force_line(in_force: InForce) -> str:
-    """Return what commanded the circles of a session, in words."""
+    """Return the programs that commanded the circles of a session, in words."""
     if in_force.compensated == 0:
         return texts.RUN_BY_NOMINAL if in_force.programs else texts.RUN_BY_PLAIN
     if in_force.compensated < in_force.circles:
@@ -68,7 +68,7 @@ def in_force_line(in_force: InForce) -> str:
 
 
 def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
-    """Yield where the former models are."""
+    """Yield lines on the files of the former models."""
     in_force = former.in_force
     if in_force.compensated == 0:
         yield texts.WAY_BACK_NOMINAL.format(folder=former.folder)

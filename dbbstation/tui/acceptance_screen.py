@@ -1,4 +1,4 @@
-"""Acceptance: circles before and now against the shop's tolerances, and the way back."""
+"""Acceptance: compare circles before and now with the shop's tolerances, and name the former models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The station's app: takes events, draws the top screen, passes keys on."""
+"""The station's app: it processes events, draws the top screen, and passes keys on."""
 
 from __future__ import annotations
 
@@ -60,19 +60,19 @@ if TYPE_CHECKING:
 __all__ = ["DARK", "LIGHT", "LOOK_S", "Sequence", "Shown", "StationApp"]
 
 LOOK_S = 0.1
-"""Between looks into the mailbox [s]: ten pictures per second are fluent, more is work that nobody sees."""
+"""Interval of the polls of the mailbox [s]: ten pictures per second look fluent."""
 
 _TALL_ROWS = 32
-"""From so many rows on there is room for more than the necessary."""
+"""Least number of rows for optional parts of a screen."""
 
 DARK, LIGHT = "textual-dark", "textual-light"
 
 _NOT_OPERATED = {"large": "f", "results": "e", "temperature": "t", "command_palette": "ctrl+p"}
-"""What an operator of a job cannot reach, and by which key others do."""
+"""Actions that are closed to an operator of a job, and their keys."""
 
 
 class Sequence(Protocol):
-    """What runs the sequence; `Runner` does."""
+    """Interface that runs the sequence, such as `Runner`."""
 
     @property
     def alive(self) -> bool:
@@ -257,7 +257,7 @@ class StationApp(App[None]):
         self._works.append((Background(work), then, failed))
 
     def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
-        """Open a job in the background and show its screen; one at a time."""
+        """Open a job in the background and show its screen. Only one job can be open."""
         front = self._front
         if front is None or self._opening:
             return
@@ -323,7 +323,7 @@ class StationApp(App[None]):
             drawn.draw()
 
     def send(self, command: Command) -> None:
-        """Send a command to the sequence; a verdict also after the plan."""
+        """Send a command to the sequence. Verdicts are also possible after its end."""
         if isinstance(command, Judge) and self.board.state is State.FINISHED:
             self._judge_afterwards(command)
         elif self._runner is not None:
@@ -447,7 +447,7 @@ class StationApp(App[None]):
             self.leave(sure=True)
 
     def _ask_temperature(self, then: Callable[[], None], back: Callable[[], None] = lambda: None) -> None:
-        """Ask for the shop's temperature, note it, then go on; one question at a time."""
+        """Ask for the shop's temperature, note it, then continue; only one question is open at a time."""
         if isinstance(self.screen, TemperatureQuestion):
             return
 
@@ -463,7 +463,7 @@ class StationApp(App[None]):
         self.push_screen(TemperatureQuestion(), answered)
 
     def _note(self, text: str, degc: float | None, then: Callable[[], None]) -> None:
-        """Note a text or a temperature [degC] by the sequence, or in the file after its end."""
+        """Note a text or a temperature [degC] through the sequence, or in the file after the sequence's end."""
         runner, folder = self._runner, Path(self.board.session)
         if runner is None or AddNote in self.board.allowed:
             self.send(AddNote(text, degc))

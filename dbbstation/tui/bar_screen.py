@@ -1,4 +1,4 @@
-"""The bar on its calibrator: live reading, statements and calibration."""
+"""The bar on its calibrator: live reading, stated facts and calibration."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _NAME = 30
 
 
 class BarScreen(RowScreen):
-    """Owns the instrument until it is left."""
+    """Screen that uses the instrument until it is closed."""
 
     help_name = "bar"
 

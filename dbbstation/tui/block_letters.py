@@ -1,4 +1,4 @@
-"""Large letters from blocks, three to five by five points."""
+"""Large letters of blocks, three to five by five points."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ HIGH = 5
 """Points of a letter from top to bottom."""
 
 _FLATTEST = 3
-"""Columns of a point for each of its rows, at the most; a terminal's cell is about twice as high as wide."""
+"""Greatest ratio of a point's columns to its rows; a terminal's cell is about twice as high as wide."""
 
 _FONT = {
     "0": "### #.# #.# #.# ###",
@@ -59,14 +59,14 @@ _FONT = {
 
 
 def largest(texts: Sequence[str], width: int, height: int) -> tuple[int, int]:
-    """Return the size of a point [columns, rows] with which all texts fit."""
+    """Return the largest size of a point [columns, rows] with which all texts fit."""
     points = max(len(_points(text)[0]) for text in texts)
     wide, high = max(width // points, 1), max(height // HIGH, 1)
     return min(wide, _FLATTEST * high), min(high, wide)
 
 
 def block_rows(text: str, wide: int, high: int) -> list[str]:
-    """Return the rows of a text in large letters; unknown characters become question marks."""
+    """Return a text in large letters, one string per row of the screen. Unknown characters become question marks."""
     rows = []
     for points in _points(text):
         row = "".join(("█" if point == "#" else " ") * wide for point in points)

@@ -32,11 +32,11 @@ COMMANDS: dict[str, Command] = {
 }
 
 _GIVES_UP = {"repeat": "Repeat", "reject": "Reject"}
-"""Commands that end a running circle, as the question before them says."""
+"""Commands that end a running circle, after a question."""
 
 
 class Desk(Protocol):
-    """What a screen needs of `StationApp`."""
+    """Methods of `StationApp` that a screen needs."""
 
     board: Board
 
@@ -48,7 +48,7 @@ class Desk(Protocol):
 
 
 class BoardScreen(ExplainedScreen):
-    """Panels and other parts made from the board."""
+    """A screen with panels and other parts that show the board."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__()
@@ -69,7 +69,7 @@ class BoardScreen(ExplainedScreen):
 
 
 class RunScreen(BoardScreen):
-    """A screen at the machine; its keys command the present run."""
+    """A screen for use at the machine; its keys command the present run."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
@@ -121,12 +121,12 @@ class RunScreen(BoardScreen):
         return super().keys(), self._undecided, bool(self.desk.board.doubted)
 
     def action_next(self) -> None:
-        """Accept the run or repeat it, as its word says; then back to runs in doubt."""
+        """Accept or repeat the run as its verdict suggests, then return to runs in doubt."""
         back = bool(self.desk.board.doubted)
         self.desk.send(Repeat(back=back) if self._faulty else Accept(back=back))
 
     def action_undecided(self) -> None:
-        """Accept a run in which some faults would be invisible."""
+        """Accept a run in which some faults are undetectable."""
         completed = self.desk.board.completed
         if completed is not None:
             self.desk.send(Accept(f"not to be seen: {', '.join(completed.answer.unseen)}"))
@@ -135,7 +135,7 @@ class RunScreen(BoardScreen):
         self.desk.send(Accept(alone=True))
 
     def action_accept(self) -> None:
-        """Accept the run; a faulty one only for a reason."""
+        """Accept the run; a faulty run needs a reason."""
         completed = self.desk.board.completed
         if completed is None or completed.answer.word is not Advice.REPEAT:
             self.desk.send(Accept())
@@ -159,7 +159,7 @@ class RunScreen(BoardScreen):
 
 
 def ask_to_give_up(screen: BoardScreen, act: str, then: Callable[[bool | None], None]) -> None:
-    """Ask whether to give up the recording; one question at a time."""
+    """Ask whether to give up the recording; only one question is open at a time."""
     if isinstance(screen.app.screen, GiveUpQuestion):
         return
     announced = screen.desk.board.announced

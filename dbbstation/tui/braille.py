@@ -1,4 +1,4 @@
-"""Planes of dots as braille characters, two by four dots a cell.
+"""Draw planes of dots as braille characters, two by four dots a cell.
 
 A plane is a boolean array, shape (4 rows, 2 columns), y downwards. Overlaid planes share cells, which are coloured by
 plane.
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     Plane: TypeAlias = Flags
 
 CELL_WIDE, CELL_HIGH = 2, 4
-"""Dots in a cell."""
+"""Number of dots in a cell."""
 
 BLANK = 0x2800
-"""Code point of the braille character without dots; the lowest eight bits say which dots are raised."""
+"""Code point of the braille character without dots; its lowest eight bits stand for the raised dots."""
 
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
 """Bit of each dot in a cell: three rows in the order of six-dot braille, the fourth was added below [Unicode, U+2800]."""
@@ -42,7 +42,7 @@ def light(plane: Plane, x: Floats, y: Floats) -> None:
 
 
 def connect(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Return the points with more in between, so that lines have no gaps.
+    """Return the points with further points in between, so that lines have no gaps.
 
     NaN separates lines.
     """
@@ -69,7 +69,7 @@ def patterns(plane: Plane) -> NDArray[np.uint8]:
 
 
 def overlay(planes: Sequence[Plane]) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
-    """Return code points of overlaid planes, and a bit per plane with dots in each cell, the first plane's lowest; shape (rows, columns)."""
+    """Return the code points of overlaid planes, and for each cell one bit per plane with dots, the lowest for the first plane; shape (rows, columns)."""
     codes = np.zeros((planes[0].shape[0] // CELL_HIGH, planes[0].shape[1] // CELL_WIDE), dtype=np.uint32)
     members = np.zeros(codes.shape, dtype=np.uint8)
     for number, plane in enumerate(planes):

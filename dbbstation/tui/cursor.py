@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from textual.widgets import OptionList
 
 CURSOR = "▸ "
-"""Before the chosen row."""
+"""Text before the chosen row."""
 
 
 def mark_chosen(options: OptionList, rows: Sequence[Content]) -> None:
-    """Show rows with the mark before the chosen one."""
+    """Show rows with the mark before the chosen row."""
     for place, row in enumerate(rows[: options.option_count]):
         mark = CURSOR if place == options.highlighted else " " * len(CURSOR)
         options.replace_option_prompt_at_index(place, Content(mark) + row)

@@ -11,7 +11,7 @@ class ExplainedScreen(Screen[None]):
     """A screen that F1 explains."""
 
     help_name: ClassVar[str] = ""
-    """Under which the texts of help have it."""
+    """Name of its text in the help."""
 
     def look(self) -> None:
-        """Take in changes from elsewhere."""
+        """Show changes from other parts of the program."""

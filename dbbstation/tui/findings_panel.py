@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dbbstation.station.events import RunCompleted
 
 _ROW = 37
-"""Columns of a row where the panel has no size yet: as many as the right side has on the smallest terminal."""
+"""Columns of a row before the panel has a size, as on the right side of the smallest terminal."""
 
 STYLES = {
     FindingVerdict.GOOD: "$text-success",
@@ -26,18 +26,18 @@ STYLES = {
 """Green, amber, red."""
 
 _ORDER = list(reversed(STYLES))
-"""What is wrong stands first: it must not be what the screen has no room for."""
+"""Order of the findings: faults are first, so that a small screen shows them."""
 
 WORD_STYLES = {
     Advice.GOOD: "bold reverse $text-success",
     Advice.CANNOT_TELL: "bold reverse $text-warning",
     Advice.REPEAT: "bold reverse $text-error",
 }
-"""The word on a run stands out whatever the colours."""
+"""Styles of a run's verdict, visible without colours too."""
 
 
 class FindingsPanel(Panel):
-    """The run's word, then as many findings as fit."""
+    """The run's verdict, then as many findings as fit."""
 
     can_grow = True
 
@@ -49,7 +49,7 @@ class FindingsPanel(Panel):
 
 
 def word_of(completed: RunCompleted) -> Content:
-    """Return the highlighted word on a run."""
+    """Return the highlighted verdict on a run."""
     word = completed.answer.word
     return Content.styled(f" {word} ", WORD_STYLES[word])
 

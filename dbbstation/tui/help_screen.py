@@ -22,7 +22,7 @@ _KEY = 8
 
 
 class HelpScreen(ModalScreen[None]):
-    """Precedes the screen that it explains."""
+    """Screen over the screen that it explains."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
 

@@ -282,7 +282,7 @@ HELP = {
         },
     ),
 }
-"""By the name that a screen has for its help."""
+"""Help texts, by the help name of a screen."""
 
 KEY_NAMES = {
     "enter": "Enter",
@@ -297,6 +297,6 @@ KEY_NAMES = {
     "delete": "Delete",
     "plus": "+",
 }
-"""How keys are called that are no letter."""
+"""Names of the keys that are not letters."""
 
 HELP_CLOSES = "Esc, F1 or ? closes this help; arrow keys scroll."

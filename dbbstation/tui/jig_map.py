@@ -1,4 +1,4 @@
-"""A small map of the jig plate with the ball's place."""
+"""A small map of the jig plate with the ball's position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 COLUMNS, ROWS = 13, 5
 
 _LETTERS = 3
-"""A bore's number with the brackets that mark it."""
+"""Width of a bore's number with the brackets that mark it."""
 
 
 class JigMap(Panel):

@@ -36,7 +36,7 @@ LARGE_STYLES = {
     Advice.CANNOT_TELL: "$text-warning",
     Advice.REPEAT: "bold $text-error",
 }
-"""Colours of the word on a run, which the letters say as well."""
+"""Colours of a run's verdict, which the letters show as well."""
 
 _TEXTS = 3
 
@@ -82,7 +82,7 @@ class LargeFigures(Panel):
 
 
 class LargeScreen(RunScreen):
-    """The measuring screen with letters instead of the trace."""
+    """The measuring screen with large letters instead of the trace."""
 
     help_name = "large"
 

@@ -40,10 +40,10 @@ if TYPE_CHECKING:
 _NAME = 12
 
 _WIDE = 46
-"""From so many columns on X and Y of the centre stand beside its distance."""
+"""Least number of columns at which X and Y of the centre are beside its distance."""
 
 _DISTANCE, _MEAN = (8, 7), (7, 6)
-"""Columns of a centre's distance and of a mean: with room to spare, and beside X and Y."""
+"""Columns of a centre's distance and of a mean, first with free space, then beside X and Y."""
 
 
 class FiguresPanel(Panel):

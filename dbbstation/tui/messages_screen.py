@@ -1,4 +1,4 @@
-"""The last messages in lines, newest below, and all in full, newest first."""
+"""The last messages in single lines, the newest last; and all messages in full, the newest first."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _line(message: Message, width: int) -> Content:
 
 
 class MessagesScreen(ModalScreen[None]):
-    """Precedes the screen whose messages it shows."""
+    """Screen over the screen whose messages it shows."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,j,q", "dismiss", "Close")]
 

@@ -1,4 +1,4 @@
-"""Choice of the measurement: a row for each part, and what is missing."""
+"""Choose the measurement: a row for each part, and the missing parts."""
 
 from __future__ import annotations
 
@@ -286,7 +286,7 @@ _FIELDS = {
     SetUpPart.JOB: "job",
     SetUpPart.TEMPERATURE: "ambient_temp_c",
 }
-"""Field of the choice that a row shows."""
+"""Field of the choice for each row."""
 
 _EMPTY: dict[SetUpPart, object] = {
     SetUpPart.MACHINE: None,

@@ -1,4 +1,4 @@
-"""The next action, in plain words."""
+"""The line that states the next action."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ASKING = {State.ANNOUNCED, State.ARMED, State.COMPLETE, State.PAUSED}
 
 
 class NowLine(Panel):
-    """One sentence; grows for a fault."""
+    """One sentence; the line grows for a fault."""
 
     can_grow = True
     _say: Callable[[Board], str] = staticmethod(now)

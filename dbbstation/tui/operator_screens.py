@@ -178,7 +178,7 @@ class JobScreen(RowScreen):
 
 _BEGIN, _ANEW = "begin", "anew"
 _FIELDS = {"operator": "operator", "order": "job"}
-"""Field of a choice that a row changes."""
+"""Field of the choice that each row changes."""
 
 
 class OperateScreen(RunScreen):
@@ -210,7 +210,7 @@ class OperateScreen(RunScreen):
 
 
 class AnswerScreen(ExplainedScreen):
-    """The answer in large letters, with reasons and what to do."""
+    """The answer in large letters, with reasons and advice."""
 
     help_name = "answer"
 

@@ -1,4 +1,4 @@
-"""Parts of the overview: rest, plate, tests, chosen run."""
+"""Parts of the overview: remaining runs, plate, tests, chosen run."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from dbbstation.tui.shown import Shown
 
 _CELL = 12
-"""Columns of a place on the map at least: a bore, or a test with its signs."""
+"""Least number of columns of a bore on the map, or of a test with its signs."""
 
 _WORD = 15
 """Columns of a run in the list: direction, sign and the longest word."""
 
 _FIGURE = 8
-"""Columns of a run's circularity, where there is room."""
+"""Columns of a run's circularity, if there is space."""
 
 _IN_WORDS = 22
 """Columns of a direction on the map beside the test's name: direction, sign, longest word, circularity."""
@@ -71,7 +71,7 @@ class ChosenTest:
 
 
 class LeftLine(Panel):
-    """The rest of the plan with its duration, and a hint while keys wait."""
+    """The remaining runs with their duration, and a hint while keys wait."""
 
     def __init__(self, shown: Shown, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -90,7 +90,7 @@ class LeftLine(Panel):
 
 
 class PlateMap(Panel):
-    """Bores in place, with their tests: a row per direction with sign, word and circularity."""
+    """Map of the bores with their tests: a row per direction with sign, verdict and circularity."""
 
     def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -171,10 +171,10 @@ def _filled(text: Content, figure_um: float | None, width: int) -> Content:
 
 
 class TestList(Panel):
-    """As many tests as fit around the chosen one; the direction is in brackets."""
+    """List of as many tests as fit around the chosen one, with the direction in brackets."""
 
     __test__ = False
-    """Not one of pytest's."""
+    """Keeps pytest from collecting this class."""
 
     def __init__(self, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)

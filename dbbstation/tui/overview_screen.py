@@ -1,4 +1,4 @@
-"""All tests on a map of the plate, to choose another test or verdict."""
+"""All tests on a map of the plate, for choosing another test or verdict."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.tui.shown import Shown
 
 _VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecision.REJECTED}
-"""Which verdict a key takes back."""
+"""Verdict that each key takes back."""
 
 
 class OverviewScreen(BoardScreen):

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 class Panel(Static):
-    """Text made from the board."""
+    """A panel whose text shows the board."""
 
     can_grow = False
-    """Whether the height follows the text; a layout of the screen costs much more than a text."""
+    """Whether the height follows the text; a new layout needs much more time than a new text."""
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__("", id=id, markup=False)
@@ -32,5 +32,5 @@ class Panel(Static):
 
 
 def lines(*rows: Content) -> Content:
-    """Return rows below each other."""
+    """Return rows as one text, one below the other."""
     return Content("\n").join(rows)

@@ -1,4 +1,4 @@
-"""Characters for terminals that do not have all: no UTF-8, or a Linux console without braille."""
+"""Characters for limited terminals: without UTF-8, or a Linux console without braille."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _BRAILLE = re.compile(f"[{chr(BLANK)}-{chr(BLANK + 0xFF)}]")
 _FOREIGN = re.compile(r"[^\x00-\x7f]")
 
 _DOTS = " .:*"
-"""By raised dots of a cell: none, one or two, up to four, more."""
+"""Characters by the number of raised dots: zero, one or two, three or four, more."""
 
 _ALIKE = dict(zip("µ°±…·→›▸▶–×●○✓√⇧│┃║▊▎▌▐▏▕─━═▔▁▂┄┈", "uo~..>>>>-x@ovv^|||||||||--------", strict=True))
 
 
 def plain_driver(usual: type[Driver]) -> type[Driver]:
-    """Return a driver with only this terminal's characters; each replaces one, so that the layout is kept."""
+    """Return a driver that writes only this terminal's characters, one for one, so that the layout is kept."""
     encoding = getattr(sys.__stderr__, "encoding", None) or ""  # where Textual draws
     every = "utf" not in encoding.lower() or _foreign_locale()
     if not every and os.environ.get("TERM") != "linux":
@@ -37,19 +37,19 @@ def plain_driver(usual: type[Driver]) -> type[Driver]:
 
 
 def _foreign_locale() -> bool:
-    """Return whether the terminal was set to another encoding, where Python takes UTF-8 because it lacks the locale [PEP 538, 540]."""
+    """Return whether the terminal has another encoding than Python, which uses UTF-8 if it lacks the locale [PEP 538, 540]."""
     taken = os.environ.get("LC_CTYPE", "")
     named = os.environ.get("LC_ALL") or ("" if taken == "C.UTF-8" else taken) or os.environ.get("LANG") or taken
     return bool(named) and "utf" not in named.lower() and bool(sys.flags.utf8_mode) and "PYTHONUTF8" not in os.environ
 
 
 def without_braille(text: str) -> str:
-    """Return a text with cells of dots as one character of ASCII each."""
+    """Return a text with one ASCII character in place of each cell of dots."""
     return _BRAILLE.sub(lambda cell: _DOTS[min(((ord(cell[0]) - BLANK).bit_count() + 1) // 2, 3)], text)
 
 
 def plain(text: str) -> str:
-    """Return a text in ASCII, a character for each."""
+    """Return a text in ASCII, character by character."""
     return _FOREIGN.sub(_alike, without_braille(text))
 
 

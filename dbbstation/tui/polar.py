@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from dbbstation.tui.braille import Plane
 
 NOMINAL_SHARE, BAND_SHARE = 0.58, 0.34
-"""Radius of the nominal circle, and what the scale's deviation adds to it, as shares of the dial's radius."""
+"""Radius of the nominal circle, and its increase for a deviation of full scale, as shares of the dial's radius."""
 
 SMALLEST_SCALE_UM = 2.0
-"""A scale below the noise of any bar would show noise."""
+"""Smallest scale [µm]: a smaller one would show only noise."""
 
 CELL_ASPECT = 2.0
 """Height of a terminal's cell over its width, as most fonts have it."""
 
 _DOTS_BETWEEN_MARKS = 3
-"""Dots from one dot of a dotted circle to the next; the rings of the scale are twice as sparse."""
+"""Spacing of the dots of a dotted circle; on the rings of the scale it is double."""
 
 _MARGIN_DOTS = 4.0
-"""Room for the letters at the rim."""
+"""Margin for the letters at the rim."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ class Dial:
         return braille.empty(self.columns, self.rows)
 
     def places(self, theta_deg: Floats, share: Floats | float) -> tuple[Floats, Floats]:
-        """Return points in dots from the upper left corner, shape (n,) each."""
+        """Return x and y of points in dots from the upper left corner, shape (n,) each."""
         theta = np.radians(theta_deg)
         x = self.columns * braille.CELL_WIDE / 2.0 + self.radius * share * np.cos(theta)
         y = self.rows * braille.CELL_HIGH / 2.0 - self.radius * share * np.sin(theta) / self.dot_aspect
         return x, y
 
     def cell(self, theta_deg: float, share: float) -> tuple[int, int]:
-        """Return row and column of the cell at a place, within the field."""
+        """Return row and column of the cell at a point, limited to the field."""
         x, y = self.places(np.array([theta_deg]), share)
         row, column = int(y[0] // braille.CELL_HIGH), int(x[0] // braille.CELL_WIDE)
         return min(max(row, 0), self.rows - 1), min(max(column, 0), self.columns - 1)
@@ -92,7 +92,7 @@ def draw_trace(
 
 
 def draw_scale(plane: Plane, dial: Dial, start_deg: float | None) -> None:
-    """Add the nominal circle, rings of plus and minus the scale, and the start's spoke."""
+    """Add the nominal circle, rings at plus and minus the scale, and a spoke at the start."""
     for share, spacing in (
         (NOMINAL_SHARE, _DOTS_BETWEEN_MARKS),
         (NOMINAL_SHARE + BAND_SHARE, 2 * _DOTS_BETWEEN_MARKS),

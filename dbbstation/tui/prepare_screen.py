@@ -1,4 +1,4 @@
-"""The checklist before circles: checked facts, and what a person must see."""
+"""The checklist before circles: facts that the program checked, and facts that a person must check."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.tui.reception import StationDesk
 
 _GOOD, _OPEN, _NOTE = "✓", "!", "·"
-"""Signs: checked and good; not known; to be known."""
+"""Signs: checked and good; unknown; note."""
 
 
 class PrepareScreen(RowScreen):

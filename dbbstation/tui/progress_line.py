@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.service.board import Board
 
 _FIXED = 60
-"""Letters beside the two bars."""
+"""Number of characters beside the two bars."""
 
 _SHORTEST = 6
 

@@ -1,4 +1,4 @@
-"""Questions: chosen from a list, typed, answered by yes or no."""
+"""Questions with a choice from a list, a typed answer, or yes or no."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class ChooseQuestion(ModalScreen[int | None]):
-    """Returns the place of the choice, or None."""
+    """Returns the index of the choice, or None."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,q,ctrl+c", "dismiss(None)", "Back")]
 
@@ -67,7 +67,7 @@ class TypeQuestion(ModalScreen[str | None]):
 
 
 class TemperatureQuestion(TypeQuestion):
-    """Returns a valid temperature as text, empty to go on without, or None to go back."""
+    """Returns a valid temperature as text, an empty text to continue without one, or None to go back."""
 
     def __init__(self) -> None:
         super().__init__(texts.TEMPERATURE_NOW)
@@ -120,7 +120,7 @@ class ReasonQuestion(ModalScreen[str | None]):
 
 
 class YesQuestion(ModalScreen[bool]):
-    """Returns whether to do what the text asks."""
+    """Returns whether the answer is yes."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("y", "answer(True)", "Yes"),

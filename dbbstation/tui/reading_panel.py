@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from dbbstation.station.events import Sample
 
 _STALE_S = 1.5
-"""Without a new reading for so long the last one is shown as old: it must not look live [s]."""
+"""Age at which the last reading is shown as old [s], so that it does not look live."""
 
 _WITHOUT_BAR = {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED, State.COMPLETE, State.FLAWED, State.FINISHED}
-"""States in which no bar need be in its place."""
+"""States in which the bar may be absent."""
 
 _BEFORE_RUN = {State.ANNOUNCED, State.ARMED}
-"""States in which the bar is put in at the feed-in point."""
+"""States in which the operator puts the bar in at the feed-in point."""
 
 _FAR_UM = 9_999.9
-"""Further from the nominal length a deviation in µm says nothing."""
+"""Largest deviation that is shown in µm."""
 
 
 class Age:
-    """Tells a live reading from a stale one."""
+    """Distinguishes a live reading from a stale one."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -69,7 +69,7 @@ class ReadingPanel(Panel):
 
 
 def seat_words(found: BarAtFeedIn) -> str:
-    """Return the bar's position at the feed-in point, in words."""
+    """Return a sentence on the bar's position at the feed-in point."""
     if found.seated:
         return SEATED
     if found.backwards:

@@ -14,7 +14,7 @@ _Outcome = TypeVar("_Outcome")
 
 
 class StationDesk(Protocol):
-    """Works in the background, opens jobs, shows results; `StationApp` is one."""
+    """Interface that works in the background, opens jobs and shows results, such as `StationApp`."""
 
     def do(
         self,
@@ -22,10 +22,10 @@ class StationDesk(Protocol):
         then: Callable[[_Outcome], None],
         failed: Callable[[Exception], None],
     ) -> None:
-        """Do work of some seconds; `then` takes its outcome, `failed` a StationError."""
+        """Do work of some seconds; `then` receives its outcome, `failed` a StationError."""
 
     def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
         """Open a job and show its screen."""
 
     def show_results(self, folder: Path) -> None:
-        """Show what can be done with a measured session."""
+        """Show the possible tasks on a measured session."""

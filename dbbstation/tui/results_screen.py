@@ -1,4 +1,4 @@
-"""After a session: calibrate, diagnose, programs, report, and their results."""
+"""Tasks after a session (calibrate, diagnose, programs, report) and their results."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 _MOST = 6
-"""Causes, and sentences of a kind, that are shown; the files have all."""
+"""Greatest number of shown causes, and of shown sentences of a kind; the files contain all."""
 
 
 def result_lines(step: SessionTask, answer: Mapping[str, object]) -> list[str]:

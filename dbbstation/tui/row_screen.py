@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class RowScreen(ExplainedScreen):
-    """Title, sentence, rows, a text about the chosen row, keys."""
+    """A screen with title, sentence, rows, a text about the chosen row, and keys."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class RowScreen(ExplainedScreen):
 
     @property
     def stands(self) -> bool:
-        """Return whether its parts exist, because background work may end too early or late."""
+        """Return whether the screen's parts exist: background work may end before or after."""
         return bool(self.query("#row-text"))
 
     @property

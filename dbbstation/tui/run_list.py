@@ -24,13 +24,13 @@ SIGNS = {
 }
 
 _CELL = 15
-"""Direction, sign and the longest word."""
+"""Columns of a direction, a sign and the longest word."""
 
 _SHORTEST_NAME = 4
 
 
 class RunList(Panel):
-    """As many tests as fit around the present one."""
+    """List of as many tests as fit around the present one."""
 
     def text(self, board: Board) -> Content:
         numbered = enumerate(zip(board.tasks, board.marks, strict=True), start=1)

@@ -1,4 +1,4 @@
-"""The next action, and faults, in plain sentences."""
+"""Sentences for the next action and for faults."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _BEGIN = "Opening instrument and session …"
 
 
 def now(board: Board) -> str:
-    """Return what to do or wait for."""
+    """Return a sentence on what to do or wait for."""
     if board.fault is not None:
         return _fault(board)
     if board.state is None:
@@ -31,7 +31,7 @@ def now(board: Board) -> str:
 
 
 def now_for_operator(board: Board, trouble: str = "") -> str:
-    """Return the same for an operator, who can only repeat a faulty run, and has the shop's own text for trouble."""
+    """Return the same for an operator, who can only repeat a faulty run. For trouble it is the shop's text."""
     completed = board.completed
     if board.fault is not None:
         return f"{_fault(board, commands=False)} {trouble}".rstrip()

@@ -1,4 +1,4 @@
-"""The announced run's set-up: place, ball, tilt, bar, and its steps on a tall screen."""
+"""The announced run's set-up: position, ball, tilt, bar, and on a tall screen its steps."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SetUpPanel(Panel):
 
 
 class StepsPanel(Panel):
-    """One step in a row or two; finished ones are dim."""
+    """One step per row or two; finished steps are dim."""
 
     can_grow = True
 

@@ -1,4 +1,4 @@
-"""Content of screens beside events."""
+"""Content of screens that does not come from events."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Shown:
-    """Plan and plate, and the shop's own text for an operator in trouble."""
+    """Plan and plate, and the shop's text for an operator in trouble."""
 
     plan: str
     bores: Mapping[int, tuple[float, float]] = field(default_factory=dict)

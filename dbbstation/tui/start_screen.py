@@ -45,7 +45,7 @@ class StartScreen(RowScreen):
         self.search()
 
     def search(self) -> None:
-        """List the sessions anew; a reported failure stays."""
+        """List the sessions again; a reported failure stays visible."""
         self.say(texts.START_LOOKS)
         self._reception.do(self._front.sessions, self._list, self._failed)
 

@@ -28,7 +28,7 @@ LARGE_WORDS: Mapping[State | None, tuple[str, str]] = {
     State.STOPPED: ("stopped", "Q"),
     State.FAULTED: ("fault", "C or Q"),
 }
-"""State and next action in large letters, nine of them at most."""
+"""State and next action in at most nine large letters."""
 
 LARGE_BACK = "go back"
 """An earlier circle is wrong."""
@@ -39,7 +39,7 @@ REASONS = (
     "wrong ball, bore, bar or program",
     "the machine was disturbed or not warm",
 )
-"""Why a run does not count after all."""
+"""Reasons for rejecting a run."""
 
 REASON_TITLE = "Why does {run} not count?"
 ALL_THE_SAME = (
@@ -47,7 +47,7 @@ ALL_THE_SAME = (
     "it cannot be measured again",
     "the machine is to be seen as it is",
 )
-"""Why a run counts although something is wrong with it."""
+"""Reasons for accepting a faulty run."""
 
 REASON_TITLE_COUNTS = "Something is wrong with {run}. Why does it count all the same?"
 REASON_ANOTHER = "type another reason"
@@ -80,7 +80,7 @@ JOB_ROWS: Mapping[str, str] = {
     "port": "port",
     "temperature": "temperature [°C]",
 }
-"""What an operator may change."""
+"""Choices of an operator."""
 JOB_LIMIT = "at most {largest:g} {unit} of {figure}, {tests}"
 JOB_ALL_TESTS = "all tests"
 JOB_BEFORE = "Before you begin:"
@@ -183,7 +183,7 @@ CONFIRMED: Mapping[str, str] = {
     "clearance": "Every tilt was run once without the bar: bar and tool stay clear.",
     "spindle": "The spindle is locked and oriented; nobody starts it.",
 }
-"""What only a person can see before a session, by a name that is not shown."""
+"""Facts that only a person can check before a session, by a name that is not shown."""
 
 CONFIRMED_AGAIN: Mapping[str, str] = {
     "bar": "The bar is in, its cable is free, both balls are clean.",
@@ -191,7 +191,7 @@ CONFIRMED_AGAIN: Mapping[str, str] = {
     "jig": "The plate was not moved in its seat, and is clamped.",
     "spindle": "The spindle is locked, oriented as before; nobody starts it.",
 }
-"""The same of a session that goes on: what can have changed since."""
+"""The same for a continued session: facts that may have changed since."""
 
 CHECK_READS = "The instrument reads {length:.4f} mm{rate}; for the first circle the bar is {seat}."
 CHECK_READS_ALL = "The instrument reads {length:.4f} mm{rate}."

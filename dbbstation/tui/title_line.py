@@ -44,10 +44,10 @@ class TitleLine(Panel):
 
 
 _NARROWEST = 80
-"""Columns of the smallest terminal, before the line has a size."""
+"""Assumed columns before the line has a size: those of the smallest terminal."""
 
 _SHORTEST = 4
-"""Characters of a name that still say anything."""
+"""Least number of shown characters of a name."""
 
 
 def _shortened(name: str, room: int) -> str:

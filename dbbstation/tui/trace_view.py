@@ -37,16 +37,16 @@ if TYPE_CHECKING:
     from dbbstation.tui.braille import Plane
 
 _SCALE, _CCW, _CW, _LAST, _LABEL = 1, 2, 4, 8, 16
-"""Who has a dot in a cell: the bits of `braille.overlay`, in the order the planes are given, and one for text."""
+"""Bits of `braille.overlay` for the planes with a dot in a cell, in the order of the planes, and one bit for text."""
 
 _HEADS = {Direction.CCW: "●", Direction.CW: "○"}
-"""Marks where a running circle is."""
+"""Marks at the position of a running circle."""
 
 _START_OFFSET_DEG = 9.0
-"""The word at the start angle stands beside its spoke, so that it covers neither the spoke nor an axis letter."""
+"""Angle from the start's spoke to its word [deg], so that the word covers neither the spoke nor an axis letter."""
 
 _SMALLEST_ROWS = 6
-"""With fewer the lines of text above and below would leave no circle."""
+"""Least number of rows for text above and below the circle."""
 
 
 class TraceView(Widget):

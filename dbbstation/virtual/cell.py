@@ -45,7 +45,7 @@ class VirtualCell:
         return running.run.length_mm_at(t_s - running.begin_s) + self.machine.noise_mm()
 
     def mount(self, test: str) -> int:
-        """Put up a test's ball anew; return the mounting's number.
+        """Mount a test's ball again and return the mounting's number.
 
         Raises:
             MachineError: a run goes on, or an unknown test.
@@ -59,7 +59,7 @@ class VirtualCell:
             return self.machine.mount(self.machine.plan.tests[test].ball)
 
     def calibrate(self, length_mm: float) -> None:
-        """Put the bar on a calibrator until the next ball or run.
+        """Put the bar on a calibrator until a ball is mounted or a run starts.
 
         Raises:
             MachineError: a run goes on.
@@ -70,7 +70,7 @@ class VirtualCell:
         self._clock.run_until(math.inf)
 
     def start(self, test: str, direction: Direction, path: CommandedPath | None = None) -> VirtualRun:
-        """Start a run; another ball is replaced first.
+        """Start a run, after replacing another test's ball.
 
         Raises:
             MachineError: another run goes on, or this one is impossible.

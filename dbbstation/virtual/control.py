@@ -1,4 +1,4 @@
-"""The control address of the virtual machine: one line of text in, one line of JSON out, on the loopback address only."""
+"""The control address of the virtual machine, on the loopback address only. It reads a line of text and answers with a line of JSON."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ SCHEME = "tcp://"
 
 _TICK_S = 0.05
 _LONGEST = 4096
-"""Bytes of a line; whoever sends more is no friend."""
+"""Greatest number of bytes of a line; longer lines are refused."""
 
 
 class CellCommands:
-    """Obeys the protocol's commands."""
+    """Executes the protocol's commands."""
 
     def __init__(self, cell: VirtualCell, programs: Programs | None = None) -> None:
         self._cell = cell
@@ -38,7 +38,7 @@ class CellCommands:
         self.quit = threading.Event()
 
     def __call__(self, line: str) -> dict[str, object]:
-        """Obey one line; return the answer.
+        """Execute one line and return the answer.
 
         Raises:
             StationError: it cannot be obeyed.

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 from dbbstation.errors import MachineError
 
 _PATIENCE_S = 30.0
-"""The first run on a new computer waits for the compiler."""
+"""Longest wait for an answer [s]: the first run on a new computer waits for the compiler."""
 
 _LOCAL = {"127.0.0.1", "localhost"}
 
@@ -66,7 +66,7 @@ class ControlClient:
         return answer
 
     def free(self) -> None:
-        """Stop a run of a dead program.
+        """Stop a run whose program has ended.
 
         Raises:
             MachineError: nobody answers.

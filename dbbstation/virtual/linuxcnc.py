@@ -1,12 +1,12 @@
-"""LinuxCNC without a screen as a function: a program in, what it commands in every servo cycle out.
+"""Run LinuxCNC without a screen: a program is the input, the commands of every servo cycle are the output.
 
-Needs the Debian packages `linuxcnc-uspace` and, for a kinematics, `linuxcnc-uspace-dev`. LinuxCNC refuses to run as root. Called
-by root, this module starts it as the user who called sudo, else as the user `nobody`.
+This needs the Debian packages `linuxcnc-uspace` and, for a kinematics, `linuxcnc-uspace-dev`. LinuxCNC refuses to run
+as root. If root calls this module, it starts LinuxCNC as the user who called sudo, else as the user `nobody`.
 
-LinuxCNC runs in real time. With `faster` its clock runs that many times as fast: the servo period and all times are divided
-by it, speeds multiplied by it, accelerations by its square, so that every servo cycle calculates with the same way per
-cycle and the same change of it. Samples have the times that they would have at the usual clock. The interpreter
-is not part of that clock. If it falls behind the planner, the program runs again with a slower clock.
+LinuxCNC runs in real time. `faster` speeds up its clock: the servo period and all times are divided by it, speeds are
+multiplied by it, and accelerations by its square. So every servo cycle computes the same distance per cycle and the
+same change of it. Samples have the times of the usual clock. The interpreter does not use this clock. If the
+interpreter falls behind the planner, the program runs again with a slower clock.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 NEEDED = ("linuxcnc", "halsampler", "rtapi_app", "setpriv")
 MODULES = Path("/usr/lib/linuxcnc/modules")
-"""Where the Debian package looks for modules; rtapi_app takes no other folder."""
+"""Folder in which the Debian package looks for modules; rtapi_app allows no other folder."""
 
 NOBODY = "65534"
 """User and group without rights, on any Linux [Debian base-passwd]."""
@@ -53,13 +53,14 @@ PERIOD_NS = 1_000_000
 """Servo period at the usual clock."""
 
 GREATEST_MM_S, GREATEST_DEG_S, GREATEST_DEG_S2 = 500.0, 600.0, 10_000.0
-"""Speeds of axes, and the acceleration of the angles: no limit for any program here."""
+"""Speeds of the axes and acceleration of the angles: so large that they limit no program here."""
 
 RAMP_HZ = 100.0
-"""What `ARC_BLEND_RAMP_FREQ` is if a file does not say: moves that end within its period change speed evenly. It has a clock of its own."""
+"""LinuxCNC's default of `ARC_BLEND_RAMP_FREQ`: moves that end within its period change speed evenly. It has a separate
+clock."""
 
 BEHIND = "the interpreter fell behind the planner"
-"""As `drive.py` has it."""
+"""The same text as in `drive.py`."""
 
 PATIENCE_S = 600.0
 EVERY = 10
@@ -67,12 +68,12 @@ EVERY = 10
 
 
 class BehindError(RuntimeError):
-    """The planner's queue ran empty on the way: what it did then is not what the program asks for."""
+    """The planner's queue ran empty during the program, so that its motion is not what the program commands."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlannerRun:
-    """What the planner made of a program.
+    """The motion that the planner computed for a program.
 
     Attributes:
         time_s: of each sample, from the first servo cycle that moves to the last, shape (n,) [s].
@@ -86,18 +87,18 @@ class PlannerRun:
 
     @property
     def duration_s(self) -> float:
-        """From the first motion to the last, dwells and stops included [s]."""
+        """Return the time from the first motion to the last, with dwells and stops [s]."""
         return float(self.time_s[-1] - self.time_s[0])
 
     @property
     def moving_s(self) -> float:
-        """Time in motion [s]: without dwells and stops, whose length depends on how busy the computer is."""
+        """Return the time in motion [s], without dwells and stops, because their length depends on the load of the computer."""
         return float(np.diff(self.time_s)[np.any(np.diff(self.poses, axis=0) != 0.0, axis=1)].sum())
 
 
 @dataclass(frozen=True, eq=False)
 class ControlKins:
-    """A kinematics in place of none: joints are recorded then.
+    """A kinematics of LinuxCNC; with it, joints are recorded.
 
     Attributes:
         home_mm: joints at which the machine is switched on, shape (6,).
@@ -116,7 +117,7 @@ class ControlKins:
 
 
 def missing(*, kinematics: bool = False) -> str:
-    """Return why LinuxCNC cannot run here, or cannot be given a kinematics; empty if it can."""
+    """Return why this computer cannot run LinuxCNC or build a kinematics; empty if it can."""
     lacking = [name for name in (*NEEDED, *(["halcompile"] if kinematics else [])) if shutil.which(name) is None]
     if lacking:
         return f"LinuxCNC is not installed here: no {', '.join(lacking)}"
@@ -149,7 +150,7 @@ def run(
     patience_s: float = PATIENCE_S,
     kins: ControlKins | None = None,
 ) -> PlannerRun:
-    """Run a program on the planner, from its first point on.
+    """Run a program on the planner, from its first point.
 
     Args:
         text: the program; its first move names X, Y, Z, A, B and C.
@@ -172,7 +173,7 @@ def run(
 def run_once(
     text: str, mm_s2: float, faster: int, patience_s: float = PATIENCE_S, kins: ControlKins | None = None
 ) -> PlannerRun:
-    """Run a program with this clock, or raise; arguments as for `run`."""
+    """Run a program with this clock; arguments as for `run`."""
     with started(text, mm_s2, faster, kins, patience_s=patience_s) as (folder, printed):
         ended = text_of(folder / "ended.txt") if (folder / "ended.txt").exists() else ""
         if ended == BEHIND:
@@ -188,7 +189,7 @@ def run_once(
 def started(
     text: str, mm_s2: float, faster: int, kins: ControlKins | None, *, patience_s: float, driver: Path | None = None
 ) -> Iterator[tuple[Path, str]]:
-    """Run LinuxCNC to its end in a new folder; yield the folder and what was printed.
+    """Run LinuxCNC to its end in a new folder; yield the folder and the printed text.
 
     Args:
         driver: takes the place of `drive.py`.
@@ -205,7 +206,7 @@ def started(
 
 
 def driven_program(machine: Machine, ran: PlannerRun) -> str:
-    """Return the program by which a nominal control would drive the struts as LinuxCNC drove them."""
+    """Return the program with which a nominal control drives the struts exactly as LinuxCNC did."""
     rows = np.unique([*range(0, len(ran.poses), EVERY), len(ran.poses) - 1])
     start = middle(machine)
     near = Frames(*(np.repeat(of, len(rows), axis=0) for of in (start.position_mm, start.rotation)))
@@ -261,7 +262,7 @@ def _configure(folder: Path, mm_s2: float, faster: int, kins: ControlKins | None
 
 
 def _quickened(text: str, faster: int) -> str:
-    """Return the program with feeds multiplied and dwells divided; comments are left alone."""
+    """Return the program with feeds multiplied and dwells divided; comments stay unchanged."""
     if faster == 1:
         return text
 
@@ -287,7 +288,7 @@ def _first_point(text: str) -> str:
 
 @contextmanager
 def alone() -> Iterator[None]:
-    """Wait until no other LinuxCNC runs: there is one on a computer at a time."""
+    """Wait until no other LinuxCNC runs: a computer can run only one at a time."""
     handle = open_to_change(Path(tempfile.gettempdir()) / "dbbstation-planner.lock", create=True)
     try:
         while True:

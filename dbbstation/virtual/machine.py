@@ -1,4 +1,4 @@
-"""The virtual machine: nominal controller, actual geometry, a bar between balls."""
+"""The virtual machine: a nominal control, the actual geometry, and a bar between two balls."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SESSION, _BAR = "virtual session", "virtual bar"
 
 @dataclass(frozen=True)
 class Sizes:
-    """Accuracy of the virtual measurement, one standard deviation each."""
+    """Errors of the virtual measurement, as standard deviations."""
 
     noise_mm: float = 0.0003
     bar_uncertainty_mm: float = 0.0005
@@ -36,7 +36,7 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class VirtualRun:
-    """A run computed before its start.
+    """A run, which is computed before it starts.
 
     Attributes:
         length_mm: distance plus the bar's error at the path's times, shape (n,).
@@ -70,7 +70,7 @@ class VirtualMachine:
 
     @property
     def bar_error_mm(self) -> float:
-        """Return the bar's reading less true distance [mm]."""
+        """Return the bar's reading minus the true distance [mm]."""
         return float(self._bar.values[0])
 
     def check(self) -> None:
@@ -87,7 +87,7 @@ class VirtualMachine:
             self.truth.bar(Motion(path.poses, is_path=True, time_s=path.t_s, setup=self._setup(test.ball)))
 
     def mount(self, ball: Ball) -> int:
-        """Put a ball up anew; return the mounting's number."""
+        """Mount a ball again and return the mounting's number."""
         self.mountings += 1
         self.mounted = ball
         return self.mountings
@@ -95,7 +95,7 @@ class VirtualMachine:
     def run(
         self, test: str, direction: Direction, *, path: CommandedPath | None = None, begin_s: float = 0.0
     ) -> VirtualRun:
-        """Compute a run, with its ball put up if needed.
+        """Compute a run, and mount its ball first if needed.
 
         Args:
             path: None: the plan's circle.
@@ -129,7 +129,7 @@ class VirtualMachine:
         return float(self._noise.normal(0.0, self.sizes.noise_mm)) if self.sizes.noise_mm else 0.0
 
     def describe(self) -> dict[str, object]:
-        """Return all errors by source, set and parameter, in their units, and set-ups under the spindle."""
+        """Return all errors by source, set and parameter, in their units, and the set-ups under the spindle."""
         under = self._under_spindle
         sources = (*self.truth.sources, self._bar, *self._scatter.all(), *(f for *_, of in under.values() for f in of))
         return {

@@ -1,4 +1,4 @@
-"""Commands of the virtual control over time."""
+"""Commanded poses of the virtual control over time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def circle_path(circle: Circle) -> CommandedPath:
 
 
 def path_of(toolpath: Toolpath) -> CommandedPath:
-    """Return what a toolpath commands with the bar on: first to last pause, if any.
+    """Return the path of a program while the bar is on: between its first and last pause, if it has any.
 
     Raises:
         MachineError: it does not move.

@@ -60,7 +60,7 @@ class MeasurementErrors:
         return self._of_balls[ball.name]
 
     def mounting(self, ball: Ball, number: int, shared: str) -> Fitted:
-        """Return a ball's place in its `number`-th mounting."""
+        """Return a ball's position in its `number`-th mounting."""
         if number not in self._of_mountings:
             rng = np.random.default_rng([self.seed, 4, number])
             (source,) = sources_named(("mounting",))
@@ -68,7 +68,7 @@ class MeasurementErrors:
         return self._of_mountings[number]
 
     def set_up(self, number: int) -> SetUp:
-        """Return the balls' places at the tip in the `number`-th mounting under the spindle."""
+        """Return the balls' positions at the tip in the `number`-th mounting under the spindle."""
         return SetUp.drawn(np.random.default_rng([self.seed, 6, number]), self.set_up_mm)
 
     def all(self) -> tuple[Fitted, ...]:

@@ -1,4 +1,4 @@
-"""A fixed ball that was put up under the spindle, and the moving ball, which was attached later [CAL III-A, Fig 4]."""
+"""The fixed ball, put up under the spindle, and the moving ball, attached afterwards [CAL III-A, Fig 4]."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Setup
 
 SET_UP_MM = 0.05
-"""How far balls stand from where they should that were put up by hand, one standard deviation per axis [mm]."""
+"""Standard deviation per axis of the position of balls that were put up by hand [mm]."""
 
 _STANDING_S = np.array([0.0, 1.0, 2.0])
-"""The machine has come to rest while a ball is put up: nothing lags any more [s]."""
+"""Time at rest while a ball is put up [s], long enough that no motion lags."""
 
 
 class MovingBall(ToolBallOffset):
@@ -56,7 +56,7 @@ class SetUp:
 
 
 def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s: float = 0.0) -> tuple[Fitted, Fitted]:
-    """Return a set-up's effect on the bar: fixed and moving ball.
+    """Return the effect of a set-up on the bar, by fixed and moving ball.
 
     Raises:
         KinematicsError: the machine cannot take the pose.

@@ -1,4 +1,4 @@
-"""The virtual instrument: answers on a pseudo-terminal by a protocol file, at the line's speed."""
+"""The virtual instrument. It answers on a pseudo-terminal as a protocol file states, at the line's speed."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 
 
 TOLERANCE = 0.04
-"""A UART samples the last bit of ten in its middle: half a bit in ten, less some sampling error, is what it bears."""
+"""Largest relative error of the baud rate: a UART samples the last of ten bits in its middle, so half a bit in ten,
+minus some sampling error, is allowed."""
 
 
 def heard_at(raw: bytes, line: LineSettings, *, sent_baud: int, heard_baud: int) -> bytes:
-    """Return what a receiver at `heard_baud` makes of `raw` sent at `sent_baud`."""
+    """Return the bytes that a receiver at `heard_baud` reads if `raw` is sent at `sent_baud`."""
     if abs(heard_baud / sent_baud - 1.0) <= TOLERANCE:
         return raw
     bits = [bit for byte in raw for bit in _sent_bits(byte, line)]
@@ -59,18 +60,19 @@ def _sent_bits(byte: int, line: LineSettings) -> list[int]:
 
 
 _TICK_S = 0.001
-"""Real seconds between looks at the line while bytes are under way; bytes due in between go together."""
+"""Interval of the polls while bytes are on the line, in real time [s]; bytes that are due in between are sent
+together."""
 
 _IDLE_S = 0.005
-"""Real seconds between looks while nothing is under way; a request wakes it at once."""
+"""Interval of the polls while the line is quiet, in real time [s]; a request ends it at once."""
 
 _BACKLOG = 4096
-"""Frames that wait for a program that does not read. Then the instrument falls behind its clock and takes its samples later,
-each with the length of its own time: on a fast clock a busy computer would otherwise lose thousands at once."""
+"""Greatest number of frames that wait for a slow program. The instrument then falls behind its clock and samples later,
+with the length at the later time. Otherwise a busy computer would lose thousands of samples on a fast clock."""
 
 
 _UNDER_WAY = 64
-"""Frames on the line behind which a clock that waits stands still."""
+"""Number of frames on the line at which a waiting clock stops."""
 
 
 @dataclass(slots=True)
@@ -136,7 +138,7 @@ class VirtualInstrument:
         self._thread.start()
 
     def stop(self) -> None:
-        """Switch off and close the line.
+        """Switch the instrument off and close the line.
 
         Raises:
             Exception: from `length_mm_at`.
@@ -192,7 +194,7 @@ class VirtualInstrument:
             return min(max(self.clock.real_s(due_s - self.clock()), 0.0), tick_s)
 
     def _hear(self, raw: bytes) -> None:
-        """Obey complete commands; drop other bytes."""
+        """Execute complete commands and drop other bytes."""
         ask = self.protocol.ask
         follow_up = b"" if ask.follow_up is None else ask.follow_up.request
         known = {ask.request, follow_up, *(step.send for step in ask.start + ask.stop)} - {b""}
@@ -238,7 +240,7 @@ class VirtualInstrument:
             self._send_sample(now_s + self._dice.uniform(*self.protocol.latch_bounds_s()), replied_s)
 
     def _sample(self, now_s: float, *, connected: bool) -> None:
-        """Take due samples of a stream; without listener they are lost."""
+        """Take the due samples of a stream; they are lost if no program listens."""
         while self._running and self._next_sample_s <= now_s and not (connected and len(self._outgoing) >= _BACKLOG):
             at_s = self._next_sample_s
             self._next_sample_s += 1.0 / self._rate_hz
@@ -266,7 +268,7 @@ class VirtualInstrument:
         self._outgoing.append(_Outgoing(raw, start_s))
 
     def _transmit(self, end: End, now_s: float) -> None:
-        """Write due bytes; without listener they are lost."""
+        """Write the due bytes; they are lost if no program listens."""
         while self._outgoing:
             first = self._outgoing[0]
             due = int(min(len(first.raw), (now_s - first.start_s) / self._character_s + 1e-6))

@@ -1,4 +1,4 @@
-"""Virtual time: real time, faster."""
+"""Clocks of virtual time, which is faster than real time."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ import time
 from dbbstation.errors import MachineError
 
 STAND_S = 0.2
-"""Real time that the bar stands outside before each run: on a fast clock the path's own dwell may pass while the program
-at the other end of the line is not looking [s]."""
+"""Real time that the bar waits outside the circle before each run [s]: on a fast clock the program may miss the path's
+own dwell."""
 
 _STAND_WAITING_S = 5.0
-"""The same for a machine that waits: several samples of a slow instrument, and nobody can miss one [s of machine time]."""
+"""The same for a machine that waits, in machine time [s]: several samples of a slow instrument, which no program can
+miss."""
 
 _BEHIND_S = 3.0
-"""Time that passes after a run, so that its end has samples behind it [s of machine time]."""
+"""Machine time after a run [s], so that samples follow the run's end."""
 
 _STEP_S = 0.5
-"""Time that passes at once: some samples, so that the line is used in pieces that are worth it [s of machine time]."""
+"""Machine time that passes in one step [s]: some samples, so that the line carries several frames together."""
 
 _PATIENCE_S = 25.0
-"""Real time in which a run is read to its end; a control client waits a little longer [s]."""
+"""Longest real time of reading a run [s]; a control client waits a little longer."""
 
 
 class ScaledClock:
@@ -73,7 +74,7 @@ class ScaledClock:
 
 
 class WaitingClock(ScaledClock):
-    """Machine time that passes only during runs, as fast as samples are read or asked for."""
+    """Machine time that passes only during runs, as fast as samples are read or requested."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -100,7 +101,7 @@ class WaitingClock(ScaledClock):
                 self._stands.notify_all()
 
     def exchanges(self, period_s: float) -> bool:
-        """Return whether a reading may be taken now, then advance by a period for its exchange."""
+        """Return whether a reading is possible now, and then advance by one period for its exchange."""
         with self._stands:
             if self._now_s >= self._until_s:
                 return False

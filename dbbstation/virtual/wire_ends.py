@@ -13,7 +13,7 @@ class End(Protocol):
     """A line for the virtual instrument."""
 
     port: str
-    """Name under which a program opens the other end."""
+    """Name of the other end, which a program opens."""
 
     @property
     def connected(self) -> bool:
@@ -23,7 +23,7 @@ class End(Protocol):
         """Wait for bytes; return whether there are any."""
 
     def read(self) -> bytes:
-        """Return the bytes that have come."""
+        """Return the bytes that have arrived."""
 
     def write(self, raw: bytes) -> int:
         """Send what the line takes; return the number of bytes."""
@@ -66,7 +66,7 @@ class SocketEnd:
         return bool(ready)
 
     def read(self) -> bytes:
-        """Return the bytes that have come."""
+        """Return the bytes that have arrived."""
         if self._client is None:
             return b""
         try:

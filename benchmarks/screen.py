@@ -1,6 +1,6 @@
 """What the station's screens cost while a circle comes at 1 kHz, against the same sequence without a screen.
 
-Each screen runs on a pseudo-terminal in a process of its own, ten looks a second, as `dbbstation station` runs it: sequencer,
+Each screen runs on a pseudo-terminal in a process of its own, ten looks a second, as `dbbstation measure` runs it: sequencer,
 runner, board, app and Textual's driver are the real ones. Readings come from memory as time passes, so that no instrument and
 no virtual machine is among what is measured. The share of a core is the processor time of that process over twelve seconds in
 the middle of the circle. A look is taking the mail and drawing the board into widgets; what Textual makes of them later is in

@@ -152,7 +152,7 @@ async def operator_svg(screen: str) -> str:
         for _ in range(4):
             await pilot.pause()
             app.look()
-        return app.export_screenshot(title="dbbstation station --job")
+        return app.export_screenshot(title="dbbstation measure --job")
 
 
 _BLANKS_FIRST = re.compile(r' x="([\d.]+)"([^>]*) textLength="([\d.]+)"([^>]*)>((?:&#160;)+)([^<]*)')

@@ -48,7 +48,7 @@ COMMANDS = {
     "import": "Import recordings of another program into a session.",
     "instrument": "Instruments: list, ports, monitor, replay, emulate.",
     "jig": "A jig file from a CMM sheet; how well holders repeat.",
-    "measure": "Measure a plan, test by test, into a session folder.",
+    "measure": "Measure a plan on a screen or in lines, into a session.",
     "mismatch": "Where any simulation and any recording differ, and how.",
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
@@ -57,7 +57,6 @@ COMMANDS = {
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
     "sources": "The known causes of error, and how to confirm them.",
-    "station": "Measure a plan on a terminal screen.",
 }
 """Name and one line of help of every command; each is a module of this folder with a command of its name."""
 

@@ -121,9 +121,9 @@ def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> 
 def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:
     of: dict[str, dict[str, None]] = {}
     for run in runs:
-        for name_of, budget in run.uncertainty.items():
+        for quantity, budget in run.uncertainty.items():
             if budget.why_not:
-                of.setdefault(budget.why_not, {})[name_of] = None
+                of.setdefault(budget.why_not, {})[quantity] = None
     for why, figures in of.items():
         echo(f"{', '.join(figures)}: {why}")
 
@@ -145,8 +145,8 @@ def _print_budgets(result: CirclesResult) -> None:
     rows: list[list[object]] = []
     missing: dict[str, None] = {}
     for run in _with_budgets(result):
-        for name_of, budget in run.uncertainty.items():
-            name = [run.test, getattr(run, "direction", "both"), run.repeat, name_of]
+        for quantity, budget in run.uncertainty.items():
+            name = [run.test, getattr(run, "direction", "both"), run.repeat, quantity]
             rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget.terms_um.items()]
             u = budget.u_um
             rows.append([*name, "u, all together", "-" if u is None else f"{u:.3f}"])

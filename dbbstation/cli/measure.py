@@ -1,4 +1,4 @@
-"""`dbbstation measure`: the whole sequence of a measurement without a screen."""
+"""`dbbstation measure`: the whole sequence of a measurement, on a screen or in lines."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import click
 
+from dbbstation.cli.asked import Asked, at_a_terminal
 from dbbstation.cli.declared import made
-from dbbstation.cli.instrument_options import LineOptions, RateHz, spying
+from dbbstation.cli.instrument_options import OpenLine, RateHz, spying
 from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import RecordingOptions
+from dbbstation.files.formats.virtual_port import SLOWEST
 from dbbstation.service.patience import RECONNECT_S, driver_patience
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
-from dbbstation.system.virtual_ports import is_virtual
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -39,12 +40,14 @@ _AUTO_PATIENCE_S = 60.0
 
 @made()
 def measure(
-    line: LineOptions,
+    line: OpenLine,
     noted: RecordingOptions,
     *,
-    plan: Annotated[Path, o.PLAN],
-    machine: Annotated[Path, o.MACHINE],
-    out: Annotated[Path, replace(o.OUT, kind="folder", metavar="SESSION")],
+    plan: Annotated[Path | None, o.PLAN] = None,
+    machine: Annotated[Path | None, o.MACHINE] = None,
+    out: Annotated[Path | None, replace(o.OUT, kind="folder", metavar="SESSION")] = None,
+    screen: Annotated[bool, Option("Print lines in place of a screen, as without a terminal.")] = True,
+    virtual: Annotated[bool, Option("Use a virtual machine and instrument, on the screen.")] = False,
     auto: Annotated[
         str | None,
         Option(
@@ -52,75 +55,79 @@ def measure(
             metavar="URL",
         ),
     ] = None,
-    time_scale: Annotated[float, Option(o.TIME_SCALE, least=0.01, most=200.0)] = 1.0,
+    time_scale: Annotated[float, Option(o.TIME_SCALE, least=SLOWEST, most=200.0)] = 1.0,
     rate_hz: RateHz = None,
     as_json: o.Json = False,
-) -> None:
+) -> int:
     r"""Measure a plan, test by test, into a session folder.
 
-    The command tells you which ball goes into which bore and how to tilt the tool. It waits for Enter, then for the
-    machine, and detects start and end of a circle in the readings. Every sample is on the disk within a second. Ctrl-C
-    stops the measurement; the same command continues it.
+    The screen shows what to do, the live reading, the live circle and the first figures. Without options it begins with
+    the existing sessions and the choices for a new one. The command waits for Enter, then for the machine, and detects
+    start and end of a circle in the readings. Every sample is on the disk within a second. Quitting or Ctrl-C loses no
+    data; the same command continues the session.
 
     \b
     Examples:
+      dbbstation measure                               choose on the screen what is measured
+      dbbstation measure --virtual                     try it without hardware
+      dbbstation measure --virtual --time-scale 10     the same, ten times faster
+      dbbstation measure --job monday-check.yaml       one job for an operator, by its file
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
       dbbstation measure ... --order drift --gate first   (heights mixed, the first test again at the end)
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `instrument emulate`)
     """
-    from dbbstation.files.formats.machine import read_machine
-    from dbbstation.files.formats.plan import read_inline_plan
-    from dbbstation.files.recordings.entries import ReadBy
+    asked = Asked(line, noted, plan, machine, out, rate_hz, time_scale)
+    if screen and auto is None and not as_json and at_a_terminal():
+        from dbbstation.cli.on_screen import on_screen
+
+        return on_screen(asked, virtual=virtual)
+    if virtual or asked.of_operator:
+        what = "--virtual" if virtual else "a job file"
+        raise click.UsageError(f"{what} needs the screen: a terminal, without --no-screen, --auto and --json")
+    asked.require()
+    _in_lines(asked, auto, as_json=as_json)
+    return 0
+
+
+def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.library import at_rate
     from dbbstation.instrument.stamps import MachineTime
-    from dbbstation.station.assembly import Job, assemble
+    from dbbstation.station.assembly import assemble
     from dbbstation.station.detector import Patience
-    from dbbstation.station.programs import load_programs
     from dbbstation.virtual.wire_clock import ScaledClock
 
-    nominal, whole = read_machine(machine), noted.in_force(read_inline_plan(plan))
-    chosen = line.protocol(bar_length_mm=noted.stated_length_mm())
-    protocol = at_rate(chosen, rate_hz)
+    job, protocol = asked.job()
+    line, time_scale, read_by = asked.line, asked.time_scale, asked.read_by(protocol)
     hands = None if auto is None else VirtualHands(auto)
     stands_s = -math.inf if hands is None else hands.stands_since_s()
     waits = math.isfinite(stands_s)
     scale = _WAITING_SCALE if waits else time_scale
-    clock = MachineTime(1.0 / protocol.fastest_hz(line.baud), stands_s) if waits else ScaledClock(scale)
-    job = Job(
-        machine=nominal,
-        plan=whole,
-        folder=out,
-        details=noted.details(protocol.length.stroke_mm),
-        programs={} if noted.programs is None else load_programs(noted.programs, whole.to_domain(), nominal),
+    job = replace(
+        job,
         patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
-        clock=clock,
+        clock=MachineTime(1.0 / protocol.fastest_hz(line.baud), stands_s) if waits else ScaledClock(scale),
         time_scale=scale,
-        rate_hz=protocol.fastest_hz(line.baud),
-        range_mm=protocol.length.range_mm,
-        model=noted.judging_model(),
         # A real machine neither has a control address of `instrument emulate` nor runs faster than it does.
-        instrument=ReadBy(
-            chosen.name,
-            line.profile or "",
-            f"{line.port}, in machine time" if waits else line.port,
-            virtual=auto is not None or time_scale != 1.0 or is_virtual(line.port),
+        instrument=replace(
+            read_by,
+            port=f"{line.port}, in machine time" if waits else line.port,
+            virtual=auto is not None or time_scale != 1.0 or read_by.virtual,
         ),
     )
-    job.check(str(plan))
-    say_sampling(whole.to_domain(), protocol, line.baud)
-    if nominal.control is not None:
-        echo(f"note: the control corrects by itself: {nominal.control.said}; the session notes it", err=True)
+    job.check(str(asked.plan))
+    say_sampling(job.plan.to_domain(), protocol, line.baud)
+    if job.machine.control is not None:
+        echo(f"note: the control corrects by itself: {job.machine.control.said}; the session notes it", err=True)
     if auto is None:  # a virtual machine has a bar of known length
-        noted.require_bar(job)
+        asked.noted.require_bar(job)
     with (
-        spying(noted.spy, protocol, line.port) as log,
+        spying(asked.noted.spy, protocol, line.port) as log,
         Instrument(
             protocol,
             line.port,
             baud=line.baud,
-            clock=clock,
+            clock=job.clock,
             log=log,
             reconnect_s=RECONNECT_S,
             **driver_patience(scale, waits=waits),

@@ -8,6 +8,7 @@ RENAMED = {
     "plot": "`circles --figure`",
     "ports": "`instrument ports`",
     "replay": "`instrument replay`",
+    "station": "`measure`",
     "study": "`python -m studies` in a checkout",
 }
 

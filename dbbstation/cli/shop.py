@@ -21,7 +21,7 @@ SETTINGS_OPTION = "settings"
 _SESSIONS = ("sessions", "folder", "folders", "a")
 """Names of the arguments that are sessions."""
 
-_MADE = frozenset({"measure", "station", "simulate"})
+_MADE = frozenset({"measure", "simulate"})
 """Commands whose `--out` is a session."""
 
 _OF_FOLDERS = frozenset({"fleet", "history"})

@@ -18,21 +18,17 @@ MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"
 MODEL = shipped_folder("fixtures") / "models" / "small.yaml"
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 
-NO_JSON = {"station": "draws a screen; `measure --json` does the same without one"}
-
 NO_FORCE = {
     "import": "makes a session; one that exists is never replaced, nor is a mapping",
     "demo": "makes a new folder with everything of one demonstration; recordings are never replaced",
     "measure": "continues the session in its folder; nothing recorded is replaced",
     "simulate": "makes a session; one that exists is never replaced",
-    "station": "continues the session in its folder, as measure does",
 }
 
 NO_TESTS = {
     "instrument emulate": "is told at its control address which test to run",
     "import": "takes the files that are given",
     "measure": "the operator skips tests with a key, and the session says which are missing",
-    "station": "as measure",
     "session list": "lists all",
     "session log": "lists all",
     "session rebuild": "writes the whole session file",
@@ -50,7 +46,7 @@ WRITES = {"out", "figure", "log"}
 TAKES_TESTS = {"sessions", "folder", "folders", "a", "plan", "plan_file", "session"}
 
 LACKING = {
-    "--json": (NO_JSON, bool, {"as_json"}),
+    "--json": ({}, bool, {"as_json"}),
     "--force": (NO_FORCE, lambda names: bool(names & WRITES), {"force"}),
     "--tests and --exclude": (NO_TESTS, lambda names: bool(names & TAKES_TESTS), {"tests", "exclude"}),
 }

@@ -91,7 +91,7 @@ def test_each_option_says_what_it_is_for(command):
 
 
 def test_results_have_a_json_form(command):
-    if command.name not in {"simulate", "demo", "station"}:  # these write recordings, tell a story, draw a screen
+    if command.name not in {"simulate", "demo"}:  # these write recordings, tell a story
         assert "--json" in {option for parameter in command.params for option in parameter.opts}
 
 

@@ -53,7 +53,7 @@ OF_FILES = {
 ELSEWHERE = {
     "bar --out", "demo --out", "import --out", "import --mapping", "jig holders --out", "jig sheet --out", "measure --out",
     "fleet --out", "fleet --table", "measure --spy", "control kinematics --out",
-    "control parameters --out", "instrument monitor --log", "instrument monitor --spy", "program --out", "simulate --out", "station --out", "station --spy",
+    "control parameters --out", "instrument monitor --log", "instrument monitor --spy", "program --out", "simulate --out",
 }  # fmt: skip
 """Options whose command needs an instrument or long work before it writes, or that make a session: what they write through is
 tested by itself."""

@@ -68,4 +68,4 @@ async def still_svg(
             app.call_after_refresh(laid_out.set)
             await laid_out.wait()
             app.draw()
-        return app.export_screenshot(title="dbbstation station")
+        return app.export_screenshot(title="dbbstation measure")

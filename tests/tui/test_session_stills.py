@@ -241,7 +241,7 @@ async def still(make: Callable[[StationApp], RowScreen | None], size: tuple[int,
         for _ in range(4):
             await pilot.pause()
             app.look()
-        return app.export_screenshot(title="dbbstation station")
+        return app.export_screenshot(title="dbbstation measure")
 
 
 @pytest.fixture(autouse=True)

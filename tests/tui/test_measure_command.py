@@ -1,4 +1,4 @@
-"""`dbbstation station` on the command line, and who loads Textual."""
+"""`dbbstation measure` with its screen, and who loads Textual."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from dbbstation.cli import COMMANDS
-from dbbstation.cli.station import station
+from dbbstation.cli.measure import measure
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.service.order import Gate, Order, ordered
@@ -23,39 +23,59 @@ REAL = ["--plan", "p.yaml", "--machine", "m.yaml", "--instrument", "heidenhain-n
 
 
 def run(*arguments: str) -> None:
-    CliRunner().invoke(station, arguments, catch_exceptions=False, standalone_mode=False)
+    CliRunner().invoke(measure, arguments, catch_exceptions=False, standalone_mode=False)
 
 
 def refusal(*arguments: str) -> str:
-    result = CliRunner().invoke(station, arguments, standalone_mode=False)
+    result = CliRunner().invoke(measure, arguments, standalone_mode=False)
     assert isinstance(result.exception, click.UsageError)
     return result.exception.format_message()
 
 
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.import_module("dbbstation.cli.measure"), "at_a_terminal", lambda: True)
+
+
 def test_help_has_examples() -> None:
-    text = CliRunner().invoke(station, ["--help"]).stdout
-    assert "dbbstation station --virtual" in text
+    text = CliRunner().invoke(measure, ["--help"]).stdout
+    assert "dbbstation measure --virtual" in text
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "the screen needs a terminal"),
-        (["--plan", "p.yaml"], "missing --machine, --instrument, --port, --out; or --virtual"),
+        (["--plan", "p.yaml"], "missing --machine, --instrument, --port, --out; --virtual on a terminal needs none"),
         (REAL[:-2], "missing --out"),
+        (["--plan", "p.yaml", "--no-screen"], "missing --machine, --instrument, --port, --out"),
+        (["--virtual", "--no-screen"], "--virtual needs the screen"),
+        (["--virtual", "--json"], "--virtual needs the screen"),
+        (["--job", "monday.yaml", "--no-screen"], "a job file needs the screen"),
+        (["--virtual", "--time-scale", "100"], "at most 50"),
         (["--virtual", "--port", "COM3"], "leave out --port"),
         (["--virtual", "--baud", "9600"], "leave out --port and --baud"),
         ([*REAL, "--time-scale", "5"], "--time-scale goes with --virtual"),
-        (["--virtual"], "the screen needs a terminal; `dbbstation measure` does the same without one"),
-        (REAL, "the screen needs a terminal"),
     ],
 )
+@pytest.mark.usefixtures("terminal")
 def test_refusals(arguments: list[str], says: str) -> None:
     assert says in refusal(*arguments)
 
 
-@pytest.mark.parametrize("name", sorted(set(COMMANDS) - {"station"}))
-def test_no_other_command_loads_the_screen(name: str) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "missing --plan, --machine, --instrument, --port, --out"),
+        (REAL[:-2], "missing --out"),
+        (["--virtual"], "--virtual needs the screen: a terminal"),
+    ],
+)
+def test_refusals_without_a_terminal(arguments: list[str], says: str) -> None:
+    assert says in refusal(*arguments)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_no_command_loads_the_screen_before_it_is_shown(name: str) -> None:
     code = (
         "import importlib, pkgutil, sys\n"
         "from dbbstation.cli import cli\n"
@@ -80,17 +100,12 @@ def test_what_runs_without_a_screen_never_loads_it() -> None:
     assert done.stderr == ""
 
 
-def test_the_help_of_the_station_does_not_load_the_screen_either() -> None:
-    code = "import sys; import dbbstation.cli.station; sys.exit('textual' in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
+@pytest.mark.usefixtures("terminal")
 def test_order_job_and_programs_reach_the_session_and_the_start_screen(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module = importlib.import_module("dbbstation.cli.station")
+    module = importlib.import_module("dbbstation.cli.on_screen")
     seen: list[Any] = []
-    monkeypatch.setattr(module, "_check_terminal", lambda: None)
     monkeypatch.setattr(module, "_run", lambda job, _open, _line: seen.append(job) or 0)
     monkeypatch.setattr(module, "_begin", lambda given, _limits, _model: seen.append(given) or 0)
     shipped = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"

@@ -1,1 +1,1 @@
-"""Error sources: one physical cause per file, and their contract."""
+"""Error sources, one physical cause per file, and their interface."""

@@ -1,4 +1,4 @@
-"""An error source's effect as C, for a kinematics inside a control."""
+"""Error sources as C code for a kinematics inside a control."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ if TYPE_CHECKING:
 class CForm:
     """Statements of C that add a source's effect at one pose.
 
-    They may use names of `control/kernel.c`: `at`, the struts as the source sees them in its model; `e`, the sum to add
-    to; `v`, the values; `EACH`, a loop over struts i. Thermometer k is `warmer[thermometer[k]]`, in kelvin above its
-    zero.
+    They may use names of `control/kernel.c`: `at`, the source's struts; `e`, the sum of effects; `v`, the values;
+    `EACH`, a loop over struts i. `warmer[thermometer[k]]` is thermometer k's excess over its zero [K].
 
     Attributes:
-        by_pose: False if it uses only lengths of `at`, so that the pose need not be solved for.
-        constants: further constants by name, a number or an array.
+        by_pose: False if it uses only lengths of `at`, so the pose need not be computed.
+        constants: further numbers or arrays by name.
         thermometers: columns without their unit.
     """
 
@@ -34,7 +33,7 @@ class CForm:
 
 
 def c_constant(name: str, value: ArrayLike) -> str:
-    """Return the definition of a number or an array, exact to the last bit."""
+    """Return the C definition of a number or an array, exact to the last bit."""
     array = np.asarray(value)
     kind = "int" if np.issubdtype(array.dtype, np.integer) else "double"
     shape = "".join(f"[{n}]" for n in array.shape)

@@ -1,8 +1,8 @@
-"""The contract of an error source.
+"""The interface of an error source.
 
-A machine model is nominal geometry plus error sources. A source gives its `effect` on a `Motion` and the derivative by
-its parameters. It uses readings only as places of the bar's encoder, and changes only struts, joints, tool tip, reading
-or motor current.
+A machine model is nominal geometry plus error sources. A source computes its `effect` on a `Motion` and the derivative
+by its parameters. Readings may only give the bar encoder's place. Effects change only struts, joints, tool tip, fixed
+ball, readings, loads or motor currents.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import Struts, inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the interface: sources import it from here
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 Worked = TypeVar("Worked")
 
 State = Any
-"""What a source remembers of the way so far, of any type that the source likes; never changed in place."""
+"""A source's memory of earlier rows, of any type; never changed in place."""
 
 
 class Owner(StrEnum):
-    """Owner of a source; only the machine's are predicted and compensated."""
+    """Owner of a source; only machine sources are predicted and compensated."""
 
     MACHINE = "machine"
     SESSION = "session"
@@ -49,7 +49,7 @@ class Owner(StrEnum):
 
 
 class Need(StrEnum):
-    """What a source needs beside the machine."""
+    """Inputs that a source needs besides the machine."""
 
     POSE = "pose"
     PATH = "path"
@@ -78,7 +78,7 @@ class Thermometer:
     """One thermometer over a session.
 
     Attributes:
-        degc: without quantisation, shape (q,).
+        degc: smoothed temperatures without quantisation, shape (q,).
     """
 
     time_s: Floats
@@ -89,20 +89,20 @@ class Thermometer:
 class Setup:
     """Set-up of a run: ball, mounting and bar with their uncertainties.
 
-    Runs that share a name share that error, over all sessions of a fit.
+    Runs with equal names share the error, over all sessions of a fit.
 
     Attributes:
         fixed_ball_mm: centre by CMM, machine frame, shape (3,).
         mounting_repeatability_mm: one standard deviation, common or per axis, shape (3,).
         ball_uncertainty_mm: of the CMM, one standard deviation per axis.
         bar_uncertainty_mm: of the calibrated length, one standard deviation; large without calibration.
-        bar_reads_long_mm: expected reading less true distance, included in predictions and never subtracted from readings.
+        bar_reads_long_mm: expected reading less true distance; added to predictions, never subtracted from readings.
         bar_length_mm: calibrated distance of the balls, or None.
-        place_known: False under the spindle, where `fixed_ball_mm` is the machine's commanded place.
+        place_known: False for a ball set up under the spindle, whose `fixed_ball_mm` is the commanded place.
         set_up_errors: micrometer readings, or None.
         plate: None for a ball in no bore.
-        start_uncertainty_deg: of the turn's begin, one standard deviation; zero with recorded angles.
-        moving_s: begin and end of all runs in order, on the clock of `Motion.time_s`; may be empty.
+        start_uncertainty_deg: standard uncertainty of the turn's start; zero with recorded angles.
+        moving_s: start and end of all runs in order, on the clock of `Motion.time_s`; may be empty.
         thermometers: over the session, by column without unit.
     """
 
@@ -127,23 +127,23 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class Motion(WithLogged):
-    """A commanded run in time order, with logged columns.
+    """Commands in time order, with logged columns.
 
-    Rows outside `kept` give sources their history and are not compared.
+    Rows outside `kept` build up the memory of sources and are not compared.
 
     Attributes:
         poses: commanded [X, Y, Z, A, B, C], shape (n, 6) [mm, deg].
-        is_path: rows are successive; otherwise poses without history.
-        straight: straight between rows, as a program; otherwise samples of a smooth path.
+        is_path: rows are successive; otherwise independent poses.
+        straight: linear between rows, as in a program; otherwise samples of a smooth path.
         time_s: since the session's first sample, shape (n,); None if unknown.
         logged: by column, shape (n,) each; see `temperature_degc` and `motor_current_a`.
-        load_n: axial forces of the motors, positive if the platform pulls, shape (n, 6); None: by the machine file's
+        load_n: axial forces of the motors, positive if the platform pulls, shape (n, 6); None for the machine file's
             weights at commanded poses.
         setup: None for unmeasured poses.
-        reading_mm: as place of the bar's encoder, shape (n,); None if unmeasured.
-        reading_is_measured: from an instrument with noise, not a model.
-        put_up: the machine standing while the ball was set at its tip, whose actual last place the ball has; None for a known
-            place.
+        reading_mm: place of the bar's encoder, shape (n,); None if unmeasured.
+        reading_is_measured: True for noisy readings, False for a model's.
+        put_up: resting motion during the set-up under the spindle; the ball is at the tip's actual last place. None for
+            a known place.
     """
 
     poses: Floats
@@ -171,24 +171,24 @@ class Motion(WithLogged):
         return self.once("struts", machine, lambda: inverse(machine.hexapod, self.frames(machine)))
 
     def once(self, what: str, machine: Machine | None, work: Callable[[], Worked]) -> Worked:
-        """Return what depends on the motion and a machine's joints, cached while in use."""
+        """Return a result that depends on motion and joints only, cached while in use."""
         joints, known = None if machine is None else machine.hexapod, self._known.get(what)
         if known is None or known[0] is not joints:
             known = self._known[what] = joints, work()
         return cast("Worked", known[1])
 
     def commanded(self, frames: Frames, machine: Machine) -> Motion:
-        """Return the motion with these frames."""
+        """Return the motion with other commanded frames."""
         motion = replace(self, poses=frames.to_poses(machine.hexapod.rotation))
         motion._known["frames"] = machine.hexapod, frames  # noqa: SLF001 - of the same class
         return motion
 
     def stretch(self, rows: slice) -> Motion:
-        """Return some rows in time order; all count."""
+        """Return some rows in time order, all of them kept."""
         return self._of_rows(lambda values, _: values[rows])
 
     def after(self, earlier: Motion) -> Motion:
-        """Return an earlier stretch with this one behind it; all rows count."""
+        """Return an earlier stretch followed by this one, all rows kept."""
         before = earlier._rows()
         return self._of_rows(lambda values, name: np.concatenate([before[name], values]))
 
@@ -203,7 +203,7 @@ class Motion(WithLogged):
 
     @cached_property
     def provides(self) -> frozenset[Need]:
-        """Return what sources may use of this motion."""
+        """Return the inputs that this motion provides."""
         given = {Need.POSE: True, Need.PATH: self.is_path, Need.TIME: self.time_s is not None}
         given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
         given[Need.READING] = self.reading_mm is not None
@@ -211,25 +211,25 @@ class Motion(WithLogged):
 
 
 BEYOND_PLAUSIBLE = 100.0
-"""A value of so many usual sizes is none that a machine has: 20 mm on a strut's reference length, 5 mm on a joint, 0.3 mm
-of play. With ten, joints that a kinematic fit pulls for gravity's sake (up to 0.27 mm of 0.05 mm) come near; a slip of
-the pen by a decimal point more, or millimetres for micrometres, is beyond it wherever a value is of its usual size."""
+"""Largest value in usual sizes: 20 mm on a strut's reference length, 5 mm on a joint, 0.3 mm of play. A kinematic fit
+without gravity shifts joints up to 0.27 mm, with a usual size of 0.05 mm, so ten would be too few. Usual values with a
+misplaced decimal point, or in micrometres for millimetres, mostly exceed the limit."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a source.
+    """One parameter of a source.
 
     Attributes:
         name: unique in the source, ending with its unit.
-        plausible: usual size, one standard deviation, in that unit.
+        plausible: usual size, one standard deviation, in the unit.
         grid: search values of a nonlinear parameter (time constant, phase); empty for an amplitude.
         tolerance: the machine file's standard deviation, used as prior; or None.
-        newer: True if older models lack it, where it is zero.
+        newer: True if older models lack it; there it is zero.
         positive: cannot be negative; a significant negative fit indicates another cause.
         listed: only values of `grid` are possible.
-        part: amplitudes with one label may be wrong alone; empty for a strut's and for sources without parts.
-        strut: 1 to 6; its amplitudes may be wrong alone. None for none.
+        part: label of amplitudes that may be wrong alone; empty for struts and for sources without parts.
+        strut: 1 to 6; one strut's amplitudes may be wrong alone. None if of no strut.
     """
 
     name: str
@@ -246,22 +246,22 @@ class Parameter:
 
     @property
     def alone_with(self) -> str:
-        """Return the part that may be wrong alone: by strut, or as stated."""
+        """Return the label of the part that may be wrong alone."""
         return self.part or (f"strut {self.strut}" if self.strut else "")
 
     @property
     def largest(self) -> float:
-        """Return the greatest size allowed in a model, in the parameter's unit."""
+        """Return the largest value allowed in a model, in the parameter's unit."""
         return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.grid), 0.0)
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Return limits of a nonlinear parameter in a fit; None for amplitudes.
+        """Return a nonlinear parameter's limits in a fit; infinite for amplitudes and listed values.
 
         Positive parameters may exceed their grid by one step (ratio), others by its length.
         """
         grid = sorted(self.grid)
-        if len(grid) < 2 or self.listed:  # noqa: PLR2004 - a step has two ends
+        if len(grid) < 2 or self.listed:  # noqa: PLR2004 - a step needs two values
             return -math.inf, math.inf
         if grid[0] > 0.0:
             return grid[0] ** 2 / grid[1], grid[-1] ** 2 / grid[-2]
@@ -271,7 +271,7 @@ class Parameter:
 def of_each_strut(
     name: str, unit: str, plausible: float, meaning: str, *, positive: bool = False
 ) -> tuple[Parameter, ...]:
-    """Return one amplitude for each strut."""
+    """Return one amplitude parameter per strut."""
     return tuple(
         Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k)
         for k in range(1, STRUTS + 1)
@@ -282,10 +282,10 @@ def of_each_strut(
 class Effect:
     """A source's effect, or its derivative by parameters (last axis of length p).
 
-    Arrays without sample axis hold for every sample. None is no effect.
+    Arrays without sample axis apply to every sample. None means no effect.
 
     Attributes:
-        strut_mm: actual minus believed length, shape (6,) or (n, 6).
+        strut_mm: actual minus assumed length, shape (6,) or (n, 6).
         base_joint_mm: actual minus nominal, machine frame, shape (6, 3) or (n, 6, 3).
         platform_joint_mm: actual minus nominal, platform frame, same shapes.
         tool_tip_mm: shift of tip and ball, platform frame, (3,) or (n, 3).
@@ -305,7 +305,7 @@ class Effect:
     current_a: Floats | None = None
 
     def __add__(self, other: Effect) -> Effect:
-        """Return the sum of both effects."""
+        """Return the sum of two effects."""
         return Effect(**{f.name: _sum(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)})
 
     def rows(self, rows: slice) -> Effect:
@@ -321,7 +321,7 @@ class Effect:
         return self.rows(slice(-count, None) if count else slice(0, 0))
 
     def times(self, values: Floats) -> Effect:
-        """Return the effect of values, shape (p,), if `self` is a derivative."""
+        """Return the effect of values, shape (p,), from a derivative."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         return Effect(**{name: None if array is None else array @ values for name, array in arrays.items()})
 
@@ -346,59 +346,56 @@ def _sum(a: Floats | None, b: Floats | None) -> Floats | None:
 
 
 SMOOTH_MM = math.inf
-"""`detail_mm` of a source that follows the geometry: it bends over hundreds of millimetres."""
+"""`detail_mm` of a source that varies over hundreds of millimetres."""
 
 UNSTATED_MM = 4.0
-"""What is taken for a source that says nothing of its detail: shorter than the lead of most screws, and a program is
-still not longer than one point for each millimetre."""
+"""Default `detail_mm`: shorter than most screw leads, but still at most one point per millimetre of a program."""
 
 
 class ErrorSource(ABC):
-    """One physical cause, without state.
+    """One physical cause; instances have no state.
 
-    Session and mounting sources have values per sharing set, named by `shared_by`.
+    Sources of sessions and mountings have separate values for each group of runs, named by `shared_by`.
     """
 
     name: ClassVar[str]
     belongs_to: ClassVar[Owner]
     needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
     varies_with: ClassVar[str] = ""
-    """Variable that organises its misfit, as printed beside a place; empty where there is no single one."""
+    """Variable on which its error depends, as printed; empty if there is no single one."""
     form_uncertainty: ClassVar[float] = 0.05
-    """Standard deviation, as a share of the effect, by which real machines depart from the formula: what is smaller beside this
-    cause may be a matter of its formula. Few hundredths for geometry and springs, a tenth to three tenths for friction, play
-    and warm-ups; each source says why."""
+    """Relative standard deviation of real machines from the formula; smaller residuals may be formula errors. Few
+    hundredths for geometry and springs, 0.1 to 0.3 for friction, play and warm-up; each source states the reason."""
     weighs: ClassVar[bool] = False
-    """True for what weights do, which a model asks for at the poses and joints that the machine really has."""
+    """True for effects of weights, which a model computes at actual poses and joints."""
     loads_struts: ClassVar[bool] = False
-    """True for a weight: it has a `load_n`, and its `strut_mm` is counted with the compliance of the machine given."""
+    """True for a weight with a `load_n`, whose `strut_mm` uses the given machine's compliance."""
     weighs_struts: ClassVar[bool] = False
-    """True where its `load_n` is that of the strut weights, which the machine file may state as well."""
+    """True if its `load_n` comes from strut weights, which the machine file may also state."""
     detail_mm: ClassVar[float] = UNSTATED_MM
-    """Shortest way of a strut or of the tool tip over which the effect goes up and down once [mm]: so closely it is looked
-    at where programs are compensated. `SMOOTH_MM` for one that follows the geometry, or does nothing finer than that but
-    where a strut turns round: no chord fits a step, however closely it is looked at. Where it hangs on machine or values,
-    see `shortest_period_mm`."""
+    """Shortest travel of a strut or the tool tip over which the effect varies up and down once [mm]; it determines the
+    sampling of compensated programs. `SMOOTH_MM` if the effect varies like the geometry except for steps at reversals,
+    which no sampling resolves. See `shortest_period_mm` if it depends on machine or values."""
     texts: ClassVar[Texts]
     looks_ahead: ClassVar[bool] = False
-    """True where the effect in a row hangs on rows that follow, as of a reading that is taken late. Such a source is asked
-    for whole runs only, and one of the machine's is not compensated: a program is compensated from its beginning on."""
+    """True if a row's effect depends on later rows, as for delayed readings. Such a source receives whole runs only. A
+    machine source of this kind cannot be compensated, because programs are compensated from the beginning."""
     builds_up: ClassVar[bool] = False
-    """True where errors build up over many rows, as those of a lag. To find a command for them by trial would take a trial
-    for each row; such a source answers `undone`."""
+    """True if errors accumulate over many rows, as by a lag. A search for commands would need a trial per row, so the
+    source implements `undone`."""
     happens_once: ClassVar[bool] = False
-    """True for what acts once in a session, such as a bump: no other tests can show it again, and it is never called identified."""
+    """True for a single event in a session, such as a bump: other tests cannot show it again, so it is never called identified."""
     concealed_times: ClassVar[float] = 1.0
-    """Times the plausible size that directions may have which a fit holds, because no recording shows them."""
+    """Prior standard deviation of undetermined directions, in plausible sizes."""
     candidate: ClassVar[bool] = True
-    """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
+    """Whether a diagnosis may name it; False for a mere description of an error."""
 
     @abstractmethod
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         """Return the parameters in the order of `values`.
 
         Raises:
-            ModelError: the machine file lacks what the source needs, such as masses.
+            ModelError: the machine file lacks an input, such as masses.
         """
 
     @abstractmethod
@@ -410,18 +407,18 @@ class ErrorSource(ABC):
         """Return the derivative of `effect`, with a last axis of length p."""
 
     def begin(self, motion: Motion, machine: Machine, values: Floats) -> State:  # noqa: ARG002
-        """Return the memory before a run's first row.
+        """Return the memory at the start of a run.
 
         Args:
-            motion: the run or its beginning, which shows the struts' directions.
+            motion: the run or its beginning, which gives the struts' directions.
         """
         return None
 
     def advance(self, motion: Motion, machine: Machine, values: Floats, state: State) -> tuple[Effect, State]:
-        """Return the effect along one stretch, and the memory behind it.
+        """Return the effect along one stretch, and the memory after it.
 
-        Stretches of any cut give the effects of the whole. Sources without history have no state. A path source that does
-        not define its memory receives all rows each time, slowly.
+        Any division into stretches gives equal effects. Sources without memory have no state. A path source that does
+        not define its memory receives all earlier rows each time, which is slow.
 
         Args:
             motion: in time order; `straight`.
@@ -440,18 +437,18 @@ class ErrorSource(ABC):
         values: Floats,
         state: State,
     ) -> Floats:
-        """Return strut errors along a stretch with given reached lengths, shape (n, 6) [mm].
+        """Return strut errors along a stretch that reaches given lengths, shape (n, 6) [mm].
 
-        For sources that `builds_up`.
+        Only for sources with `builds_up`.
 
         Args:
             motion: a command near the solution.
-            reached: the stretch as this source alone should reach it.
+            reached: the stretch that the machine should reach with this source alone.
         """
         raise NotImplementedError
 
     def shared_by(self, motion: Motion) -> str:
-        """Return the name of the set of values that this motion uses."""
+        """Return the name of the group of runs that share this motion's values."""
         if self.belongs_to is Owner.MACHINE or motion.setup is None:
             return ""
         if self.belongs_to is Owner.SESSION:
@@ -459,34 +456,34 @@ class ErrorSource(ABC):
         return motion.setup.mounting if self.belongs_to is Owner.MOUNTING else motion.setup.instrument
 
     def shortest_period_mm(self, machine: Machine, values: Floats) -> float:  # noqa: ARG002
-        """Return the shortest way of one wave of these values [mm]: by default `detail_mm`."""
+        """Return the shortest travel of one wave for these values [mm]; by default `detail_mm`."""
         return self.detail_mm
 
     def stated_mm(self, motion: Motion) -> Floats | None:  # noqa: ARG002
-        """Return stated standard deviations of this motion's set, shape (p,), or None.
+        """Return the stated standard deviations for this motion, shape (p,), or None.
 
-        A stated size makes a random effect.
+        Stated sizes make the source a random effect.
         """
         return None
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:  # noqa: ARG002
-        """Return whether runs can show the effect at shape parameters, shape (s,).
+        """Return whether runs determine the effect at shape parameters, shape (s,).
 
-        False if they show only an ambiguous part.
+        False if they show only an ambiguous part of it.
         """
         return True
 
     def by_temperature(self) -> ErrorSource | None:
-        """Return the cause's form by logged temperatures, or None.
+        """Return the cause's law by logged temperatures, or None.
 
-        It has the same name; a model has one of both.
+        Both laws have one name; a model contains only one.
         """
         return None
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
-        """Return other laws of the cause: by default that by temperatures.
+        """Return other laws of the cause; by default the law by temperatures.
 
-        Each has the same name and owner and another `law`; a model has one of them.
+        All laws have the same name and owner; a model contains only one.
         """
         logged = self.by_temperature()
         return () if logged is None else (logged,)
@@ -497,33 +494,33 @@ class ErrorSource(ABC):
         values: Floats,  # noqa: ARG002
         thermometers: Collection[str] = (),  # noqa: ARG002
     ) -> CForm | None:
-        """Return the effect as C for a kinematics inside a control; None, the default, if there is none.
+        """Return the effect as C for a kinematics inside a control; by default None.
 
         Args:
             machine: with the identified compliance.
             thermometers: columns without unit that the control has.
 
         Raises:
-            ModelError: the machine file or the control lacks what it needs.
+            ModelError: machine file or control lack an input.
         """
         return None
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        """Return changes of the effect by other constants of the law, with a last axis.
+        """Return changes of the effect by other constants of the law, stacked along a last axis.
 
-        For machine-dependent constants that recordings seldom show: a diagnosis allows each change in a share up to about
-        one. None by default.
+        They describe constants of the machine that recordings seldom determine. A diagnosis allows each change with a
+        factor up to about one. None by default.
         """
         return Effect()
 
     @property
     def law(self) -> str:
-        """Return the name of the law: by default what it varies with."""
+        """Return the law's name; by default `varies_with`."""
         return self.varies_with
 
     @property
     def simpler_law(self) -> str | None:
-        """Return the law that this one contains, or None."""
+        """Return the law of which this is an extension, or None."""
         return None
 
     @property
@@ -537,7 +534,7 @@ class ErrorSource(ABC):
         return Need.CURRENT in self.needs
 
     def found_compliance(self, machine: Machine, values: Floats) -> Compliance | None:  # noqa: ARG002
-        """Return the struts' compliance by these values, scaled by the first, or None."""
+        """Return the struts' compliance for these values, scaled by the first, or None."""
         return None
 
     def current_per_load(
@@ -546,14 +543,14 @@ class ErrorSource(ABC):
         machine: Machine,  # noqa: ARG002
         values: Floats,  # noqa: ARG002
     ) -> Floats | None:
-        """Return the derivative of `current_a` by the motor's load, shape (n, 6) [A/N]; None: independent."""
+        """Return the derivative of `current_a` by the motor's load, shape (n, 6) [A/N]; None if independent."""
         return None
 
     def require(self, motion: Motion) -> None:
-        """Refuse a motion that lacks needed data.
+        """Refuse a motion that lacks inputs.
 
         Raises:
-            ModelError: names source and missing data.
+            ModelError: names source and missing inputs.
         """
         missing = self.needs - motion.provides
         if missing:
@@ -574,23 +571,23 @@ _HOW_TO_GIVE = {
 
 
 class SourceWithHistory(ErrorSource):
-    """A source with defined memory: `begin` and `advance`."""
+    """A source that defines its memory by `begin` and `advance`."""
 
     @abstractmethod
     def begin(self, motion: Motion, machine: Machine, values: Floats) -> State:
-        """Return the memory before a run's first row."""
+        """Return the memory at the start of a run."""
 
     @abstractmethod
     def advance(self, motion: Motion, machine: Machine, values: Floats, state: State) -> tuple[Effect, State]:
-        """Return the effect along one stretch, and the memory behind it."""
+        """Return the effect along one stretch, and the memory after it."""
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return the effect of the run as one stretch."""
+        """Return the effect of a whole run."""
         return self.advance(motion, machine, values, self.begin(motion, machine, values))[0]
 
 
 class LinearSource(ErrorSource):
-    """A source proportional to its parameters: only the derivative is written."""
+    """A source with an effect proportional to its parameters; subclasses define only the derivative."""
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         """Return derivative times values."""
@@ -599,10 +596,10 @@ class LinearSource(ErrorSource):
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A source with values for one of its sets, as a model carries it.
+    """A source with values for one group of runs, as in a model.
 
     Attributes:
-        shared: name of the set; empty for the machine's.
+        shared: name of the group; empty for the machine.
     """
 
     source: ErrorSource
@@ -611,5 +608,5 @@ class Fitted:
 
     @classmethod
     def zero(cls, source: ErrorSource, machine: Machine, shared: str = "") -> Self:
-        """Return the source with zero values."""
+        """Return a source with zero values."""
         return cls(source, np.zeros(len(source.parameters(machine))), shared)

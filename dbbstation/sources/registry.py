@@ -1,4 +1,4 @@
-"""Every error source by name, of the package and installed packages."""
+"""Find error sources by name, in this package and installed packages."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
 GROUP = "dbbstation.sources"
-"""Entry points of this group name classes that derive from `ErrorSource`."""
+"""Group of entry points that name subclasses of `ErrorSource`."""
 
 HOW_TO_ADD = "one of your own is given with --source-files FILE.py, or its package installed"
-"""What an unknown name may lack."""
+"""Hint for unknown names."""
 
 
 def known_sources() -> Mapping[str, ErrorSource]:
@@ -41,11 +41,11 @@ def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
     return found, whose
 
 
-_BASE: type[ErrorSource] = ErrorSource  # type: ignore[type-abstract]  # what derives from it is made
+_BASE: type[ErrorSource] = ErrorSource  # type: ignore[type-abstract] # subclasses are instantiated
 
 
 def known_with(others: Sequence[FoundClass[ErrorSource]], faults: list[Problem]) -> Mapping[str, ErrorSource]:
-    """Return all sources with those of further classes; their faults go to `faults`.
+    """Return all known sources plus sources of further classes, whose faults are appended to `faults`.
 
     Raises:
         InputError: as `known_sources`.
@@ -89,7 +89,7 @@ def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None 
     """Return sources by name.
 
     Args:
-        known: None: those of package and installed packages.
+        known: None for the sources of this package and installed packages.
 
     Raises:
         ModelError: an unknown name.

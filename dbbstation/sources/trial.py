@@ -1,4 +1,4 @@
-"""The trial of a foreign error source against the contract, before its use."""
+"""Test a foreign error source against the interface before its use."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ if TYPE_CHECKING:
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 STEP = 1e-4
-"""Share of a plausible size by which a derivative is checked."""
+"""Step of the numerical derivative, relative to plausible sizes."""
 
 AGREES = 1e-2
-"""Share of its greatest value by which a derivative may differ from what the effect does."""
+"""Largest difference between derivative and numerical derivative, relative to the greatest value."""
 
 SAME = 1e-9
-"""Share of the greatest effect by which two stretches may differ from the whole: rounding."""
+"""Largest rounding difference between two stretches and the whole, relative to the greatest effect."""
 
 MOST_KINKS = 0.05
-"""Share of samples where it may differ more: play has kinks, where no derivative holds."""
+"""Largest share of samples with more difference: at kinks, as of play, no derivative exists."""
 
 FEWEST_LETTERS, FEWEST_WORDS = 10, 4
-"""Of a text, and of what a parameter means: less says nothing to whoever finds it in a verdict."""
+"""Fewest letters of a text and words of a parameter's meaning that help a reader of a verdict."""
 
 OTHER_SIZE = 0.7
-"""Share of the plausible sizes, amplitudes negative, at which a derivative is looked at a second time."""
+"""Second point of the derivative test, relative to plausible sizes; amplitudes are negative."""
 
 ROUNDED = 8.0 * float(np.finfo(np.float64).eps)
-"""Rounding of a difference of two effects, over their size: a few operations, each to half of eps."""
+"""Relative rounding of a difference of two effects: a few operations with half of eps each."""
 
 
 @cache
@@ -84,7 +84,7 @@ def trial_machine() -> Machine:
 
 
 def undeclared(kind: type[ErrorSource]) -> list[str]:
-    """Return what a class lacks before it can be made; may be empty."""
+    """Return the faults that prevent a class from being instantiated; may be empty."""
     faults = []
     missing = sorted(getattr(kind, "__abstractmethods__", ()))
     if missing:
@@ -121,21 +121,21 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
     """Return faults of a source's parameters, effect and derivative; may be empty.
 
     Args:
-        machine: tried on a circle about mid-travel.
+        machine: for the test on a circle about mid-travel.
 
     Raises:
-        Exception: of the source's code.
+        Exception: raised by the source's code.
     """
     try:
         parameters = source.parameters(machine)
     except ModelError:
-        return []  # This machine lacks what it needs; its own users have it.
+        return []  # This machine lacks an input; machines of the source's users have it.
     faults = _of_parameters(parameters)
     if faults:
         return faults
     motion = _circle(machine)
     values = np.array([p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in parameters])
-    # A derivative comes first: where only that is written, the effect is made of it.
+    # The derivative is tested first, because a linear source computes its effect from it.
     for what, ask, last in (("derivative", source.derivative, (len(parameters),)), ("effect", source.effect, ())):
         answer: object = ask(motion, machine, values)
         if not isinstance(answer, Effect):
@@ -234,7 +234,7 @@ def _of_proportion(
     parameters: Sequence[Parameter],
     values: Floats,
 ) -> list[str]:
-    """Check that zero gives nothing, and doubled amplitudes doubled effects, unless paths are remembered."""
+    """Check that zero values have zero effect, and, for sources without memory, that doubled amplitudes double the effect."""
     zero = np.zeros(len(parameters))
     nothing = source.effect(motion, machine, zero)
     slopes = source.derivative(motion, machine, zero)
@@ -326,7 +326,7 @@ def _of_derivative(
             elif exact is not None:
                 slope = (ends[0] - ends[1]) / (2.0 * step[k])
                 scale = max(float(np.abs(exact[..., k]).max()), float(np.abs(slope).max()))
-                # Effects that hardly change leave the digits in which a computer rounds them.
+                # The difference of nearly equal effects is mostly rounding.
                 rounding = ROUNDED * float(max(np.abs(end).max() for end in ends)) / step[k]
                 off = np.abs(slope - exact[..., k]) > AGREES * scale + rounding
                 if off.mean() > MOST_KINKS:

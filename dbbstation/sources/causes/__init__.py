@@ -1,1 +1,1 @@
-"""Physical causes of error, one file each, found by the registry."""
+"""Physical causes of error, one file each; the registry imports them."""

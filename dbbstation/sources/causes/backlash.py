@@ -33,13 +33,12 @@ MM_PER_UM = 1e-3
 
 
 class Backlash(SourceWithHistory):
-    """After a reversal a strut lags by its play until the drive has travelled through it.
+    """After a reversal a strut stands still until the drive has crossed its play.
 
-    With commanded travel x and play w, y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while
-    growing and +w/2 while shrinking. Wind-up against friction reaches the same limits over a longer travel: `_WoundUp`.
+    For commanded travel x and play w, y_k is y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while
+    growing, +w/2 while shrinking. Wind-up against friction reaches these limits over a longer travel (`_WoundUp`).
 
-    A run begins in motion. Negative w is an overshoot, with the sign of |w|'s effect inverted, so that a fit may pass
-    zero.
+    A run begins in motion. Negative w inverts the effect of |w|, so a fit may pass zero.
     """
 
     name = "backlash"
@@ -88,18 +87,18 @@ class Backlash(SourceWithHistory):
 
 
 LENGTHS_MM = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
-"""Lengths of a wind-up worth trying: presliding of screws, seals and joints takes some hundredths to some tenths of a millimetre [mm]."""
+"""Tried lengths of wind-up [mm]: presliding of screws, seals and joints takes some hundredths to tenths of a millimetre."""
 
 AHEAD = 1.1
-"""Least length of a wind-up, of its width. With 1 a strut that turns round would not move at first, with less it would move against its
-drive; with 1.1 both grow together, so that the error can be compensated."""
+"""Least length of a wind-up over its width. With 1 a reversing strut would first stand still; with less it would move
+against its drive. With 1.1 it follows the drive, so the error can be compensated."""
 
 
 class _WoundUp(SourceWithHistory):
-    """Drive friction reverses over a travel: presliding by the law of Dahl.
+    """Drive friction reverses over a travel: presliding by Dahl's law.
 
-    With direction s, travel x and width w the error is w z, dz = -(s/2 + z) |dx| / l. After a reversal of a fully wound
-    strut it is -s w (1/2 - exp(-d / l)), d the travel since.
+    For direction s, travel x and width w the error is w z with dz = -(s/2 + z) |dx| / l. At the distance d after a
+    reversal of a fully wound strut it is -s w (1/2 - exp(-d / l)).
     """
 
     name, belongs_to, texts = Backlash.name, Backlash.belongs_to, Backlash.texts

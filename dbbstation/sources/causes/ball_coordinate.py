@@ -1,4 +1,4 @@
-"""One entry of the CMM sheet."""
+"""Wrong CMM coordinates of a ball."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 class BallCoordinate(LinearSource):
-    """A ball's CMM coordinates are off, for all its mountings.
+    """A ball's CMM coordinates are wrong in all its mountings.
 
-    The CMM's uncertainty and a wrong entry are the same cause.
+    CMM uncertainty and typing errors are one cause.
     """
 
     name = "ball-coordinate"

@@ -15,15 +15,16 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 ORDERS = (2, 3, 4, 5)
-"""Undulations per turn: what balls of standard grades show. Order 0 is the bar's length and order 1 the ball's place."""
+"""Undulations per turn of balls of standard grades. Order 0 is the bar's length, order 1 the ball's place."""
 
 
 class BallForm(LinearSource):
-    """The fixed ball rises by h under the bar and lowers the reading by h.
+    """Where the fixed ball's surface is higher by h, the reading is lower by h.
 
-    With n from fixed to moving ball, h = Re sum (a_k - i b_k) (n_x + i n_y)^k, k = 2 ... 5, sectoral spherical
-    harmonics: a_k cos k theta + b_k sin k theta for a level bar. The ball's mark gives the same orientation in every
-    mounting. Level circles also touch the moving ball from all sides, so both balls' forms are found together.
+    With direction n from fixed to moving ball, h = Re sum (a_k - i b_k) (n_x + i n_y)^k, k = 2 ... 5, sectoral
+    spherical harmonics. For a level bar this is a_k cos k theta + b_k sin k theta. A mark on the ball fixes its
+    orientation in every mounting. Level circles also touch the moving ball all round, so the result contains both
+    balls' forms.
     """
 
     name = "ball-form"

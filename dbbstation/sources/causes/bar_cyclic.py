@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 SIGNAL_PERIODS_UM = (2.0, 4.0, 8.0, 10.0, 16.0, 20.0, 40.0, 80.0, 100.0, 200.0)
-"""Signal periods of length encoders that are sold [µm]."""
+"""Signal periods of commercial length encoders [µm]."""
 
 
 class BarCyclic(ErrorSource):
-    """The reading has a wave along the encoder: a sin(2 pi x / p) + b cos(2 pi x / p), p its signal period.
+    """The reading has a wave along the encoder, a sin(2 pi x / p) + b cos(2 pi x / p), with signal period p.
 
-    x is the reading less the run's whole millimetre. Phase and amplitude belong to the session, since the display is set
-    anew. A run that sweeps less than a period shows an ambiguous part of a wave.
+    x is the reading less the run's whole millimetre. Each session has its own phase and amplitude, because the display
+    is reset. A run that sweeps less than a period is ambiguous.
     """
 
     name = "bar-cyclic"
@@ -77,7 +77,7 @@ class BarCyclic(ErrorSource):
     def _waves(self, motion: Motion, period_um: float) -> tuple[Floats, Floats]:
         """Return sine and cosine, shape (n, 2) [1], and the phase's derivative by the period, shape (n,) [rad/µm].
 
-        A period of at most zero makes no wave.
+        A period of zero or less gives no wave.
         """
         self.require(motion)
         reading = reading_without_noise_mm(motion)

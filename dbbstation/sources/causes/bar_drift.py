@@ -1,4 +1,4 @@
-"""The bar warms up while it measures."""
+"""Warm-up of the bar during measurement."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MM_PER_UM = 1e-3
 class BarDrift(ErrorSource):
     """The bar's reading drifts with its body's temperature, by `warm_up`.
 
-    It is zero at the session's first sample; what was off then is the bar's offset. Sessions with the same bar share it.
+    The drift is zero at the session's first sample, because earlier errors are the bar's offset. Sessions with one bar share its values.
     """
 
     name = "bar-drift"
@@ -60,7 +60,7 @@ class BarDrift(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=BarDrift):
-    """The growth of a part that is heated through another part."""
+    """Growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=BarDrift):

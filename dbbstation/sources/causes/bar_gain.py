@@ -1,4 +1,4 @@
-"""The scale of the bar's encoder."""
+"""Scale error of the bar's encoder."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MM_PER_UM = 1e-3
 
 
 class BarGain(LinearSource):
-    """The reading errs in proportion to the encoder's way from the calibrated length.
+    """The reading error is proportional to the encoder's travel from the calibrated length.
 
-    The way is the commanded one. To first order r = n + J p, n commanded less calibrated length, p geometric errors.
-    Scaled by 1 + s it is n + J p' + s n with p' = (1 + s) p, indistinguishable geometric errors. What remains is s n,
-    visible only if one bar measures circles of several sizes.
+    The commanded travel is used. To first order r = n + J p, with commanded less calibrated length n and geometric
+    errors p. Scaled by 1 + s this is n + J p' + s n, and p' = (1 + s) p cannot be distinguished from p. Only s n
+    remains, visible if one bar measures circles of several sizes.
     """
 
     name = "bar-gain"
@@ -46,7 +46,7 @@ class BarGain(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        """Return the commanded way; zero without calibrated length or ball place."""
+        """Return the commanded travel; zero without calibrated length or ball place."""
         setup = motion.setup
         if setup is None or setup.bar_length_mm is None or not setup.place_known:
             return Effect(reading_mm=np.zeros((len(motion), 1)))

@@ -1,4 +1,4 @@
-"""A bent scale of the bar's encoder."""
+"""Quadratic scale error of the bar's encoder."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 REACH_MM = 0.1
-"""Way of the encoder for which its errors are stated [mm]."""
+"""Encoder travel at which the error is stated [mm]."""
 
 
 class BarScale(LinearSource):
-    """The reading errs by the square of its way from the nominal length.
+    """The reading error grows with the square of the travel from the nominal length.
 
-    The way counts from the run's whole millimetre. A proportional part is `bar-gain`. Deviations of a few micrometres
-    show no bow.
+    Travel counts from the run's whole millimetre. The proportional part is `bar-gain`. Deviations of a few micrometres
+    do not show the curvature.
     """
 
     name = "bar-scale"

@@ -1,4 +1,4 @@
-"""Yielding of the frame under the base joints."""
+"""Compliance of the frame under the base joints."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 class BaseCompliance(LinearSource):
     """Each base joint yields under its strut's force: dQ_i = C F_i, C = diag(h, h, v).
 
-    The frame is a spring under each joint, isotropic horizontally, without coupling. Equal compliances equal softer
-    struts of any length; only their difference, or gravity's growth with length, separates frame and struts.
+    The frame is an uncoupled spring under each joint, isotropic horizontally. Equal compliances act like softer struts.
+    Only unequal compliances, or gravity's growth with length, separate frame and struts.
     """
 
     name = "base-compliance"
     belongs_to = Owner.MACHINE
-    form_uncertainty = 0.05  # a frame is no spring at one point
+    form_uncertainty = 0.05  # a frame deforms as a whole
     detail_mm = SMOOTH_MM
     weighs = True
     texts = Texts(

@@ -1,4 +1,4 @@
-"""Places of the base joints."""
+"""Position errors of the base joints."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 USUAL_MM = 0.2
-"""Usual error of a joint's coordinate where the machine file states no tolerance [mm]."""
+"""Usual error of a joint's coordinate if the machine file states no tolerance [mm]."""
 
 
 class BaseJoints(LinearSource):
-    """Base joints are off their design places: dQ_i, i = 1 to 6, three coordinates each [CAL II-C 2]."""
+    """Base joints are displaced from design by dQ_i, i = 1 to 6, three coordinates each [CAL II-C 2]."""
 
     name = "base-joints"
     belongs_to = Owner.MACHINE

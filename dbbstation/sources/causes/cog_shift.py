@@ -1,4 +1,4 @@
-"""The platform's centre of gravity."""
+"""Displacement of the platform's centre of gravity."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 
 class CogShift(LinearSource):
-    """The weight acts beside the stated point: a moment d x W more [GRAV 3.2].
+    """The weight acts at a distance d from the stated point, which adds the moment d x W [GRAV 3.2].
 
-    d is fixed in the platform. [GRAV] takes only its axial part, from motor currents. Circles show it times the struts'
-    compliance, of the source gravity, else of the machine file.
+    d is fixed in the platform. [GRAV] identifies only its axial part, from motor currents. Circles show d times the
+    struts' compliance: from the source gravity, else from the machine file.
     """
 
     name = "cog-shift"
@@ -65,7 +65,7 @@ class CogShift(LinearSource):
         weight_n = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2
         struts = motion.struts(machine)
         x, y, _ = (motion.frames(machine).rotation @ shift_mm).T
-        moment = weight_n * np.column_stack([-y, x, np.zeros(len(x))])  # of a weight that points down
+        moment = weight_n * np.column_stack([-y, x, np.zeros(len(x))])  # of a downward weight
         tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
         return stretch_mm(struts, strut_compliance(machine), tension), tension
 

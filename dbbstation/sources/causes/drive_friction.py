@@ -1,4 +1,4 @@
-"""Between a strut's load and its motor's current."""
+"""Relation of a strut's load to its motor's current."""
 
 from __future__ import annotations
 
@@ -19,40 +19,40 @@ if TYPE_CHECKING:
 N_PER_KN = 1e3
 
 TURNED_OVER_MM = 0.05
-"""Travel after a reversal within which friction turns over. Rolling contacts and seals, which are elastic before they
-slide, need some micrometres, belts and couplings some tens [Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30
+"""Travel after a reversal until friction has reversed. Rolling contacts and seals are elastic before they slide and
+need some micrometres, belts and couplings some tens [Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30
 (1994) 1083, sec. 2.2, and the wind-up of the drive on top]."""
 
 PER_MOTOR = ("gain_a_kn", "coulomb_n", "viscous_ns_mm", "load_share_n_kn", "asymmetry_n")
-"""Parameters of a motor, in their order."""
+"""Kinds of a motor's parameters, in order."""
 
 
 def of_motor(motor: int, kind: str) -> str:
-    """Return the parameter name of one motor, 1 to 6; `kind` is of `PER_MOTOR`."""
+    """Return a motor's parameter name; motors count from 1 to 6, `kind` is one of `PER_MOTOR`."""
     return f"motor_{motor}_{kind}"
 
 
 MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in range(1, STRUTS + 1)}
-"""Motor, 1 to 6, by the name of its gain."""
+"""Motors, 1 to 6, by the name of their gain."""
 
 
 class DriveFriction(ErrorSource):
-    """A motor's current balances its load; drive friction helps or opposes it.
+    """A motor's current balances load and drive friction.
 
-    I = k (F - s (F_c + e |F|) - b v - a): load F, positive if the platform pulls; speed v and direction s, positive
-    while growing. e is the screw's loss, 1 / efficiency - 1 against the load and 1 - efficiency with it. a is half the
-    asymmetry of Coulomb friction, or an offset of the current's zero.
+    I = k (F - s (F_c + e |F|) - b v - a). The load F is positive if the platform pulls, speed v and direction s if the
+    strut grows. The screw's loss e is 1 / efficiency - 1 against the load and 1 - efficiency with it. a is half the
+    asymmetry of Coulomb friction, or a zero offset of the current.
 
-    The load follows from the machine file's weights, the centre of gravity and struts' weights at the actual pose. Only
-    the product of gain and weight is determined; the weight is taken as stated. After a reversal friction changes sign
-    linearly within TURNED_OVER_MM, where readings are unusable. Bars and poses do not depend on this source.
+    The load follows from stated weights and the centre of gravity at the actual pose. Currents determine only gain
+    times weight, so the stated weight is assumed. After a reversal friction changes sign linearly over TURNED_OVER_MM;
+    readings there are unusable. Bars and poses do not depend on this source.
     """
 
     name = "drive-friction"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME, Need.CURRENT})
-    looks_ahead = True  # speeds are differences to the rows before and behind
+    looks_ahead = True  # speeds are differences to the previous and next row
     varies_with = "strut-speed-sign"
     form_uncertainty = 0.2  # friction differs along the screw and with temperature
     texts = Texts(
@@ -116,7 +116,7 @@ class DriveFriction(ErrorSource):
 
 
 def directions(length_mm: Floats) -> Floats:
-    """Return the direction of friction, from -1 (shrinking) to 1 (growing), shape (n, 6).
+    """Return the direction of friction, -1 (shrinking) to 1 (growing), shape (n, 6).
 
     Args:
         length_mm: driven, in time order, shape (n, 6).
@@ -128,7 +128,7 @@ def directions(length_mm: Floats) -> Floats:
 def driven_directions(motion: Motion, machine: Machine) -> Floats:
     """Return the direction of friction along a motion, shape (n, 6).
 
-    Readings between -1 and 1, within TURNED_OVER_MM of a reversal, show no friction.
+    Readings with values between -1 and 1, within TURNED_OVER_MM of a reversal, cannot be used.
     """
     return directions(motion.struts(machine).length_mm)
 

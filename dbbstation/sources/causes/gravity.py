@@ -1,4 +1,4 @@
-"""Struts stretched and compressed by the platform's weight."""
+"""Strut elongation under the platform's weight."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ PER_KN = 1e-3
 class Gravity(LinearSource):
     """Struts change length under the platform's weight: dL_i = c(L_i) T_i [GRAV eq 1, 6, 7, 8].
 
-    Tensions T follow from equilibrium at the given pose and joints. The actual ones differ by parts in a thousand, near
-    loose poses (A = -25 degrees, Y = 100 mm) by parts in a hundred. Tensions are signed.
+    Signed tensions T follow from equilibrium at the given pose and joints. Actual joints and pose change them by parts
+    in a thousand, near loose poses (A = -25 degrees, Y = 100 mm) by parts in a hundred.
 
-    c(L) = c_1000 (1 - s + s L / 1000 mm) is common to all struts; the share s is the machine file's. Circles show only
-    compliance times weight: 1 % more weight reads as 1 % softer struts. Joints and bearings that stiffen under load: `_Contacts`.
+    c(L) = c_1000 (1 - s + s L / 1000 mm) is common to all struts, with the share s of the machine file. Circles show
+    only compliance times weight: 1 % more weight equals 1 % softer struts. `_Contacts` describes joints and bearings
+    that stiffen under load.
     """
 
     name = "gravity"
@@ -37,7 +38,7 @@ class Gravity(LinearSource):
     detail_mm = SMOOTH_MM
     weighs = True
     varies_with = "strut-force"
-    form_uncertainty = 0.02  # struts are nearly linear springs
+    form_uncertainty = 0.02  # struts are almost linear springs
     texts = Texts(
         what="The struts are elastic: the platform's weight pulls some of them longer and pushes others shorter.",
         shows="Circles with the spindle tilted, above all off the centre, are deformed by tens of µm, the same in both "
@@ -79,9 +80,9 @@ EACH e->strut[i] += stretch(at, i, 1e-6 * v[0]) * t[i];"""
 
 
 class _Contacts(Gravity):
-    """Struts on contacts whose compliance falls by h per e-fold of load: c(L) T - h T ln(hypot(T, 0.1 kN) / 1 kN).
+    """Contacts lose the compliance h per e-fold of load: c(L) T - h T ln(hypot(T, 0.1 kN) / 1 kN).
 
-    Rollers behave so; a power law of the load nearly so.
+    Rollers follow this law; a power law of the load is similar.
     """
 
     @property
@@ -101,7 +102,7 @@ class _Contacts(Gravity):
         return Effect(strut_mm=np.stack([stretch, -MM_PER_N * tension * _folds(tension, ACROSS_N)], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return effects of another load across, and of contacts softer where the strut is longer."""
+        """Return effects of another transverse load, and of contact compliance that grows with strut length."""
         tension, stretch = _stretched(motion, machine)
         own, folds = MM_PER_N * tension, _folds(tension, ACROSS_N)
         changes = [own * (folds - _folds(tension, 3.0 * ACROSS_N)), (own - stretch) * folds]
@@ -117,10 +118,10 @@ def _folds(tension: Floats, across_n: float) -> Floats:
 
 
 ACROSS_N = 100.0
-"""Load across a strut on its joints: half of its own weight where that is 20 kg [N]."""
+"""Transverse load on a strut's joints: half the weight of a strut of 20 kg [N]."""
 
 STIFFENING = 0.1
-"""Usual size of what an e-fold of load takes off a compliance: rollers deflect by about the 0.9th power of their load."""
+"""Usual relative loss of compliance per e-fold of load: rollers deflect by about the 0.9th power of load."""
 
 
 def _stretched(motion: Motion, machine: Machine) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""A bump of the jig plate during the session."""
+"""A displacement of the jig plate during the session."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 MOST_RUNS = 120
-"""Runs of a session after which a bump is looked for."""
+"""Most runs of a session after which a displacement is tried."""
 
 
 class JigBump(ErrorSource):
-    """From one run on, all balls on the table are shifted alike.
+    """From one run on, all balls on the table have the same shift.
 
-    One bump is more probable than many badly seated balls in one direction. A bump between a test's two directions is
-    visible at once.
+    One bump is more probable than many balls badly seated in one direction. Between both directions of a test it is
+    directly visible.
     """
 
     name = "jig-bump"

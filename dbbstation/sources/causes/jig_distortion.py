@@ -1,4 +1,4 @@
-"""The jig plate bent by its clamps."""
+"""Distortion of the jig plate by clamping."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 REACH_MM = 100.0
-"""Distance from the plate's origin at which the height of a bent plate is stated [mm]."""
+"""Distance from the plate's origin at which heights are stated [mm]."""
 
 
 class JigDistortion(ErrorSource):
-    """Clamping changes the plate's height by w(x, y), and holders lean with its slope.
+    """Clamping changes the plate's height by w(x, y), and holders tilt with its slope.
 
-    With r = 100 mm, w = a (x² + y²)/r² + b (x² - y²)/r² + c 2 x y/r²: constant curvatures, as moments along the edges
-    make (Kirchhoff). A ball h above the middle surface moves by (-h dw/dx, -h dw/dy, w), h = z + d with d the depth of
-    that surface below the jig's origin. Zero at the origin, since the plate's shift and tilt define the machine's
-    coordinates. x and y are the machine's axes.
+    With r = 100 mm, w = a (x² + y²)/r² + b (x² - y²)/r² + c 2 x y/r². These constant curvatures follow from moments
+    along the edges (Kirchhoff); x and y are machine axes. A ball at height h above the middle surface moves by (-h
+    dw/dx, -h dw/dy, w); h = z + d, and d is this surface's depth below the jig's origin. Shift and tilt at the origin
+    are zero, because the plate defines the machine's coordinates.
     """
 
     name = "jig-distortion"
@@ -66,9 +66,9 @@ class JigDistortion(ErrorSource):
 
 
 def _bends(motion: Motion) -> tuple[Floats, Floats]:
-    """Return the ball's shift per bow, saddle and twist at d = 0, and per mm of depth.
+    """Return the ball's shift by bow, saddle and twist: at d = 0, and its change per mm of depth.
 
-    Shapes (3, 3), [mm/µm] and [1/µm]; zero for a ball in no bore.
+    Both have shape (3, 3), in [mm/µm] and [1/µm]; a ball in no bore gives zero.
     """
     setup = motion.setup
     if setup is None or setup.plate is None:

@@ -1,4 +1,4 @@
-"""The jig plate warmer than on the CMM."""
+"""Thermal growth of the jig plate since the CMM."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ MM_PER_UM_M = 1e-6
 
 
 class JigThermal(LinearSource):
-    """Balls move from the plate's origin as it grows: db = a T (b - b_0).
+    """Balls move away from the plate's origin: db = a T (b - b_0).
 
-    T is the warming since the CMM, a the jig file's expansion, for plate and holders alike. Another centre of growth only
-    shifts the plate, which defines the coordinates. A ball in no bore stays.
+    T is the warming since the CMM, a the jig file's expansion coefficient of plate and holders. Another centre of
+    growth only shifts the plate, which defines the coordinates. A ball in no bore stays.
     """
 
     name = "jig-thermal"
     belongs_to = Owner.SESSION
-    form_uncertainty = 0.03  # plate and holders are of one material and warm alike to a few per cent
+    form_uncertainty = 0.03  # temperatures of plate and holders agree within a few per cent
     texts = Texts(
         what="The jig plate is warmer or colder on the machine than it was on the coordinate measuring machine: its "
         "balls stand further apart and higher, or closer and lower.",
@@ -47,6 +47,6 @@ class JigThermal(LinearSource):
         if setup is None or setup.plate is None:
             return Effect(fixed_ball_mm=np.zeros((3, 1)))
         stated = setup.plate.expansion_um_m_k
-        # Plate, holders and risers are of steel where the jig file does not say otherwise.
+        # Plate, holders and risers are steel unless the jig file states otherwise.
         per_kelvin = MM_PER_UM_M * (STEEL_UM_M_K if stated is None else stated)
         return Effect(fixed_ball_mm=per_kelvin * (setup.fixed_ball_mm - setup.plate.origin_mm)[:, None])

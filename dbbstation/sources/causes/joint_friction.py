@@ -29,27 +29,27 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Parameter
 
 LEVER_MM = 1000.0
-"""Arm at which the parameter is a force: 1 N there is a moment of 1 N m."""
+"""Lever arm that converts the parameter to a moment: 1 N at 1000 mm is 1 N m."""
 
 WIND_UP_RAD = 1e-4
-"""Angle over which a joint's friction changes from one direction to the other: that of preloaded rolling bearings, a
-tenth of a millimetre at the platform. The step of friction spreads over about two degrees of a circle of 150 mm."""
+"""Angle over which a joint's friction reverses, for preloaded rolling bearings: a tenth of a millimetre at the
+platform, about two degrees of a circle of 150 mm."""
 
 OTHERS = 3.0
-"""Times as large or small an angle, which joints of another make and preload may have. Of the readings of [CAL Table II] with joints of the
-tests' virtual machine that wind up over 40, 160 and 600 µrad at most 16, 16 and 18 % are left; 16, 16 and 22 % with 1.5 times, 16, 16 and 16 % with 6 times."""
+"""Factor by which this angle may differ for joints of another make and preload. For joints of the tests' virtual
+machine that wind up over 40, 160 and 600 µrad, at most 16, 16 and 18 % of the effect on [CAL Table II] remain; 16, 16
+and 22 % with a factor of 1.5, 16, 16 and 16 % with 6."""
 
 
 class JointFriction(SourceWithHistory):
-    """A base joint resists turning, so its strut drags the platform and all six struts stretch.
+    """Friction in a base joint makes its strut pull on the platform, which stretches all six struts.
 
-    A universal joint has e1, fixed in the base, level and square to base joint - platform joint in the middle, and e2
-    square to e1 and strut. The moment about an axis is M z_a, z from -1 (growing angle) to +1 over a small wind-up (stop
-    operator). By virtual work f = M (z_1 dq_1/dp + z_2 dq_2/dp), p the platform joint, q the angles. Tensions follow from
-    J^T T = [sum f, sum (R P) x f], lengths from the machine file's compliance; circles show only friction times
-    compliance.
+    A universal joint has two axes. e1 is fixed in the base, level, and perpendicular to the strut at mid-travel; e2 is
+    perpendicular to e1 and strut. The moment about an axis is M z, with z from -1 (growing angle) to +1 over a small
+    wind-up (stop operator). By virtual work f = M (z_1 dq_1/dp + z_2 dq_2/dp) for platform joint p and angles q.
+    Tensions follow from J^T T = [sum f, sum (R P) x f]. Circles show only friction times the machine file's compliance.
 
-    Platform joints turn by nearly the same angles, so their friction is found with the base joints'.
+    Platform joints rotate by nearly equal angles, so the result includes their friction.
     """
 
     name = "joint-friction"
@@ -87,9 +87,9 @@ class JointFriction(SourceWithHistory):
         return Effect(strut_mm=stretch_mm(struts, strut_compliance(machine), tension)), behind
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return effects of the outer axis alone, of either axis as the strut leans over, and of other wind-up angles.
+        """Return effects of the outer axis alone, of each axis varying with inclination, and of other wind-up angles.
 
-        Bearings differ, and their load changes with inclination. Wind-up is visible only where a joint hardly swings.
+        Bearings differ, and their load changes with inclination. Wind-up shows only at small swings.
         """
         struts, axes = motion.struts(machine), outer_axes(machine.hexapod)
         joints = joint_angles(struts, axes)
@@ -124,7 +124,7 @@ class JointFriction(SourceWithHistory):
 def outer_axes(hexapod: Hexapod) -> Floats:
     """Return the base-fixed axes of base joints, unit vectors, machine frame, shape (6, 3)."""
     across = hexapod.platform_joints_mm[:, :2] - hexapod.base_joints_mm[:, :2]
-    across[np.linalg.norm(across, axis=1) == 0.0] = [0.0, 1.0]  # a strut that is plumb there: any level axis is as good
+    across[np.linalg.norm(across, axis=1) == 0.0] = [0.0, 1.0]  # a vertical strut may have any level axis
     axes = np.column_stack([-across[:, 1], across[:, 0], np.zeros(STRUTS)])
     unit: Floats = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     return unit
@@ -132,7 +132,7 @@ def outer_axes(hexapod: Hexapod) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class JointAngles:
-    """Angles of base joints, and forces of moments about their axes.
+    """Angles of base joints, and their derivatives by the platform joints' places.
 
     Attributes:
         angle_rad: outer axes of six joints, then inner ones, shape (n, 12).
@@ -149,10 +149,11 @@ def joint_angles(struts: Struts, axes: Floats) -> JointAngles:
     unit = struts.unit
     aside = np.einsum("nij,ij->ni", unit, axes)  # sine of the second angle
     round_axis = np.cross(axes, unit)
-    # The strut's part square to e1 turns about e1 by q1, which is counted from straight down: no strut points up.
+    # The strut's component perpendicular to e1 rotates about e1 by q1, counted from vertically down: no strut points
+    # up.
     level = np.cross(axes, np.array([0.0, 0.0, -1.0]))
     first = np.arctan2(np.einsum("nij,ij->ni", unit, level), -unit[:, :, 2])
-    part = 1.0 - aside**2  # square of that part
+    part = 1.0 - aside**2  # square of this component
     length = struts.length_mm[:, :, None]
     return JointAngles(
         np.hstack([first, np.arcsin(aside)]),
@@ -165,7 +166,7 @@ def friction_drag(struts: Struts, axes: Floats, state: PlayState | None = None) 
     """Return forces on platform joints for 1 N m of friction about each base axis, (n, 6, 3) [N].
 
     Returns:
-        The forces, and the state behind the last row.
+        The forces, and the state after the last row.
     """
     joints = joint_angles(struts, axes)
     acting, behind = resistance(joints.angle_rad, leaning(joints.angle_rad) if state is None else state)
@@ -174,7 +175,7 @@ def friction_drag(struts: Struts, axes: Floats, state: PlayState | None = None) 
 
 
 def drags(joints: JointAngles, acting: Floats) -> tuple[Floats, Floats]:
-    """Return forces on platform joints for acting shares of 1 N m, (n, 6, 3) [N]."""
+    """Return forces on platform joints for given shares of 1 N m, (n, 6, 3) [N]."""
     return (
         LEVER_MM * acting[:, :STRUTS, None] * joints.by_first,
         LEVER_MM * acting[:, STRUTS:, None] * joints.by_second,
@@ -182,13 +183,13 @@ def drags(joints: JointAngles, acting: Floats) -> tuple[Floats, Floats]:
 
 
 def resistance(angle_rad: Floats, state: PlayState, wind_up_rad: float = WIND_UP_RAD) -> tuple[Floats, PlayState]:
-    """Return the acting share of friction against motion, -1 to 1, shape (n, m).
+    """Return the share of friction that opposes motion, -1 to 1, shape (n, m).
 
     Args:
         angle_rad: in time order, shape (n, m).
 
     Returns:
-        The shares, and the state behind the last row.
+        The shares, and the state after the last row.
     """
     lag, _, behind = followed(angle_rad, np.full(angle_rad.shape[1], wind_up_rad), state)
     return 2.0 * lag / wind_up_rad, behind

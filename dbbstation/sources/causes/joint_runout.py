@@ -1,4 +1,4 @@
-"""Joints that are not points."""
+"""Joints whose axes do not meet in a point."""
 
 from __future__ import annotations
 
@@ -27,25 +27,26 @@ USUAL_UM = 20.0
 
 
 class JointRunout(LinearSource):
-    """The axes of a joint do not meet, or its ball is not round: the strut's length changes as the joint swings.
+    """If a joint's axes do not meet, or its ball is not round, the strut's length changes as the joint swings.
 
-    The second axis of a universal joint passes the first at distance e, towards the strut. Swung by beta about the
-    second axis, the strut reaches e cos(beta) beyond the first, which the controller takes as its end: dL = e
-    (cos(beta) - 1) = -e/2 sin²(beta) for small angles. sin(beta) = u a, with strut direction u and first axis a. An
-    offset fixed in the strut is a length error.
+    The second axis of a universal joint passes the first at the distance e, towards the strut. The controller assumes
+    the strut's end on the first axis. For a swing beta about the second axis, dL = e (cos(beta) - 1), about -e/2
+    sin²(beta), with sin(beta) = u a, strut direction u and first axis a. An offset fixed in the strut is a length
+    error.
 
-    The axes' directions need not be known. d is the strut's direction in base or platform, minus that at mid-travel,
-    along v (in the strut's vertical plane) and h (level), both across the strut there:
+    The axes' directions need not be known. d is the strut's direction in base or platform minus its direction at
+    mid-travel. Its components along v (in the strut's vertical plane) and h (level), both perpendicular to the strut
+    there, give:
 
     dL = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h).
 
-    This holds to second order for a universal joint whose first axis a is across the strut there (e_vv = e a_v² and so
-    on), and for an oval ball, whose radius is another quadratic form of the direction: three numbers for each of twelve
-    joints.
+    To second order this holds for a universal joint whose first axis a is perpendicular to the strut there (e_vv = e
+    a_v² and so on). It also holds for an oval ball, whose radius is a quadratic form of the direction. Each of twelve
+    joints has three numbers.
 
-    If the strut's end is offset across the strut and turns about the first axis like a crank, dL = f_v d_v + f_h d_h,
-    equal to a displaced joint. In the base this belongs to `base-joints`. In the platform it needs two more numbers per
-    strut, which tests hardly separate from `platform-joints`.
+    If the strut's end is offset transversely and rotates about the first axis like a crank, dL = f_v d_v + f_h d_h,
+    like a displaced joint. In the base this is `base-joints`. In the platform it needs two more numbers per strut,
+    which tests hardly separate from `platform-joints`.
     """
 
     name = "joint-runout"
@@ -118,7 +119,7 @@ class JointRunout(LinearSource):
 
 
 def _per_offset(motion: Motion, machine: Machine) -> Floats:
-    """Return each strut's length change per own offset, in parameter order, shape (n, 6, 8) [1]."""
+    """Return each strut's length change per offset of its joints, in parameter order, shape (n, 6, 8) [1]."""
     frames = motion.frames(machine)
     unit, rest = motion.struts(machine).unit, inverse(machine.hexapod, middle(machine)).unit[0]
     across = _across(rest)
@@ -128,10 +129,10 @@ def _per_offset(motion: Motion, machine: Machine) -> Floats:
 
 
 def _across(rest: Floats) -> Floats:
-    """Return directions v and h across `rest`, shape (6, 3); shape (6, 2, 3) [1]."""
+    """Return directions v and h perpendicular to `rest`, shape (6, 3); shape (6, 2, 3) [1]."""
     level = np.cross(rest, [0.0, 0.0, 1.0])
     size = np.linalg.norm(level, axis=1, keepdims=True)
-    # A strut that hangs plumb has no vertical plane of its own: take that of X.
+    # For a vertical strut the vertical plane is undefined: use the plane of X.
     level = np.where(size > 1e-9, level / np.maximum(size, 1e-9), [0.0, -1.0, 0.0])  # noqa: PLR2004
     return np.stack([np.cross(level, rest), level], axis=1)
 

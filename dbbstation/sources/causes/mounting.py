@@ -1,4 +1,4 @@
-"""The position of a holder in one mounting."""
+"""Position error of a holder in one mounting."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 class Mounting(LinearSource):
-    """The ball is displaced differently in each mounting [CAL III-B].
+    """The ball has another displacement in each mounting [CAL III-B].
 
-    Usual scatter and a bad mounting are one cause of different size.
+    Usual scatter and a bad mounting differ only in size.
     """
 
     name = "mounting"

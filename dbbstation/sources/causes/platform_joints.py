@@ -1,4 +1,4 @@
-"""Places of the platform joints."""
+"""Position errors of the platform joints."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 class PlatformJoints(LinearSource):
-    """Platform joints are off their design places: dP_i, i = 1 to 6, three coordinates each.
+    """Platform joints are displaced from design by dP_i, i = 1 to 6, three coordinates each.
 
-    [CAL II-C] omits them: with lengths and base joints fitted, upright circles show nothing of them, tilted ones only the
-    rotation of the shift relative to a base joint's.
+    [CAL II-C] omits them. If lengths and base joints are fitted, upright circles do not show them. Tilted circles show
+    only the rotation of a shift relative to a base joint's shift.
     """
 
     name = "platform-joints"

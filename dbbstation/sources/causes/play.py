@@ -1,4 +1,4 @@
-"""Play of strut drives that the load closes."""
+"""Play of strut drives under load."""
 
 from __future__ import annotations
 
@@ -41,21 +41,21 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 FRICTION_N = (0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
-"""Frictions worth trying, from none to more than a strut carries in upright circles [N]."""
+"""Tried friction forces, from zero to more than a strut's load in upright circles [N]."""
 
 SHAKING_N = (25.0, 50.0, 100.0, 200.0, 400.0)
-"""Shaking forces worth trying, from a twentieth of what a strut carries to as much as that [N]."""
+"""Tried shaking forces, from a twentieth of a strut's load to the whole load [N]."""
 
 
 class Play(SourceWithHistory):
-    """The load closes a strut's play; it lags only where friction exceeds the load.
+    """The load holds a strut at one end of its play; only friction above the load makes it lag.
 
-    With play w, tension T and friction R behind the play: pulled by more than R, the strut is longer by w/2; pushed by
-    more, shorter by w/2, and reversals have no effect. For |T| < R it is `backlash`. Tensions are nominal at commanded
+    The play is w, the tension T, the friction behind the play R. For T > R the strut is longer by w/2, for T < -R
+    shorter by w/2, and reversals have no effect. For |T| < R the law is `backlash`. Tensions are nominal at commanded
     poses, with the machine file's weights.
 
-    A run begins in motion. Negative w is the mirror image. The friction is searched among stated values, because the
-    error changes with it only at single samples.
+    A run begins in motion. Negative w inverts the effect. The friction is searched on a grid, because it changes the
+    error only at single samples.
     """
 
     name = "play"
@@ -113,10 +113,10 @@ class Play(SourceWithHistory):
 
 
 class _Shaken(ErrorSource):
-    """Play of a strut that its drive shakes: it crosses gradually while the load changes from pull to push.
+    """The drive shakes the strut, which crosses its play gradually while the load changes from pull to push.
 
-    The strut's force is the load's T plus Gaussian shaking with standard deviation N. The strut is at either end of its
-    play as the sum pulls or pushes; on average it is longer by w/2 erf(T / (sqrt(2) N)).
+    The strut's force is T plus Gaussian shaking of standard deviation N. Its sign gives the end of the play, so the
+    mean extension is w/2 erf(T / (sqrt(2) N)).
     """
 
     name, belongs_to, texts = Play.name, Play.belongs_to, Play.texts
@@ -160,7 +160,7 @@ EACH e->strut[i] += 0.5e-3 * v[i] * erf((t[i] - moving * at->unit[i][2]) / sprea
 
 
 LEAST_N = 1.0
-"""Shaking force below which the play is crossed at once, for any load that a sample has [N]."""
+"""Least shaking force; below it the play is crossed abruptly [N]."""
 
 
 def _spread_n(values: Floats) -> float:
@@ -168,7 +168,7 @@ def _spread_n(values: Floats) -> float:
 
 
 def _tensions(motion: Motion, machine: Machine) -> Floats:
-    """Return forces on the drives, positive if the load pulls, shape (n, 6) [N]."""
+    """Return the drives' loads, positive if they pull, shape (n, 6) [N]."""
     masses = platform_masses(Play.name, machine)
     frames, struts = motion.frames(machine), motion.struts(machine)
     load = platform_weight(frames, masses)
@@ -187,7 +187,7 @@ def settled(
     """Follow each column through its play.
 
     Returns:
-        Error y - x and its derivative by the width, shapes (n, m), and the state behind the last row.
+        Error y - x and its derivative by the width, shapes (n, m), and the state after the last row.
     """
     place, by_width = np.empty_like(tension), np.empty_like(tension)
     at, side = state.place.copy(), state.side.copy()

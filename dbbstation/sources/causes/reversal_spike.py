@@ -1,4 +1,4 @@
-"""Struts that stick at reversal."""
+"""Sticking of struts at reversal."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 DECAY_S = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
-"""Times that a position loop may need [s]."""
+"""Tried time constants of the position loop [s]."""
 
 DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.0005, 0.8, 12))
-"""Decay lengths worth trying: spikes that fade in 0.05 to 0.5 s, on circles of 100 to 150 mm at 500 to 2500 mm/min [mm]."""
+"""Tried decay lengths [mm]: spikes that decay in 0.05 to 0.5 s, on circles of 100 to 150 mm at 500 to 2500 mm/min."""
 
 
 RISE = 1.1
-"""Multiple of its height over which a spike rises. A strut that sticks would have 1. With 2 a spike that rises at once, 2 to 8 µm high, was found a third too small or, in two of
-seven sessions, not at all; with 1.2 and 1.1 it was found in all of them."""
+"""Travel over which a spike rises, over its height; 1 is full sticking. With 2, abrupt spikes of 2 to 8 µm were
+estimated a third too small, or missed in two of seven sessions; with 1.2 and 1.1 all were detected."""
 
 
 class ReversalSpike(ErrorSource):
-    """A reversing strut sticks and is drawn back: -s a (1 - exp(-d / c|a|)) exp(-sqrt(d / l)).
+    """A reversing strut sticks, and the position loop corrects it: -s a (1 - exp(-d / c|a|)) exp(-sqrt(d / l)).
 
-    d is the way since the turning point, s the new sign. The position loop compensates friction with exp(-t / T), t the
-    time since then: `_InTime`. With d = A t^2 / 2 that is exp(-sqrt(d / l)), l = A T^2 / 2, which needs no clock. At
-    another feed l changes with the square of the feed, and between turning points with the acceleration A.
+    d is the travel since the turning point, s the new direction. The position loop reduces the error as exp(-t / T) at
+    the time t since then (`_InTime`). For d = A t^2 / 2 this is exp(-sqrt(d / l)) with l = A T^2 / 2, which needs no
+    clock. l changes with the square of the feed, and with the acceleration A at the turning point.
 
-    The rise limits the lag to the drive's motion: c = 1 is full sticking. With c = `RISE` the sum of travel and error
-    grows and can be compensated. At a = 0 the error is proportional to a.
+    The rise limits the lag to the drive's motion; c = 1 is full sticking. With c = `RISE` the sum of travel and error
+    is monotonic and can be compensated. Near a = 0 the error is proportional to a.
 
-    A run has no spike before its first turning point. A straight path turns at the outermost row, a smooth one between
-    rows (`laws.turning`). A remaining spike fades over c|a| at the next turn. Returns of less than a micrometre do not
-    count.
+    A run has no spike before its first turning point. A straight path reverses at its extreme row, a smooth path
+    between rows (`laws.turning`). The remainder of a spike decays over c|a| after the next reversal. Reversals of less
+    than a micrometre do not count.
     """
 
     name = "reversal-spike"
@@ -79,7 +79,7 @@ class ReversalSpike(ErrorSource):
     )
 
     _power = 0.5
-    """Of what the spike fades with, relative to its constant."""
+    """Exponent of the decay variable over its constant."""
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
         return (_InTime(),)
@@ -89,8 +89,8 @@ class ReversalSpike(ErrorSource):
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
         return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
 
-    def _clock(self, motion: Motion) -> Floats | None:  # noqa: ARG002 - of a law without a clock
-        """Return times of rows, shape (n,); None where a spike fades over its way."""
+    def _clock(self, motion: Motion) -> Floats | None:  # noqa: ARG002 - this law needs no clock
+        """Return times of rows, shape (n,); None if spikes decay with travel."""
         return None
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
@@ -110,7 +110,7 @@ class ReversalSpike(ErrorSource):
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return changes if each strut fades by a constant of its own, and if all are behind at once, as one that is torn off."""
+        """Return changes by a separate decay constant of each strut, and by an abrupt spike without rise."""
         since, fading = self._since(motion, machine)
         height, constant = _sizes(values)
         at_once = -np.sign(since) * height * np.exp(-((fading / constant) ** self._power))
@@ -128,7 +128,7 @@ class ReversalSpike(ErrorSource):
         return spike, by_height, by_length
 
     def _since(self, motion: Motion, machine: Machine) -> tuple[Floats, Floats]:
-        """Return the signed way since turning of a smooth path [mm], and what spikes fade with, shapes (n, 6)."""
+        """Return the signed travel since reversal on a smooth path [mm], and the decay variable, shapes (n, 6)."""
         travel, clock = motion.struts(machine).length_mm, self._clock(motion)
         since, late = since_turning_in_time(travel, np.zeros(len(travel)) if clock is None else clock)
         return since, np.abs(since) if clock is None else late
@@ -145,7 +145,7 @@ class ReversalSpike(ErrorSource):
 
 
 class _InTime(ReversalSpike):
-    """The same, faded in time: -s a (1 - exp(-d / c|a|)) exp(-t / T), alike at all turning points and feeds."""
+    """Spikes that decay in time: -s a (1 - exp(-d / c|a|)) exp(-t / T), equal at all turning points and feeds."""
 
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
     _power = 1.0
@@ -170,15 +170,15 @@ def _sizes(values: Floats) -> tuple[Floats, float]:
 
 
 FULLY = 750.0
-"""Multiple of its own length after which an exponential is zero in double precision."""
+"""Decay lengths after which an exponential is zero in double precision."""
 
 WAY, TURN, TURNED, OUTERMOST, LOW, HIGH, BACK, THEN, OUT_THEN = range(9)
-"""What is remembered of a strut: which way it goes (0 before that is known), where it last turned, whether it ever did, its
-outermost place since then, its range before the way is known, whether it has come back from its outermost place, and when it was
-where it turned, and there."""
+"""Memory of a strut: direction (0 if unknown), last turning point, whether it ever reversed, extreme place since then,
+range before the direction is known, whether it has left the extreme place, and the times of the turning point and the
+extreme place."""
 
 LEFT, LEFT_SINCE = 9, 12
-"""Error at the turning point, and at the outermost place where it comes back; behind each its derivatives by height and
+"""Indices of the errors at the turning point and at the extreme place, each followed by its derivatives by height and
 decay length."""
 
 _NOTHING = np.zeros((STRUTS, 15))
@@ -190,12 +190,12 @@ _NOTHING.flags.writeable = False
 def _spike(
     way: float, fading: float, sign: float, height: float, length: float, power: float
 ) -> tuple[float, float, float]:
-    """Return the spike [mm] behind the turning point, and derivatives by height [1] and by its constant.
+    """Return the spike [mm] after the turning point, and its derivatives by height [1] and by its constant.
 
-    A strut that has not turned has sign 0. A constant of zero gives a spike without width.
+    A strut that has not reversed has sign 0. A constant of zero gives no spike.
 
     Args:
-        fading: what it fades with: the way, or the time since the turning point.
+        fading: decay variable: travel or time since the turning point.
     """
     if length <= 0.0:
         return 0.0, 0.0, 0.0
@@ -219,7 +219,7 @@ def _smooth(
     by_height: Floats,
     by_length: Floats,
 ) -> None:
-    """Return spikes at signed ways since turning, shape (n, 6) [mm]."""
+    """Return spikes at signed travel since reversal, shape (n, 6) [mm]."""
     count, columns = since.shape
     for k in range(count):
         for i in range(columns):
@@ -232,7 +232,7 @@ def _smooth(
 def _behind(
     way: float, fading: float, sign: float, height: float, length: float, power: float, left: Floats
 ) -> tuple[float, float, float]:
-    """Return the spike and the previous one's rest, shape (3,), fading over c|a|."""
+    """Return the spike plus the previous spike's remainder, shape (3,), which decays over c|a|."""
     spike, by_height, by_length = _spike(way, fading, sign, height, length, power)
     if left[0] == 0.0 or height == 0.0:
         return spike, by_height, by_length
@@ -243,7 +243,7 @@ def _behind(
 
 
 @compiled
-def _go_on(  # noqa: C901 - what is remembered decides in one pass
+def _go_on(  # noqa: C901 - the memory requires one pass
     travel: Floats,
     clock: Floats,
     height: Floats,
@@ -255,7 +255,7 @@ def _go_on(  # noqa: C901 - what is remembered decides in one pass
     by_height: Floats,
     by_length: Floats,
 ) -> None:
-    """Go on along a straight path; without a clock, shape (0,), spikes fade over their way."""
+    """Continue along a straight path; without a clock, shape (0,), spikes decay with travel."""
     count, columns = travel.shape
     timed = len(clock) > 0
     for i in range(columns):

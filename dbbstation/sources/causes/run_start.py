@@ -1,4 +1,4 @@
-"""Begin of a run's turn, found from feed-in and feed-out."""
+"""Error of a run's start angle, found from feed-in and feed-out."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     _Travelled = tuple[Floats, CubicSpline, Floats]
 
 USUAL_DEG = 0.05
-"""A fifth of a sample at ten readings a second."""
+"""Usual size: a fifth of a sample at ten readings per second."""
 
 FEWEST = 6
-"""Places that make a path; a machine that stands still while a ball is put up has one."""
+"""Fewest places of a path; a machine at rest during a set-up has one."""
 
 SAME_DEG = 1e-9
-"""Rows that are closer than this are one place."""
+"""Closer rows are one place."""
 
 
 class RunStart(ErrorSource):
-    """All angles of one run are too small by d: the machine was ahead by d along its circle.
+    """All angles of one run are too small by d, so the machine was ahead by d along its circle.
 
-    About a centred ball an exact machine shows no effect; an actual machine's figure is turned. Each run has its own d,
-    sized by its sampling, so it is a random effect; `time-skew` is the common part.
+    About a centred ball an exact machine shows no effect; an actual machine's figure is rotated. Each run has its own
+    d, so it is a random effect with a size given by sampling. `time-skew` is the common part.
     """
 
     name = "run-start"
@@ -55,7 +55,7 @@ class RunStart(ErrorSource):
         return "" if motion.setup is None else motion.setup.run
 
     def stated_mm(self, motion: Motion) -> Floats | None:
-        """Return the uncertainty from edge sampling [deg]; zero with recorded angles."""
+        """Return the standard uncertainty due to edge sampling [deg]; zero with recorded angles."""
         return np.array([0.0 if motion.setup is None else motion.setup.start_uncertainty_deg])
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
@@ -69,7 +69,7 @@ class RunStart(ErrorSource):
         return Effect(strut_mm=slope[:, :, None])
 
     def _along(self, motion: Motion, machine: Machine) -> _Travelled:
-        """Return travelled angle, shape (n,) [deg], commanded lengths over it [mm], and those at the rows, shape (n, 6)."""
+        """Return travelled angle, shape (n,) [deg], a curve of commanded lengths over it [mm], and its values at the rows, shape (n, 6)."""
         self.require(motion)
         return motion.once("travelled", machine, lambda: _along(motion, motion.struts(machine).length_mm))
 

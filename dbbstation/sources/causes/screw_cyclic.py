@@ -22,10 +22,10 @@ MM_PER_UM = 1e-3
 
 
 class ScrewCyclic(LinearSource):
-    """A strut's error has one wave per screw turn: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
+    """A strut's error has one wave per screw turn of lead p: dL = a sin(2 pi L / p) + b cos(2 pi L / p).
 
-    p is the lead. A second harmonic, and an amplitude that grows as a bent screw extends, are laws of their own:
-    `_TwoHarmonics`, `_AlongTheScrew`. The phase counts from length zero, so only the amplitude is meaningful.
+    `_TwoHarmonics` adds a second harmonic, `_AlongTheScrew` an amplitude that changes as a bent screw extends. The
+    phase counts from length zero, so only the amplitude is meaningful.
     """
 
     name = "screw-cyclic"
@@ -88,7 +88,7 @@ class ScrewCyclic(LinearSource):
 
 
 USUAL_UM = 2.0
-"""Usual size of the first harmonic; that of a harmonic falls with its order, as of a wave with a kink [µm]."""
+"""Usual size of the first harmonic [µm]; sizes fall with the order."""
 
 
 class _TwoHarmonics(ScrewCyclic):
@@ -105,12 +105,12 @@ class _TwoHarmonics(ScrewCyclic):
 
 
 GROWTHS_PERCENT_M = (-200.0, 0.0, 200.0)
-"""Changes of the amplitude along the screw worth trying, of the one at the middle of the travel: from half to twice of it over a usual
-travel [percent/m]."""
+"""Tried changes of the amplitude along the screw, relative to mid-travel [percent/m]: from half to twice over a usual
+travel."""
 
 
 class _AlongTheScrew(ErrorSource):
-    """Two harmonics whose amplitude changes along the screw, alike on all struts."""
+    """Two harmonics whose amplitude changes along the screw, equally on all struts."""
 
     name, belongs_to, texts = ScrewCyclic.name, ScrewCyclic.belongs_to, ScrewCyclic.texts
     varies_with, form_uncertainty = ScrewCyclic.varies_with, ScrewCyclic.form_uncertainty

@@ -1,4 +1,4 @@
-"""Lead of the struts' screws."""
+"""Lead error of the struts' screws."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ MM_PER_UM_M = 1e-6
 
 
 class ScrewLead(LinearSource):
-    """A strut travels more than counted, in proportion: dL_i = e_i (L_i - L_0).
+    """A strut's travel error is proportional to its travel: dL_i = e_i (L_i - L_0).
 
-    L_0 is mid-travel; the error there is the reference length's. 10 µm/m are 1 µm over 100 mm.
+    L_0 is mid-travel; the error there belongs to the reference length. 10 µm/m are 1 µm over 100 mm.
     """
 
     name = "screw-lead"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     varies_with = "strut-length"
-    form_uncertainty = 0.02  # the lead of a ground screw is even to a few per cent of its error
+    form_uncertainty = 0.02  # the lead error of a ground screw is constant to a few per cent
     texts = Texts(
         what="The lead of a strut's screw, or the scale that measures it, is not the one in the control: the strut "
         "travels too far or not far enough.",

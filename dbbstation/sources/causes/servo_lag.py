@@ -1,4 +1,4 @@
-"""Struts that follow their command late."""
+"""Lag of struts behind their commands."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ S_PER_MS = 1e-3
 
 
 class ServoLag(ErrorSource):
-    """A strut follows its command as a position loop of gain 1/tau: tau_i dy_i/dt = x_i - y_i.
+    """A strut follows its command as a position loop with gain 1/tau: tau_i dy_i/dt = x_i - y_i.
 
-    The error is y - x = -tau dx/dt + tau² d²x/dt² - ..., a lag and a shortened path. A run begins in motion. Negative
-    tau leads, as feed-forward does. Along a straight program the loop is solved from rows (`laws.loop`), and a leading
-    strut by -tau dx/dt.
+    The error y - x = -tau dx/dt + tau² d²x/dt² - ... is a lag and a shortened path. A run begins in motion. Negative
+    tau is a lead, as by feed-forward. Along straight programs the loop is solved row by row (`laws.loop`); a lead is
+    -tau dx/dt.
 
-    A common lag equals `time-skew` to first order. About a centred ball it appears only as shrinkage, (v tau)² / 2R:
-    0.2 µm at 1000 mm/min, 150 mm and 15 ms; with detected feed-in it is invisible. A fit therefore holds the mean of
-    the six times at zero and reports it.
+    To first order a common lag equals `time-skew`. About a centred ball it causes only the shrinkage (v tau)² / 2R: 0.2
+    µm at 1000 mm/min, 150 mm and 15 ms; with detected feed-in it is invisible. A fit therefore holds the mean of the
+    six times at zero and reports it.
     """
 
     name = "servo-lag"
@@ -38,7 +38,7 @@ class ServoLag(ErrorSource):
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
     builds_up = True
     varies_with = "strut-speed"
-    form_uncertainty = 0.1  # a drive lags by a filter, not by one time
+    form_uncertainty = 0.1  # a drive's lag is a filter with more than one time constant
     # Loops of 1 to 5 m/min/mm lag by 12 to 60 ms, of which feed-forward leaves some tenths: about 5 ms in common, 12 times 1 ms / sqrt(6).
     concealed_times = 12.0
     texts = Texts(
@@ -62,7 +62,7 @@ class ServoLag(ErrorSource):
         return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
 
     _more: ClassVar[tuple[tuple[float, float], ...]] = ((1.0, 1.0),)
-    """What each six values add while a strut shortens, and while it lengthens."""
+    """Factors of each six values while a strut shortens, and while it lengthens."""
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
         return (_ByDirection(),)
@@ -100,7 +100,7 @@ class ServoLag(ErrorSource):
             return driven(motion.struts(machine).length_mm, np.asarray(motion.time_s), constants, STANDING)[:2]
         time_s, length, place = driven_in_time(motion, machine)
         speed, step, constant = speed_mm_s(time_s, length), np.diff(time_s), constants.ravel()
-        # Each way of travel is followed by its own constant; where both are the same, their sum is one loop.
+        # Each direction of travel has its own constant; if both are equal, the sum is one loop.
         speed = np.hstack([np.minimum(speed, 0.0), np.maximum(speed, 0.0)])
         lag, by_constant = followed(speed, step, np.abs(constant))
         if (constant < 0.0).any():
@@ -112,7 +112,7 @@ class ServoLag(ErrorSource):
 
 
 class _ByDirection(ServoLag):
-    """Struts late by tau + d while they lengthen, and tau - d while they shorten: weight and friction load a drive by direction."""
+    """The lag is tau + d while a strut lengthens and tau - d while it shortens, because a drive's load depends on direction."""
 
     _more = ((1.0, 1.0), (-1.0, 1.0))
 
@@ -129,18 +129,18 @@ class _ByDirection(ServoLag):
 
 
 USUAL_MS = 0.3
-"""Usual difference of a lag from its mean, either way: three tenths of a usual lag."""
+"""Usual difference d of a lag from its mean: three tenths of a usual lag."""
 
 
 def followed(speed: Floats, step_s: Floats, constant_s: Floats) -> tuple[Floats, Floats]:
-    """Return errors e of loops, tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k)."""
+    """Return errors e of loops, with tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k)."""
     lag, by_constant = np.zeros_like(speed), np.zeros_like(speed)
     _follow(np.ascontiguousarray(speed), np.ascontiguousarray(step_s), constant_s, lag, by_constant)
     return lag, by_constant
 
 
 FORGOTTEN = 50.0
-"""Time constants after which nothing is left of an error."""
+"""Time constants after which an error has vanished."""
 
 
 @compiled
@@ -151,15 +151,15 @@ def _follow(
     lag: Floats,
     by_constant: Floats,
 ) -> None:
-    """Solve each column exactly for speeds linear between rows.
+    """Solve each column exactly, with speeds linear between rows.
 
-    e = -tau dx/dt + tau² d²x/dt² is a solution; the difference fades with exp(-t / tau).
+    e = -tau dx/dt + tau² d²x/dt² is a solution; the difference decays as exp(-t / tau).
     """
     rows, columns = speed.shape
     for i in range(columns):
         tau = constant[i]
         gain = (speed[1, i] - speed[0, i]) / step[0] if rows > 1 else 0.0
-        # The solution that has forgotten how it began.
+        # The steady solution.
         lag[0, i] = -tau * speed[0, i] + tau * tau * gain
         by_constant[0, i] = -speed[0, i] + 2.0 * tau * gain
         for k in range(1, rows):

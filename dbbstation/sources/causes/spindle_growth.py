@@ -1,4 +1,4 @@
-"""Growth of the warming spindle."""
+"""Thermal growth of the spindle."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 BEGUN_PERCENT = (-100.0, 0.0, 40.0)
-"""Worth trying: cooling from warm, from cold, and ten minutes of work before at a time constant of half an hour [%]."""
+"""Tried initial states [%]: a warm start that cools, a cold start, and ten minutes of earlier work at a time constant of half an hour."""
 
 _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
-"""Which way the tool tip moves, platform frame: away from the platform, which lies above it [1]."""
+"""Direction of the tool tip's motion, platform frame: away from the platform above it [1]."""
 
 
 class SpindleGrowth(ErrorSource):
-    """The tool tip moves along the spindle by g(t) of `warm_up`, plus earlier growth.
+    """The tool tip moves along the spindle by g(t) of `warm_up` plus earlier growth.
 
-    Earlier growth is a share b of the remaining growth; b = -1 for a warm spindle that cools. Upright level circles do
-    not show it; tilted ones are shifted by (g + b a) sin(tilt).
+    Earlier growth is a share b of the remaining growth a; a warm spindle that cools has b = -1. Upright level circles
+    do not show it; tilted circles are shifted by (g + b a) sin(tilt).
     """
 
     name = "spindle-growth"
@@ -81,11 +81,11 @@ class SpindleGrowth(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=SpindleGrowth):
-    """The growth of a part that is heated through another part."""
+    """Growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
-    """The tip moves by c (T - T_0); there is no spindle thermometer."""
+    """The tip moves by c (T - T_0), with the machine's thermometer."""
 
     thermometers = (MACHINE,)
     growth = Parameter(

@@ -1,4 +1,4 @@
-"""Struts shortened by sagging under their own weight."""
+"""Shortening of struts that sag under their own weight."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 USUAL_UM = 0.3
-"""Shortening of a level rod of 1000 mm and 25 kg whose stiffness is that of a steel bar of 30 mm diameter [µm]: it sags
-by 0.38 mm."""
+"""Shortening of a level rod of 1000 mm and 25 kg with the stiffness of a steel bar of 30 mm [µm]; its sag is 0.38
+mm."""
 
 
 class StrutBending(LinearSource):
-    """A strut sags across its axis, so the straight line between its joints is shorter than the bent strut.
+    """A strut sags, so the distance of its joints is less than its own length.
 
-    A strut of mass m and bending stiffness E I, pinned at both ends, carries q = m g_across / L per length. Its
-    deflection w = q x (L³ - 2 L x² + x³) / (24 E I) shortens it by half the integral of w'²:
+    A pinned strut of mass m and bending stiffness E I carries q = m g_across / L per length. Its deflection w = q x (L³
+    - 2 L x² + x³) / (24 E I) shortens it by half the integral of w'²:
 
-    shortening = 17/40320 (m g_across)² L⁵ / (E I)² = 2.487 f² / L, with f the sag in the middle.
+    shortening = 17/40320 (m g_across)² L⁵ / (E I)² = 2.487 f² / L, with the sag f in the middle.
 
     The parameter is the shortening of a level strut of 1000 mm. It scales with the squared cosine of inclination and
-    the fifth power of length, at constant mass and stiffness. The axial force is neglected: 4 kN, a twentieth of the
-    buckling load of a 30 mm bar, change the shortening by a tenth.
+    the fifth power of length, at constant mass and stiffness. The axial force is neglected: 4 kN, a twentieth of a 30
+    mm bar's buckling load, change the shortening by a tenth.
     """
 
     name = "strut-bending"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     varies_with = "strut-length"
-    form_uncertainty = 0.05  # ends of struts are neither free nor clamped
+    form_uncertainty = 0.05  # real ends are neither pinned nor clamped
     texts = Texts(
         what="A strut sags under its own weight; bent, it is shorter from joint to joint than its drive measures along "
         "it.",

@@ -1,4 +1,4 @@
-"""Reference lengths of the struts."""
+"""Errors of the struts' reference lengths."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class StrutReferenceLength(LinearSource):
-    """A strut is longer than its encoder says by a constant: dL_i, i = 1 to 6 [CAL II-C 1]."""
+    """A strut exceeds its encoder's length by a constant dL_i, i = 1 to 6 [CAL II-C 1]."""
 
     name = "strut-reference-length"
     belongs_to = Owner.MACHINE

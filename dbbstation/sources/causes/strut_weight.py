@@ -1,4 +1,4 @@
-"""Weights of struts and motors."""
+"""Weight of struts and motors."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 USUAL = StrutMasses(strut_kg=25.0, motor_kg=20.0, motor_length_mm=0.0)
-"""What struts of a machine of the PM-600's size weigh, where the machine file does not say; their lengths are unknown."""
+"""Usual masses for a machine of the PM-600's size, if the machine file states none; lengths are unknown."""
 
 
 class StrutWeight(LinearSource):
-    """Struts hang between base and platform, pull across their axes and stretch [GRAV eq 2, 3].
+    """Struts hang between base and platform, pull transversely and stretch [GRAV eq 2, 3].
 
-    Both joints carry a strut's weight; the platform's part changes all forces. Masses of strut, motor and screw are
-    common to all struts; their lengths are the machine file's, and parts without length are omitted. Stretch uses the
-    compliance of the source gravity, else of the machine file. Motors carry the mass that moves with the strut.
+    Both joints carry a strut's weight; the platform's part changes all forces. Strut, motor and screw masses are equal
+    in all struts. The machine file states their lengths; parts without length are omitted. The compliance comes from
+    the source gravity, else from the machine file. Motors carry the mass that moves with the strut.
     """
 
     name = "strut-weight"

@@ -1,4 +1,4 @@
-"""Growth of the warming base plate."""
+"""Thermal growth of the base plate."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ MM_PER_UM_M = 1e-6
 class ThermalFrame(ErrorSource):
     """Base joints move from the plate's centre: dQ_i = Q_i g(t), g of `warm_up`.
 
-    The plate is evenly warm and held at the machine frame's origin; another fixed point only shifts it. Growth counts
-    from the session's first sample.
+    The plate's temperature is uniform, and it is fixed at the machine frame's origin; another fixed point only shifts
+    it. Growth counts from the session's first sample.
     """
 
     name = "thermal-frame"
@@ -67,7 +67,7 @@ class ThermalFrame(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=ThermalFrame):
-    """The growth of a part that is heated through another part."""
+    """Growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=ThermalFrame):

@@ -1,4 +1,4 @@
-"""Growth of warming struts."""
+"""Thermal growth of struts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ThermalStruts(ErrorSource):
     """All struts grow in proportion to length: dL_i = L_i g(t), g of `warm_up`.
 
     Growth counts from the session's first sample; earlier growth is part of the reference lengths. Cold and warm starts
-    therefore have different values, and a prediction starts as the fitted sessions did.
+    therefore have different values. A prediction assumes the start of the fitted sessions.
     """
 
     name = "thermal-struts"
@@ -71,7 +71,7 @@ class ThermalStruts(ErrorSource):
 
 
 class _InTwoStages(InTwoStages, cause=ThermalStruts):
-    """The growth of a part that is heated through another part."""
+    """Growth of a part that is heated through another part."""
 
 
 class _ByTemperature(FollowsTemperature, cause=ThermalStruts):

@@ -1,4 +1,4 @@
-"""Readings and commanded poses of different times."""
+"""Time shift between readings and commanded poses."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ if TYPE_CHECKING:
 S_PER_MS = 1e-3
 
 USUAL_MS = 10.0
-"""A reading or two of an instrument that sends some hundred a second."""
+"""Usual size: one or two readings at some hundred per second."""
 
 
 class TimeSkew(ErrorSource):
-    """A reading is late by d against its pose: all struts had moved on by x(t + d) - x(t), from cubic splines.
+    """A reading is later than its pose by d, so all struts have moved on by x(t + d) - x(t), from cubic splines.
 
-    The fixed ball is stationary; changes of other sources over d are omitted (parts in a thousand at 10 ms and 1000
-    mm/min). A wrong start of the turn by an angle a is a time a / omega. It turns the figure against the travel,
-    opposite in both directions.
+    The fixed ball is stationary. Changes of other sources over d are omitted: parts in a thousand at 10 ms and 1000
+    mm/min. A start angle wrong by a is the time a / omega. The figure rotates against the travel, oppositely in both
+    directions.
 
-    About a centred ball an exact machine shows no effect: 10 ms turn 0.1 mm of centre offset into 0.1 µm. Common
-    `servo-lag` is the same with inverted sign except for shrinkage, and is modelled as this.
+    About a centred ball an exact machine shows no effect; with 0.1 mm of centre offset 10 ms give 0.1 µm. A common
+    `servo-lag` is equal with inverted sign, except for shrinkage, so this source models it.
     """
 
     name = "time-skew"
     belongs_to = Owner.INSTRUMENT
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
-    looks_ahead = True  # the reading belongs to a pose that is still to come
+    looks_ahead = True  # the reading belongs to a later pose
     varies_with = "speed"
     form_uncertainty = 0.05  # clocks drift a little
     texts = Texts(
@@ -64,7 +64,7 @@ class TimeSkew(ErrorSource):
         return Effect(strut_mm=S_PER_MS * speed[:, :, None])
 
     def stated_mm(self, motion: Motion) -> Floats | None:  # noqa: ARG002
-        """Return its usual size [ms] as a random effect, because exact circles do not determine it."""
+        """Return the usual size [ms], because exact circles do not determine this random effect."""
         return np.array([USUAL_MS])
 
     def _gone_on(self, motion: Motion, machine: Machine, late_s: float) -> tuple[Floats, Floats]:

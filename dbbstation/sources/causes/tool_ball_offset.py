@@ -1,4 +1,4 @@
-"""The moving ball off the tool tip."""
+"""Offset of the moving ball from the tool tip."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 class ToolBallOffset(LinearSource):
-    """The spindle's ball is off the programmed tip by one vector per session.
+    """The spindle's ball is displaced from the programmed tip, by one vector per session.
 
-    In readings it equals all platform joints shifted by dP_i = -o. Only the ball is removed afterwards.
+    Readings cannot distinguish it from shifting all platform joints by dP_i = -o, but the ball is removed after the test.
     """
 
     name = "tool-ball-offset"

@@ -1,4 +1,4 @@
-"""Universal joints that turn the screws."""
+"""Universal joints that rotate the screws."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from dbbstation.machine.rotation import Frames
 
 ALONG = 0.05
-"""Sine of the angle between a joint's axis and its strut below which the joint is locked, 3 degrees [1]."""
+"""Sine of the least angle between a joint's axis and its strut; below it, 3 degrees, the joint is locked [1]."""
 
 
 class UjointScrew(LinearSource):
-    """As joints swing, strut parts turn against each other, and the screw converts this into travel.
+    """As joints swing, the two strut parts rotate against each other, and the screw converts rotation to travel.
 
-    A universal joint's second axis is along a x u, with first axis a and strut u. psi is the angle about u between both
-    second axes: dL = p psi / (2 pi), lead p, psi from the untilted middle pose. Ball joints turn freely.
+    A universal joint's second axis is along a x u, with first axis a and strut u. With psi the angle about u between
+    both second axes, relative to the untilted middle pose, and lead p, dL = p psi / (2 pi). Ball joints rotate freely.
     """
 
     name = "ujoint-screw"
@@ -63,7 +63,7 @@ class UjointScrew(LinearSource):
         here = _second_axes(axes, motion.struts(machine), motion.frames(machine))
         at_rest = middle(machine)
         rest = _second_axes(axes, inverse(machine.hexapod, at_rest), at_rest)
-        # Products of unit complex numbers: differences of angles that never jump by a turn.
+        # Products of unit complex numbers give angle differences without jumps of a turn.
         turned = np.angle(here * rest.conj())
         return Effect(strut_mm=(turned / (2.0 * np.pi))[:, :, None])
 

@@ -1,9 +1,9 @@
-"""Growth by a logged thermometer on the part, in place of a law of time.
+"""Growth by a logged thermometer instead of a law of time.
 
 g(t) = c (T(t) - T_0)
 
-T_0 is the reading in the session's first run, so growth counts as in `warm_up`, from each session's own zero. T
-includes sun, open doors and pauses, so no law of time is needed.
+T_0 is the reading in the session's first run, so growth is zero at the session's start, as in `warm_up`. T includes
+sun, open doors and pauses.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ STEEL_UM_M_K = 11.5
 EQUATION = "or, where T was logged, g = c (T - T at the first sample)"
 
 FOLLOWED_K = 0.2
-"""Range that a temperature must have over a session to be followed: what thermometers resolve is a tenth [K]."""
+"""Least range of a usable temperature over a session [K]; thermometers resolve a tenth."""
 
 MACHINE = ("machine",)
 """A thermometer on the base plate or the machine as a whole."""
 
 
 class FollowsTemperature(LinearSource):
-    """A cause by thermometers instead of time, with the cause's name and texts."""
+    """A cause's law by thermometers instead of time, with the cause's name and texts."""
 
     needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
     varies_with = "temperature"
-    form_uncertainty = 0.1  # a thermometer shows one place of a body
+    form_uncertainty = 0.1  # a thermometer measures one place of a body
     growth: ClassVar[Parameter]
-    """What it grows by for one kelvin."""
+    """Growth per kelvin."""
     thermometers: ClassVar[tuple[tuple[str, ...], ...]]
-    """Columns without their unit, the best choice first: one for all of the part, or one for each strut."""
+    """Columns without unit, best choice first: one for the whole part, or one per strut."""
 
     def __init_subclass__(cls, cause: type[ErrorSource]) -> None:
         super().__init_subclass__()
@@ -52,13 +52,13 @@ class FollowsTemperature(LinearSource):
 
     @abstractmethod
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """By the growth per kelvin, from `warmer_k`."""
+        """Return the derivative by the growth per kelvin, from `warmer_k`."""
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         return (self.growth,)
 
     def require(self, motion: Motion) -> None:
-        """Refuse a motion without its thermometers.
+        """Refuse a motion without suitable thermometers.
 
         Raises:
             ModelError: names the source and suitable columns.
@@ -77,13 +77,13 @@ class FollowsTemperature(LinearSource):
         return self.effect(motion.after(state), machine, values).last(len(motion)), state
 
     def warmer_k(self, motion: Motion) -> Floats:
-        """Return the warming since the session's begin, shape (n, 1), or (n, 6) for struts [K]."""
+        """Return the warming since the session's start [K], shape (n, 1), or (n, 6) for struts."""
         self.require(motion)
         logged = [logged_degc(motion, name) for name in self._columns(motion)]
         return np.column_stack([degc - first for degc, first in logged])
 
     def moves(self, motion: Motion) -> bool:
-        """Return whether its thermometers moved enough to be followed."""
+        """Return whether its thermometers changed by at least `FOLLOWED_K`."""
         shown = [motion.setup.thermometers[name].degc for name in self._columns(motion)] if motion.setup else []
         return any(np.ptp(degc) > FOLLOWED_K for degc in shown)
 
@@ -97,7 +97,7 @@ class FollowsTemperature(LinearSource):
         lacks: str = "the control has no",
         remedy: str = "name the thermometers of the control with --thermometers, or leave the source out with --leave-out",
     ) -> tuple[str, ...]:
-        """Return the best choice of its thermometers.
+        """Return the best available thermometers.
 
         Raises:
             ModelError: names missing ones.
@@ -114,7 +114,7 @@ class FollowsTemperature(LinearSource):
 
 
 def following_thermometers(sources: Sequence[ErrorSource], motions: Iterable[Motion]) -> tuple[ErrorSource, ...]:
-    """Return sources, by thermometers if all runs have them."""
+    """Return sources, with the law by thermometers if all runs have them."""
     return tuple(_logged(source, motions) or source for source in sources)
 
 
@@ -126,7 +126,7 @@ def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | Non
 
 
 def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
-    """Return missing data of motions for a source, including moving thermometers; may be empty."""
+    """Return the inputs of a source that motions lack, including changing temperatures; may be empty."""
     try:
         for motion in motions:
             source.require(motion)
@@ -138,14 +138,14 @@ def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
 
 
 def known_thermometers(motion: Motion) -> set[str]:
-    """Return thermometers with known temperatures, by column without unit."""
+    """Return names of thermometers with known temperatures."""
     if motion.setup is not None and motion.setup.thermometers:
         return set(motion.setup.thermometers)
     return set(motion.temperature_degc)
 
 
 def logged_degc(motion: Motion, name: str) -> tuple[Floats, float]:
-    """Return a thermometer's readings, shape (n,), and its start value [degC]."""
+    """Return a thermometer's temperatures, shape (n,), and its value at the session's start [degC]."""
     if motion.setup is None or not motion.setup.thermometers or motion.time_s is None:
         own = motion.temperature_degc[name]
         return own, float(own[0])

@@ -1,4 +1,4 @@
-"""Elastic wind-up against friction: the law of Dahl with its memory.
+"""Elastic wind-up against friction by Dahl's law, with memory.
 
 [Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1 (1968), eq 1 with exponent 1]
 """
@@ -22,9 +22,9 @@ class WoundState:
     """Wind-up of m columns.
 
     Attributes:
-        travel: last place, in its unit, shape (m,); NaN before the first row.
-        side: share of the whole width, -1/2 to 1/2, shape (m,).
-        by_length: derivative of that by length, shape (m,).
+        travel: last position, in its unit, shape (m,); NaN before the first row.
+        side: wind-up over the whole width, -1/2 to 1/2, shape (m,).
+        by_length: derivative of `side` by length, shape (m,).
     """
 
     travel: Floats
@@ -33,16 +33,16 @@ class WoundState:
 
 
 def wound(travel: Floats) -> WoundState:
-    """Return the state before a run that begins in motion."""
+    """Return the initial state of a run that begins in motion."""
     start = leaning(travel)
     return WoundState(start.place, start.side, np.zeros_like(start.side))
 
 
 def wound_up(travel: Floats, length: Floats, state: WoundState) -> tuple[Floats, Floats, WoundState]:
-    """Return wind-up z: dz = -(s/2 + z) |dx| / l, s the sign of dx.
+    """Return the wind-up z, with dz = -(s/2 + z) |dx| / l and s the sign of dx.
 
     Returns:
-        z and its derivative by l, shapes (n, m), and the state behind the last row.
+        z and its derivative by l, shapes (n, m), and the state after the last row.
     """
     side, by_length = np.empty_like(travel), np.empty_like(travel)
     at, now, slope = state.travel.copy(), state.side.copy(), state.by_length.copy()

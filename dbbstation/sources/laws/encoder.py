@@ -1,4 +1,4 @@
-"""The place of the bar's encoder, without noise."""
+"""Noise-free place of the bar's encoder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Motion
 
 WINDOWS = 40
-"""Stretches of a run over which its readings are a cubic: nine degrees of a circle."""
+"""Pieces of a run on which readings are fitted by a cubic: nine degrees of a circle."""
 
 CUBIC = 3
 
@@ -19,7 +19,7 @@ CUBIC = 3
 def reading_without_noise_mm(motion: Motion) -> Floats:
     """Return the reading without most of its noise, shape (n,) [mm].
 
-    An error at noisy readings would resemble noise and be identified wrongly.
+    An error evaluated at noisy readings would itself look like noise and be misidentified.
     """
     return motion.once("reading without noise", None, lambda: _smoothed(motion))
 

@@ -1,15 +1,14 @@
-"""A position loop that follows a program, row by row.
+"""A position loop along a program, row by row.
 
-A program is straight between its rows and bends at them. If the path goes on evenly, the speed at a row is that of the
-parabola through it and the two rows before. At a bend or change of feed it is that of the last straight piece:
+A program is straight between rows and bends at rows. On a smooth path the parabola through a row and the two rows
+before gives the speed at this row. At a bend or change of feed the last straight segment gives the speed:
 
 v = s + w (s - s') h / (h + h'),    w = max(0, s . s') / max(s . s, s' . s')
 
-s and s' are the mean speeds of all struts over the last two steps h and h'. In a smooth path w is 1 within the step, so
-that v is exact to second order; behind a stop or a corner of 90 degrees w is 0. The loop y + tau v(y) = x is solved
-with this speed of the output, by backward differences [Gear, Numerical Initial Value Problems in Ordinary Differential
-Equations, 1971, ch. 11]. The command for a wanted output then follows from the output's speed, without oscillation
-between rows.
+s and s' are the mean speeds of all struts over the last two steps h and h'. On a smooth path w is 1 to first order, so
+v is exact to second order; after a stop or a corner of 90 degrees w is 0. Backward differences solve the loop y + tau
+v(y) = x with this speed of the output [Gear, Numerical Initial Value Problems in Ordinary Differential Equations, 1971,
+ch. 11]. The command for a wanted output thus follows from the output's speed, without oscillation between rows.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ class LoopState:
     """Memory of six loops.
 
     Attributes:
-        rows: steps so far: 0 before the first row, 2 with a speed.
-        memory: commanded and driven length [mm], mean speeds of the last step [mm/s], and derivatives of driven length and speed
-            by time constants of either way, shape (8, 6).
+        rows: number of rows so far: 0 at the start, 2 once a speed is known.
+        memory: commanded and driven length [mm], mean speeds of the last step [mm/s], and derivatives of driven length
+            and speed by both time constants, shape (8, 6).
     """
 
     rows: int
@@ -47,7 +46,7 @@ class LoopState:
 
 
 STANDING = LoopState(0, 0.0, 0.0, np.zeros((8, STRUTS)))
-"""Before a program: nothing has moved."""
+"""State before a program, at rest."""
 
 
 def driven(length_mm: Floats, time_s: Floats, constant_s: Floats, state: LoopState) -> tuple[Floats, Floats, LoopState]:
@@ -55,7 +54,7 @@ def driven(length_mm: Floats, time_s: Floats, constant_s: Floats, state: LoopSta
 
     Args:
         time_s: shape (n,); rows within `SHORTEST_S` are one.
-        constant_s: tau while y falls and while it rises, shape (2, 6); a negative one leads by -tau dx/dt.
+        constant_s: tau while y decreases and while it increases, shape (2, 6); a negative tau leads by -tau dx/dt.
     """
     lag, by_constant, memory = np.empty_like(length_mm), np.empty((len(length_mm), 2, STRUTS)), state.memory.copy()
     clock = np.array([state.rows, state.time_s, state.step_s])
@@ -71,10 +70,10 @@ def undone(
     constant_s: Floats,
     state: LoopState,
 ) -> Floats:
-    """Return errors y - x of loops that reach y, shape (n, 6) [mm].
+    """Return errors y - x of loops that reach given y, shape (n, 6) [mm].
 
     Args:
-        length_mm: a command near the solution, which shows bends, shape (n, 6).
+        length_mm: commands near the solution, which determine bends, shape (n, 6).
     """
     error = np.empty_like(length_mm)
     clock = np.array([state.rows, state.time_s, state.step_s])
@@ -85,7 +84,7 @@ def undone(
 
 @inlined
 def _even(length: Floats, memory: Floats, h: float, clock: Floats) -> float:
-    """Return the counted share of the speed change, w h / (h + h')."""
+    """Return the factor of the speed change, w h / (h + h')."""
     both = new = old = 0.0
     for i in range(len(length)):
         speed = (length[i] - memory[INPUT, i]) / h

@@ -1,4 +1,4 @@
-"""The play operator with its memory, shared by several sources."""
+"""The play operator with memory, for several sources."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class PlayState:
-    """Place of m columns in their play.
+    """State of m columns in their play.
 
     Attributes:
-        place: y, in the travel's unit, shape (m,); NaN before the first row.
-        side: derivative of y - x by width, -1/2 to 1/2, shape (m,); initially the leaning end.
+        place: output y, in the travel's unit, shape (m,); NaN before the first row.
+        side: derivative of y - x by width, -1/2 to 1/2, shape (m,); initially the end given by the first motion.
     """
 
     place: Floats
@@ -27,9 +27,9 @@ class PlayState:
 
 
 def leaning(travel: Floats) -> PlayState:
-    """Return the state before a run that begins in motion.
+    """Return the initial state of a run that begins in motion.
 
-    -1/2 for a growing column, +1/2 for a shrinking one, 0 for none.
+    `side` is -1/2 for a growing column, +1/2 for a shrinking one, 0 at rest.
     """
     side = np.zeros(travel.shape[1])
     _lean(np.ascontiguousarray(travel), side)
@@ -37,10 +37,10 @@ def leaning(travel: Floats) -> PlayState:
 
 
 def followed(travel: Floats, width: Floats, state: PlayState) -> tuple[Floats, Floats, PlayState]:
-    """Return the play operator: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2.
+    """Apply the play operator: y_k is y_{k-1} limited to x_k - w/2 ... x_k + w/2.
 
     Returns:
-        Lag y - x and its derivative by the width, shapes (n, m), and the state behind the last row.
+        Error y - x and its derivative by the width, shapes (n, m), and the state after the last row.
     """
     lag, by_width = np.empty_like(travel), np.empty_like(travel)
     place, side = state.place.copy(), state.side.copy()

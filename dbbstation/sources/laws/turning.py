@@ -1,4 +1,4 @@
-"""Turning points of struts along a smooth path of rows."""
+"""Turning points of struts along a smooth path."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 TURNED_MM = 1e-3
-"""A strut has turned round once it has come back by this: less is rounding of the program or of recorded angles."""
+"""A strut has reversed once it has come back this far; less is rounding of programs or recorded angles [mm]."""
 
 
 def since_turning(travel: Floats) -> Floats:
-    """Return each column's signed way since its last turn, shape (n, m); zero before the first.
+    """Return each column's signed travel since its last reversal, shape (n, m); zero before the first.
 
-    The turning point is the vertex of the parabola through the outermost row and its neighbours, over the way of all
-    columns. At corners and straight returns it is the outermost row.
+    The turning point is the vertex of the parabola through the extreme row and its neighbours, over the travel of all
+    columns. At corners and straight returns it is the extreme row.
     """
     return since_turning_in_time(travel, np.zeros(len(travel)))[0]
 
 
 def since_turning_in_time(travel: Floats, time: Floats) -> tuple[Floats, Floats]:
-    """Return the same, and the time since then, at times of shape (n,); both zero before the first turn."""
+    """Return this travel and the time since the last reversal, at times of shape (n,); both zero before the first."""
     since, late = np.zeros_like(travel), np.zeros_like(travel)
     _since(np.ascontiguousarray(travel), np.ascontiguousarray(time), TURNED_MM, since, late)
     return since, late
@@ -33,11 +33,11 @@ def since_turning_in_time(travel: Floats, time: Floats) -> tuple[Floats, Floats]
 
 @inlined
 def _parabola(travel: Floats, i: int, k: int, side: float) -> tuple[float, float, float, float]:
-    """Return the parabola through row k and its neighbours, over the way of all columns.
+    """Return the parabola through row k and its neighbours, over the travel of all columns.
 
     Returns:
-        Slope at row k, half of minus the second derivative, both of `side` times the column, way from the row before
-        and way to the next; zeros where the path has a corner at k, or ends there.
+        Slope at row k and minus half the second derivative, both of `side` times the column, then travel from the
+        previous row and to the next row. All are zero if the path has a corner or an end at k.
     """
     if k < 1 or k + 1 >= travel.shape[0]:
         return 0.0, 0.0, 0.0, 0.0
@@ -45,7 +45,7 @@ def _parabola(travel: Floats, i: int, k: int, side: float) -> tuple[float, float
     for c in range(travel.shape[1]):
         came, goes = travel[k, c] - travel[k - 1, c], travel[k + 1, c] - travel[k, c]
         before, after, along = before + came * came, after + goes * goes, along + came * goes
-    if along <= 0.0:  # also where two rows are the same
+    if along <= 0.0:  # also for two equal rows
         return 0.0, 0.0, 0.0, 0.0
     before, after = np.sqrt(before), np.sqrt(after)
     rises = side * (travel[k, i] - travel[k - 1, i]) / before
@@ -55,10 +55,10 @@ def _parabola(travel: Floats, i: int, k: int, side: float) -> tuple[float, float
 
 @inlined
 def _vertex(travel: Floats, i: int, k: int, side: float) -> tuple[float, float]:
-    """Return the turning point on the high (1.0) or low (-1.0) side, and how many rows it lies behind row k.
+    """Return the turning point on the high (1.0) or low (-1.0) side, and its distance after row k, in rows.
 
-    The neighbouring parabola midway is a lower limit; otherwise it could jump between nearly equal rows and make a
-    compensation oscillate.
+    The neighbouring parabola midway is a lower limit; otherwise the point could jump between nearly equal rows and make
+    a compensation oscillate.
     """
     slope, bend, before, after = _parabola(travel, i, k, side)
     if bend <= 0.0:
@@ -67,7 +67,7 @@ def _vertex(travel: Floats, i: int, k: int, side: float) -> tuple[float, float]:
     beside, step = (k + 1, after) if slope > 0.0 else (k - 1, before)
     middle = side * (travel[k, i] + travel[beside, i]) / 2.0
     top = max(top, middle + _parabola(travel, i, beside, side)[1] * step * step / 4.0)
-    # A slope that neighbouring rows have is that of a vertex between them, however the parabola is rounded.
+    # Rounding cannot move the vertex out of the interval between neighbouring rows.
     return side * top, min(max(slope / (2.0 * bend * (after if slope > 0.0 else before)), -1.0), 1.0)
 
 
@@ -81,9 +81,9 @@ def _since(
 ) -> None:
     count, columns = travel.shape
     for i in range(columns):
-        turn, way, has_turned = 0.0, 0.0, False  # where the column last turned, and which way it goes
+        turn, way, has_turned = 0.0, 0.0, False  # last turning point, and present direction
         then = 0.0
-        low = high = 0  # outermost rows since then
+        low = high = 0  # extreme rows since then
         for k in range(count):
             x = travel[k, i]
             low = k if x < travel[low, i] else low
@@ -95,12 +95,12 @@ def _since(
                 new = 1.0
             if new != 0.0:
                 start = high if new < 0.0 else low
-                if way != 0.0:  # the first movement is one that was already under way
+                if way != 0.0:  # the first movement was already in progress
                     turn, ahead = _vertex(travel, i, start, -new)
                     has_turned = True
                     beside = start + 1 if ahead > 0.0 else max(start - 1, 0)
                     then = time[start] + abs(ahead) * (time[beside] - time[start])
-                    # An outermost row that is still before the turning point belongs to the movement before.
+                    # An extreme row still before the turning point belongs to the previous movement.
                     for j in range(start + 1 if ahead > 0.0 else start, k):
                         since[j, i], late[j, i] = travel[j, i] - turn, time[j] - then
                 way, low, high = new, k, k

@@ -1,4 +1,4 @@
-"""Struts whose contacts differ, where a law has one length for all of them."""
+"""Differences between struts for laws with one common length."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource, Motion
 
 UNLIKE = 2.0
-"""Times the common length that a strut's own may be, one standard deviation: preload, wear and grease differ from drive to drive."""
+"""Ratio of a strut's length to the common length, one standard deviation: preload, wear and grease differ between drives."""
 
 
 def of_own_lengths(source: ErrorSource, motion: Motion, machine: Machine, values: Floats) -> Effect:
-    """Return changes of a source of struts if each has a length of its own.
+    """Return changes of a source's effect if each strut has its own length.
 
     Args:
-        values: of each strut, then the length that they share, shape (7,).
+        values: one per strut, then the common length, shape (7,).
     """
 
     def of_times(times: float) -> Floats:

@@ -1,13 +1,13 @@
-"""Growth of a warming part over a session, the law of all sources that grow with time.
+"""Thermal growth over a session, the law of all sources that grow with time.
 
-A body with one time constant tau follows its heat input. In a session that is the heat of work, equal on average from
-run to run except in pauses:
+A body with one time constant tau follows its heat input. In a session this is the heat of work, on average constant
+except in pauses:
 
 g(t) = a (1 - exp(-t / tau)) - b p(t),    tau dp/dt = [1 in a pause, else 0] - p,    p(0) = 0
 
-a is the growth still to come when the session begins, negative if the part only cools. b is the loss in an infinite
-pause: zero if the drives stay warm, and different from a if the part was warm at the start. This is Newton's law of
-cooling for heat that is switched on and off. A part heated through another one follows two such bodies: `InTwoStages`.
+a is the remaining growth at the session's start, negative if the part only cools. b is the loss in an infinite pause:
+zero if the drives stay warm, different from a if the part was warm at the start. This is Newton's law of cooling with
+intermittent heat. A part heated through another one follows two such bodies (`InTwoStages`).
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Motion
 
 TIME_CONSTANTS_S = tuple(float(f"{tau:.3g}") for tau in np.geomspace(300.0, 14400.0, 13))
-"""Time constants worth trying: five minutes to four hours, each 1.4 times the one before [s]."""
+"""Tried time constants: five minutes to four hours, in ratios of 1.4 [s]."""
 
 PAUSE_S = 600.0
-"""Time without a run from which on it is a pause. A ball is put up, a bar changed in less: that belongs to the work."""
+"""Shortest time without a run that counts as a pause [s]. Setting up a ball or changing a bar takes less."""
 
 EQUATION = (
     "a (1 - exp(-t / tau)) - b p(t), t since the session's first sample; p: what pauses of 10 min and more cool; or, in two "
@@ -41,8 +41,8 @@ EQUATION = (
 ORIGIN = "linear expansion of a body of one time constant (Newton's law of cooling), heated while the machine works; two bodies, one heated through the other"
 
 FASTER = 0.5
-"""Time constant of the second body, of the first one's. A free amplitude takes the rest: with 0.3 to 0.6 a part that is heated through another
-of 0.3 to 0.9 of its constant is followed to 2.2 % of its growth, with 0.5 to 1.2 %; one body is 7 to 11 % off."""
+"""Ratio of the second body's time constant to the first's. For a part heated through another with 0.3 to 0.9 of its
+constant, ratios of 0.3 to 0.6 err by at most 2.2 % of growth, 0.5 by 1.2 %; one body errs by 7 to 11 %."""
 
 
 def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tuple[Parameter, ...]:
@@ -58,13 +58,13 @@ def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tu
 
 
 class InTwoStages(ErrorSource):
-    """A cause that warms through another body, or in a fast and a slow part: the sum of two bodies.
+    """The sum of two bodies: a cause that warms through another body, or has a fast and a slow part.
 
-    One has the time constant tau and the growth a + 2 d, the other tau / 2 and -2 d. Heated through the second body a part
-    starts without a slope: d = a / 2. With d = 0 it is one body.
+    One body has the time constant tau and the growth a + 2 d, the other tau / 2 and -2 d. A part heated through the
+    second body starts with zero slope: d = a / 2. With d = 0 there is one body.
     """
 
-    form_uncertainty = 0.1  # heat differs from run to run, and more than two bodies warm
+    form_uncertainty = 0.1  # heat varies between runs, and more than two bodies warm up
     _one: ClassVar[ErrorSource]
 
     def __init_subclass__(cls, cause: type[ErrorSource]) -> None:
@@ -100,7 +100,7 @@ class InTwoStages(ErrorSource):
 
 
 def _two_bodies(count: int) -> tuple[Floats, Floats]:
-    """Return matrices from the law's parameters to those of each body, shape (count - 1, count)."""
+    """Return matrices from the law's parameters to each body's parameters, shape (count - 1, count)."""
     slow, fast = np.eye(count - 1, count), np.eye(count - 1, count)
     more = 1.0 / (1.0 - FASTER)
     slow[0, -1], slow[2, 2] = more, more
@@ -127,7 +127,7 @@ def grown_by(motion: Motion, values: Floats) -> Floats:
 def warmed(time_s: Floats, constant_s: float) -> Floats:
     """Return the completed share of a warm-up, 1 - exp(-t / tau), shape (n,) [1].
 
-    It is zero before t = 0; a constant of at most zero gives a step.
+    It is zero before t = 0; a time constant of zero or less gives a step.
     """
     since = np.maximum(time_s, 0.0)
     if constant_s <= 0.0:
@@ -144,7 +144,7 @@ def warmed_by_constant(time_s: Floats, constant_s: float) -> Floats:
 
 
 def pauses_s(motion: Motion) -> list[tuple[float, float]]:
-    """Return begin and end of the session's pauses [s]."""
+    """Return start and end of the session's pauses [s]."""
     return [] if motion.setup is None else _pauses_between(motion.setup.moving_s)
 
 
@@ -156,7 +156,7 @@ def _pauses_between(moving_s: tuple[tuple[float, float], ...]) -> list[tuple[flo
 
 
 def _paused(motion: Motion, constant_s: float, law: Callable[[Floats, float], Floats]) -> Floats:
-    """Return the effect of pauses, shape (n,): a step down at each begin and up at its end."""
+    """Return the effect of pauses, shape (n,): warm-up steps down at each start and up at each end."""
     time_s = _time_s(motion)
     steps = [law(time_s - begin, constant_s) - law(time_s - end, constant_s) for begin, end in pauses_s(motion)]
     return sum(steps, np.zeros(len(time_s)))

@@ -21,16 +21,16 @@ MM_PER_N = 1e-6
 """One µm/kN in mm/N."""
 
 USUAL_UM_KN = 10.0
-"""Compliance of a strut of 1000 mm where the machine file states none: that of the PM-600's kind of machine [µm/kN]."""
+"""Compliance of a strut of 1000 mm if the machine file states none, as for machines like the PM-600 [µm/kN]."""
 
 
 def strut_compliance(machine: Machine) -> Compliance:
-    """Return the machine file's compliance of struts, else the usual one."""
+    """Return the struts' compliance from the machine file, else the usual one."""
     return machine.compliance or Compliance(at_1000mm_mm_per_n=USUAL_UM_KN * MM_PER_N)
 
 
 def for_such_struts(machine: Machine) -> str:
-    """Return a note on the compliance assumed for a parameter."""
+    """Return a text on the compliance assumed for a parameter."""
     usual = f"{strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N:.3g} µm/kN at 1000 mm"
     return f"counted with the compliance of gravity, or {usual} without it"
 
@@ -71,7 +71,7 @@ def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod
 
 
 def masses_for_c(masses: StrutMasses | None) -> Floats:
-    """Return a strut's masses and lengths as `strut_load` of `control/kernel.c` takes them, shape (5,) [kg, mm]."""
+    """Return a strut's masses and lengths as arguments of `strut_load` in `control/kernel.c`, shape (5,) [kg, mm]."""
     none = StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
     own = masses or none
     return np.array([own.strut_kg, own.motor_kg, own.motor_length_mm, own.screw_kg, own.screw_length_mm])

@@ -1,1 +1,1 @@
-"""Error sources without cause: curves over length or force, and waves."""
+"""Descriptions of errors without a known cause: curves over length or force, and waves."""

@@ -1,4 +1,4 @@
-"""A strut error without cause that follows the strut's force."""
+"""A strut error of unknown cause that depends on the strut's force."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 POINTS = 25
-"""From minus to plus the platform's weight."""
+"""Points of the curve, from minus to plus the platform's weight."""
 
 
 class UnexplainedByForce(LinearSource):
-    """A strut is off by a piecewise linear function of its force by the platform's weight.
+    """A strut error that is piecewise linear in the force due to the platform's weight.
 
-    Forces are by equilibrium at the commanded pose; the error is constant beyond the weight. A diagnosis calls the curve
-    unexplained and never names this source.
+    Forces follow from equilibrium at the commanded pose; beyond the weight the error is constant. A diagnosis calls the
+    curve unexplained and never names this source.
     """
 
     name = "unexplained-by-force"
@@ -34,7 +34,7 @@ class UnexplainedByForce(LinearSource):
     detail_mm = SMOOTH_MM
     varies_with = "strut-force"
     candidate = False
-    form_uncertainty = 0.0  # a curve through what was measured, no formula
+    form_uncertainty = 0.0  # a curve fitted to measurements, without formula
     texts = texts("axial force", "actual minus driven length = sum over points k of v_ik hat_k(T_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

@@ -1,4 +1,4 @@
-"""A strut error without cause that follows the strut's length."""
+"""A strut error of unknown cause that depends on the strut's length."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 POINTS = 25
-"""Over the whole travel of a strut: 45 mm from one to the next on the reference machine."""
+"""Points over the whole travel of a strut: one per 45 mm on the reference machine."""
 
 
 class UnexplainedByLength(LinearSource):
-    """A strut is off by a piecewise linear function of its length over its travel.
+    """A strut error that is piecewise linear in length.
 
-    Constant and slope are shared with reference lengths and joints by tolerance. A diagnosis calls the curve unexplained
-    and never names this source.
+    Reference lengths and joints also explain constant and slope; priors divide them. A diagnosis calls the curve
+    unexplained and never names this source.
     """
 
     name = "unexplained-by-length"
     belongs_to = Owner.MACHINE
     varies_with = "strut-length"
     candidate = False
-    form_uncertainty = 0.0  # a curve through what was measured, no formula
+    form_uncertainty = 0.0  # a curve fitted to measurements, without formula
     texts = texts("length", "actual minus driven length = sum over points k of v_ik hat_k(L_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

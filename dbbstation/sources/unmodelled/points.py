@@ -1,4 +1,4 @@
-"""Piecewise linear curves of six struts with fixed points."""
+"""Piecewise linear curves of six struts."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 TOLERANCE_UM = 10.0
-"""Standard deviation of a value before anything is measured: the prior of every fit, which keeps points that no reading
-comes near at zero [µm]."""
+"""Prior standard deviation of a value in every fit [µm]; it keeps points without nearby readings at zero."""
 
 PLAUSIBLE_UM = 2.0 * TOLERANCE_UM
-"""An error that would matter, so much above the tolerance that no fit takes for lost what the tolerance bounds [µm]."""
+"""Usual size [µm], so far above the tolerance that no fit counts a point bounded by the tolerance as lost."""
 
 
 def values_at(points: Floats, unit: str) -> tuple[Parameter, ...]:
-    """Return one value for each strut at each point, by strut."""
+    """Return one parameter per strut and point, ordered by strut."""
     return tuple(
         Parameter(
             f"strut_{i + 1}_at_{number}_um",
@@ -39,11 +38,11 @@ def values_at(points: Floats, unit: str) -> tuple[Parameter, ...]:
 
 
 def piecewise_linear(points: Floats, values: Floats) -> Effect:
-    """Return the derivative by the points' values, at values of shape (n, 6); constant beyond the ends.
+    """Return the derivative by the values at the points, constant beyond the ends.
 
     Args:
-        points: evenly spaced, shape (p,).
-        values: in the points' unit, shape (n, 6).
+        points: evenly spaced arguments of the curve, shape (p,).
+        values: arguments of the samples, in the points' unit, shape (n, 6).
     """
     count = len(points)
     place = np.clip((values - points[0]) / (points[1] - points[0]), 0.0, count - 1.0)
@@ -53,7 +52,7 @@ def piecewise_linear(points: Floats, values: Floats) -> Effect:
 
 
 def texts(variable: str, equation: str) -> Texts:
-    """Return texts of an error with a known variable but unknown cause."""
+    """Return texts for an error whose variable is known and whose cause is unknown."""
     return Texts(
         what=f"An error of the struts that follows their {variable}; its cause is unknown.",
         shows=f"What a diagnosis leaves without a name repeats at the same {variable}, in every test and direction.",

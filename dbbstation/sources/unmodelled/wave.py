@@ -1,4 +1,4 @@
-"""A strut error without cause that repeats along the length."""
+"""A periodic strut error of unknown cause."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ PERIODS_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 
 
 class UnexplainedWave(ErrorSource):
-    """A strut has a wave: dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i).
+    """A strut error is a wave: dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i).
 
-    L_0 is mid-travel. The period p is no known lead; for the screw's, `screw-cyclic` is the cause. A diagnosis calls it
-    unexplained and never names this source.
+    L_0 is mid-travel. For the period of the screw's lead `screw-cyclic` is the cause; the period p is another. A
+    diagnosis calls the wave unexplained and never names this source.
     """
 
     name = "unexplained-wave"
     belongs_to = Owner.MACHINE
     varies_with = "strut-length"
     candidate = False
-    form_uncertainty = 0.0  # a curve through what was measured, no formula
+    form_uncertainty = 0.0  # a curve fitted to measurements, without formula
     texts = texts("length", "dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

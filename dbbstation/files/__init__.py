@@ -1,1 +1,1 @@
-"""File formats: schemas, places for messages, whole-or-nothing writing, sessions."""
+"""File formats: schemas, positions for messages, atomic writing, sessions."""

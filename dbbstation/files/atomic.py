@@ -1,6 +1,6 @@
-"""Write whole or not at all: a temporary file beside the target, synced, renamed, folder synced.
+"""Write files completely or not at all: a temporary file beside the target is synced and renamed.
 
-A power cut leaves the old file, the new one, or a temporary one with `.new` in its name.
+After a power cut there is the old file or the new one, and perhaps a temporary file with `.new` in its name.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _LOG = logging.getLogger(__name__)
 _MARK = ".new"
 
 _WITH_NAMES = re.compile(r"(session|events|station)(-\w+)?\.(yaml|log|json)")
-"""Names of files that hold operators' names. Only their owner may read them; rights that the owner changes are kept."""
+"""Names of files that contain operators' names. Only their owner may read them; changed rights are kept."""
 
 
 def write_text(path: Path, text: str, *, force: bool = False, rewrites: bool = False) -> None:
@@ -69,7 +69,7 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
 
 @contextlib.contextmanager
 def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
-    """Yield a temporary file to write piece by piece; it replaces the target at the end.
+    """Yield a temporary file for writing piece by piece; at the end it replaces the target.
 
     Raises:
         OutputError: as `write_bytes`; the old file stays after any error.
@@ -140,7 +140,7 @@ def write_folder(
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:
-    """Refuse to overwrite, or a missing folder, before long work.
+    """Refuse an existing output or a missing folder before long work.
 
     Raises:
         OutputError: the path exists without `force`, is a folder, has no folder to go into, or lies in a session.
@@ -194,12 +194,12 @@ def _refuse_overwriting(path: Path, *, force: bool) -> None:
 
 
 def is_leftover(path: PurePath) -> bool:
-    """Return whether a path is, or lies in, a temporary one that a power cut left."""
+    """Return whether a path is in or is a temporary file or folder of an interrupted write."""
     return any(part.startswith(".") and part.endswith(_MARK) for part in path.parts)
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove what a power cut left in a folder and its folders, with no other writer there."""
+    """Remove temporary files of interrupted writes below a folder that no other process writes into."""
     for left in sorted(folder.rglob(f".*{_MARK}")):
         if left.is_dir() and not left.is_symlink():
             remove_tree(left)

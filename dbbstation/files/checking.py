@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 FEWEST_SAMPLES = 8
-"""Centre, radius, ellipse and triangle of a circle are seven numbers; with fewer samples than this nothing is known of it."""
+"""Least number of samples of a circle: centre, radius, ellipse and triangle are seven numbers."""
 
 
 NC_PROGRAM = "an NC program", "dbbstation compensate PROGRAM --model MODEL.yaml --out FILE"
@@ -52,7 +52,7 @@ OTHERS = {
     ".dmo": ("a CMM sheet", "dbbstation jig sheet SHEET --before OLD.yaml --out NEW.yaml"),
     ".parquet": ("a table", "dbbstation mismatch TABLE --measured COLUMN --simulated COLUMN"),
 }
-"""Kinds of files that other commands read, and the command, by suffix."""
+"""Files that other commands read: kind and command, by suffix."""
 
 
 @dataclass
@@ -292,7 +292,7 @@ def _seal(session: SessionFolder) -> str:
 
 
 NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
-"""What is said of sessions that were written by hand: a changed plan is not noticed there."""
+"""Note on sessions that were written by hand: a changed plan is undetected."""
 
 
 def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:

@@ -1,4 +1,4 @@
-"""CSV rows: read cell by cell, and written safe for a spreadsheet."""
+"""Read CSV rows cell by cell, and write them safely for spreadsheets."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 _BEGINS_FORMULA = frozenset("=+-@\t\n＝＋－＠")
-"""Signs with which a spreadsheet begins a formula, or leaves them out before one [OWASP, CSV Injection]."""
+"""Characters that begin a formula in a spreadsheet, or that it ignores before one [OWASP, CSV Injection]."""
 
 DIGITS = 12
-"""Digits of a number, without zeros behind: sums of binary fractions are off in the sixteenth, and a micrometre of a kilometre is the
-ninth."""
+"""Digits of a written number: sums of binary fractions err in the sixteenth digit, and a micrometre of a kilometre is
+the ninth."""
 
 _NONE = "-"
-"""What tables hold where there is nothing."""
+"""Cells that mean a missing value."""
 
 
 def csv_text(rows: Iterable[Iterable[object]], *, exact: bool = False) -> str:

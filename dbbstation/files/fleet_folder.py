@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 FORMAT = "dbb-fleet-result/1"
 
 _MARK = "fleet.json"
-"""File by which a folder is known to be one of these."""
+"""File that marks a folder of results."""
 
 _SHOWN = 16
-"""Digits of a key that are in names."""
+"""Number of digits of a key in file names."""
 
 _LONGEST = 60
-"""Characters of a session's name that are in names."""
+"""Number of characters of a session's name in file names."""
 
 
 class FleetFolder:
-    """Results of one task in a folder. A context.
+    """Results of one task in a folder; a context manager.
 
     Raises:
         OutputError: something else lies in the folder, or it cannot be written.
@@ -62,12 +62,12 @@ class FleetFolder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let another process clean up."""
+        """Unlock the folder for other processes."""
         if self._lock is not None:
             self._lock.close()
 
     def known(self, name: str, key: str) -> dict[str, object] | None:
-        """Return a result kept under a key, or None."""
+        """Return the stored result of a key, or None."""
         path = self._file(name, key)
         try:
             data = json.loads(content_of(path))
@@ -78,7 +78,7 @@ class FleetFolder:
         return data if all((self.folder / file).is_file() for file in data.get("files", ())) else None
 
     def keep(self, name: str, key: str, data: Mapping[str, Any], files: Mapping[str, bytes]) -> dict[str, object]:
-        """Keep a result and return it as `known` would.
+        """Store a result and return it as `known` does.
 
         Raises:
             OutputError: it cannot be written.

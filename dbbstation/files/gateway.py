@@ -1,4 +1,4 @@
-"""The only reader of files: regular files only, with a size limit while reading.
+"""The program's only reader of files: it reads regular files only, up to a size limit.
 
 A pipe blocks, a device never ends, and a file may grow. `tests/files/test_gateway.py` finds code that reads elsewhere.
 A refusal is an `OSError` with its reason as `strerror`.
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 LARGEST_BYTES = 2_000_000_000
-"""Largest file that is read: an hour at a hundred thousand readings a second makes about as much."""
+"""Largest file that is read [bytes], about an hour at a hundred thousand readings a second."""
 
 BLOCK_BYTES = 1 << 20
-"""Bytes that are read at once: a thousandth of the largest file, and little beside what the program itself takes."""
+"""Bytes that are read at once: a thousandth of the largest file, which is little for the program."""
 
 
 class NotRegularError(OSError):
-    """A pipe, a socket or a device in place of a file."""
+    """The path names a pipe, a socket or a device, not a regular file."""
 
 
 class TooLargeError(OSError):
-    """A file has more bytes than are read."""
+    """A file exceeds the size limit."""
 
 
 class Source:
@@ -46,7 +46,7 @@ class Source:
         self._largest = largest
 
     def read(self, most: int = BLOCK_BYTES) -> bytes:
-        """Return at most `most` bytes; none at the end.
+        """Return at most `most` bytes; empty at the end.
 
         Raises:
             TooLargeError: it exceeds the largest size.

@@ -1,4 +1,4 @@
-"""Files that a command has read, by SHA-256, for outputs and log."""
+"""Record the files that a command reads, by SHA-256, for outputs and log."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class InputBook:
         self.virtual: dict[str, None] = {}
 
     def note_read(self, path: Path) -> None:
-        """Note a file that outputs need not name."""
+        """Note that a file was read, without naming it in outputs."""
         self._read.add(real_path(path))
 
     def was_read(self, path: Path) -> bool:
-        """Return whether a file was read so far."""
+        """Return whether this file was read before."""
         return real_path(path) in self._read
 
     def note_virtual(self, name: str) -> None:
@@ -44,7 +44,7 @@ class InputBook:
             self._around.note_virtual(name)
 
     def note(self, path: Path, digest: str) -> None:
-        """Note a file; the last reading of a changed file counts."""
+        """Note a file and its hash; for a changed file the last hash counts."""
         self._digests[path.absolute()] = digest
 
     def named(self) -> dict[str, str]:
@@ -64,7 +64,7 @@ _BOOK: ContextVar[InputBook | None] = ContextVar("inputs", default=None)
 
 @contextmanager
 def input_book() -> Iterator[InputBook]:
-    """Note every input read inside."""
+    """Note every input that is read within the context."""
     book = InputBook(_BOOK.get())
     token = _BOOK.set(book)
     try:
@@ -74,7 +74,7 @@ def input_book() -> Iterator[InputBook]:
 
 
 def in_a_book(task: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Let a task note its inputs if no command does, so that Python scripts never overwrite an input."""
+    """Let a task note its inputs outside of commands, so that Python scripts never overwrite an input."""
 
     @wraps(task)
     def call(*args: Given.args, **named: Given.kwargs) -> Result:
@@ -108,7 +108,7 @@ def note_virtual(name: str) -> None:
 
 
 def virtual_so_far() -> tuple[str, ...]:
-    """Return names of sessions and models of virtual machines that were read so far."""
+    """Return the names of all read sessions and models of virtual machines."""
     book = _BOOK.get()
     return () if book is None else tuple(book.virtual)
 
@@ -127,6 +127,6 @@ def was_read(path: Path) -> bool:
 
 
 def inputs_so_far() -> dict[str, str]:
-    """Return the SHA-256 of every input so far by name; empty without a book."""
+    """Return the SHA-256 of every read input by name; empty without a book."""
     book = _BOOK.get()
     return {} if book is None else book.named()

@@ -1,4 +1,4 @@
-"""An index of computed results in the user's cache folder, never the only copy.
+"""An index of computed results in the user's cache folder; all of them can be computed again.
 
 SQLite runs without a write-ahead log and never on a network share.
 """
@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _PATIENCE_S = 5.0
-"""How long another process may write; what cannot be kept after that is worked out again another time [s]."""
+"""Longest wait for another process that writes [s]; after it the result is not stored."""
 
 SHARES = frozenset(
     {"9p", "afs", "ceph", "cifs", "davfs", "fuse.davfs2", "fuse.glusterfs", "fuse.rclone", "fuse.s3fs", "fuse.sshfs"}
     | {"glusterfs", "ncpfs", "nfs", "nfs4", "smb3", "smbfs"}
 )
-"""File systems of other computers, on which SQLite's locks cannot be relied on."""
+"""Network file systems, on which SQLite's locks are unreliable."""
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """Evidence, without reading, that a file has not changed."""
+    """Evidence that a file is unchanged, without reading it."""
 
     modified_ns: int
     size: int
@@ -57,7 +57,7 @@ def stamp_of(path: Path, *others: Path) -> Stamp:
 
 @dataclass(frozen=True)
 class NotedAnchor:
-    """An anchor as it was noted."""
+    """A noted anchor."""
 
     anchor: str
     at: str
@@ -71,7 +71,7 @@ class _Row:
 
 
 class Kept:
-    """Stored results of one folder's files, each written at once. A context.
+    """Stored results of one folder's files, each written at once; a context manager.
 
     Args:
         begin_anew: discard all but noted anchors.
@@ -101,23 +101,23 @@ class Kept:
         self._close()
 
     def of(self, name: str, stamp: Stamp) -> str | None:
-        """Return what is kept of an unchanged file, or None."""
+        """Return the stored result of an unchanged file, or None."""
         row = self._rows.get(name)
         return row.text if row is not None and row.stamp == stamp else None
 
     def of_content(self, sha256: str) -> str | None:
-        """Return what is kept of a file with this content, or None."""
+        """Return the stored result of a file with this content, or None."""
         return self._by_hash.get(sha256)
 
     def keep(self, name: str, stamp: Stamp, sha256: str, text: str) -> None:
-        """Keep a file's result."""
+        """Store a file's result."""
         self._rows[name] = _Row(stamp, sha256, text)
         self._by_hash[sha256] = text
         row = (name, stamp.modified_ns, stamp.size, sha256, text)
         self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", [row])
 
     def drop_others(self, names: Iterable[str]) -> None:
-        """Forget missing files."""
+        """Delete the results of missing files."""
         gone = self._rows.keys() - set(names)
         for name in gone:
             del self._rows[name]

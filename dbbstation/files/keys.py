@@ -1,4 +1,4 @@
-"""Keys of stored results: hashes over everything that determines them."""
+"""Keys of stored results: hashes of all inputs that determine a result."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def digests_of(paths: Iterable[Path], folder: Path) -> list[tuple[str, str]]:
 
 
 def files_of_session(session: SessionFolder) -> list[Path]:
-    """Return a session's files that decide its results: statement, machine, plan, accepted runs, programs."""
+    """Return the files that determine a session's results: session file, machine, plan, accepted runs, programs."""
     runs = [run for run in session.runs if run.state is RunState.ACCEPTED]
     programs = [run.program.path for run in runs if run.program is not None]
     return [

@@ -1,4 +1,4 @@
-"""Error sources and NC dialects in a user's Python files.
+"""Load error sources and NC dialects from a user's Python files.
 
 A file is run as Python code: name only trusted files.
 """
@@ -59,7 +59,7 @@ def own_instances(
     attributes: Iterable[str],
     fault_of: Callable[[Base], tuple[str, str] | None] = lambda _one: None,
 ) -> list[Base]:
-    """Return instances of all such classes, by distinct names.
+    """Return instances of all classes that derive from `base`, by distinct names.
 
     Args:
         attributes: required, with `name`.
@@ -119,7 +119,7 @@ def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
 
 
 def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | None:
-    """Run a file as a module, writing nothing beside it; None with the fault and its line added."""
+    """Run a file as a module without writing beside it; None with the fault and its line added."""
     module = ModuleType(module_name(path))
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # where dataclasses look up the types of their fields

@@ -1,4 +1,4 @@
-"""An NC dialect by its name or by a user's Python file, tried before use."""
+"""Find an NC dialect by name or in a user's Python file, and try it before use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dbbstation.nc.trial import faults_of
 CONTRACT = "see `A new dialect` in docs/nc.md"
 
 DECLARED = ("name", "extension", "what")
-"""What a dialect says of itself, a text each."""
+"""Texts that a dialect must declare."""
 
 
 def dialect_given(name_or_file: str) -> Dialect:

@@ -1,4 +1,4 @@
-"""Error sources from Python files and installed packages."""
+"""Load error sources from Python files and installed packages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CONTRACT = "see `An error source of your own` in docs/diagnosis.md"
 
 
 def every_source(files: Sequence[Path] = ()) -> Mapping[str, ErrorSource]:
-    """Return all error sources by name: the package's, installed ones, and those of Python files.
+    """Return all error sources by name, from the package, from installed packages and from Python files.
 
     Raises:
         InputError: every fault of every entry point, or else of every file: missing, not Python, no source, a taken name, a

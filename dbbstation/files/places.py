@@ -1,4 +1,4 @@
-"""Targets of paths, links followed, and their names."""
+"""Targets of paths, with links resolved, and their names."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def real_path(path: Path) -> Path:
 
 
 def unused_path(folder: Path, name: str, suffix: str = "") -> Path:
-    """Return a path of that name that does not exist, numbered if necessary."""
+    """Return an unused path with this name, numbered if necessary."""
     numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, MOST_NUMBERED))
     return next(path for path in numbered if not path.exists())
 
 
 MOST_NUMBERED = 10_000
-"""Names with a number that are tried."""
+"""Greatest number that is tried in a name."""
 
 
 def name_of(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The identity of the program, on which results depend beside their inputs."""
+"""The identity of the program: results depend on it and on their inputs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from dbbstation import __version__
 from dbbstation.files.gateway import content_of
 
 ENDINGS = frozenset({".py", ".html", ".css", ".js"})
-"""Files of the package that decide what comes out."""
+"""Endings of the package's files that determine results."""
 
 LIBRARIES = ("numpy", "scipy", "numba", "pydantic")
-"""Libraries that work out numbers, or write them."""
+"""Libraries that compute or write numbers."""
 
 
 @cache
@@ -34,7 +34,7 @@ def program_identity() -> dict[str, str]:
 
 @cache
 def code_digest() -> str:
-    """Return a SHA-256 over all files that decide results, with their names."""
+    """Return a SHA-256 over the names and content of all files that determine results."""
     digest = hashlib.sha256()
     with as_file(files("dbbstation")) as folder:
         for path in sorted(path for path in folder.rglob("*") if path.suffix in ENDINGS):

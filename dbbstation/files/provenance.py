@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 BESIDE_TABLE = ".provenance.json"
-"""What follows the name of a table in the name of the file that says where it comes from."""
+"""Ending of a table's provenance file, after the table's name."""
 
 VIRTUAL = "VIRTUAL MACHINE"
-"""Marks everything that says nothing of a real machine."""
+"""Mark of outputs that do not describe a real machine."""
 
 _COMMENT = 170
-"""Characters of a command in one comment: controls cut longer ones."""
+"""Characters of a command in one comment; controls cut longer comments."""
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where an output comes from.
+    """Origin of an output.
 
     Attributes:
         command: without options that only direct the result.
@@ -44,12 +44,12 @@ class Provenance:
     virtual: tuple[str, ...] = ()
 
     def data(self) -> dict[str, object]:
-        """Return it for JSON and YAML."""
+        """Return the provenance for JSON and YAML."""
         virtual = {"virtual": list(self.virtual)} if self.virtual else {}
         return {"program": self.program, "command": self.command, "inputs": dict(self.inputs), **virtual}
 
     def comments(self, said: Mapping[str, str]) -> dict[str, str]:
-        """Return it as comments of an NC program, text by title.
+        """Return the provenance as comments of an NC program, text by title.
 
         Args:
             said: comments already there; inputs hashed in them are omitted.
@@ -63,7 +63,7 @@ class Provenance:
         return comments
 
     def text(self) -> str:
-        """Return it as lines of text."""
+        """Return the provenance as lines of text."""
         virtual = [f"{VIRTUAL}: {', '.join(self.virtual)}"] if self.virtual else []
         return "\n".join(
             [*virtual, self.command, *(f"{name}: sha256 {digest}" for name, digest in self.inputs.items())]

@@ -1,4 +1,4 @@
-"""Keep results out of session folders: the one place for this rule."""
+"""Refuse to write results into session folders; only this module has the rule."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 SESSION_FILE = "session.yaml"
-"""What a session folder is known by."""
+"""File that marks a session folder."""
 
 _MARK, _WITHIN = b"dbb-session/", 4096
-"""How a session file begins, and within how many bytes."""
+"""First characters of a session file, and the number of bytes that must contain them."""
 
 
 def session_around(path: Path) -> Path | None:

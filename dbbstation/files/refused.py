@@ -1,4 +1,4 @@
-"""Refusals of the system in words, with a remedy."""
+"""Refusals of the operating system in words, with remedies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _OTHERWISE = "check that the folder exists, its permissions and the disk"
 
 
 LONGEST_ON_WINDOWS = 259
-"""Longest path that Windows takes by default, in characters (Microsoft, "Maximum Path Length Limitation")."""
+"""Longest path that Windows allows by default, in characters (Microsoft, "Maximum Path Length Limitation")."""
 
 
 def refusal(error: OSError) -> tuple[str, str]:
@@ -31,6 +31,6 @@ def refusal(error: OSError) -> tuple[str, str]:
 
 
 def in_a_sentence(error: OSError) -> str:
-    """Return the same as one sentence."""
+    """Return reason and remedy as one sentence."""
     why, remedy = refusal(error)
     return f"{error.filename or 'the output, or a file'}: {why}; {remedy}"

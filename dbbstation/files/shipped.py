@@ -1,4 +1,4 @@
-"""Files shipped with the package: inside a wheel, or beside the package in a checkout."""
+"""Find files shipped with the package: inside a wheel, or beside the package in a checkout."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ def shipped_folder(name: str) -> Path:
 
 
 def package_text(name: str) -> str:
-    """Return a text file of the package itself, by its path inside."""
+    """Return a text file of the package, by its path in the package."""
     return (Path(__file__).resolve().parent.parent / name).read_text(encoding="utf-8")

@@ -50,7 +50,7 @@ def unreadable(path: Path, error: OSError) -> Problem:
 
 
 def first_line(path: Path) -> bytes:
-    """Return the first line with content that is no comment, or an empty one.
+    """Return the first line that is neither empty nor a comment, or an empty text.
 
     Raises:
         OSError: it cannot be read.
@@ -65,7 +65,7 @@ def is_comment(line: bytes) -> bool:
 
 
 def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield lines without their ends; text without line ends comes in pieces."""
+    """Yield lines without their ends; a text without line ends is divided into pieces."""
     left = b""
     for block in blocks:
         *whole, left = (left + block).split(b"\n")
@@ -77,8 +77,8 @@ def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
 
 
 LARGEST_TABLE = 200_000_000
-"""Largest table that is read whole [bytes], as text cell by cell: a million rows of twenty columns, or a drive's seven million
-samples. They take ten times as much memory; runs, which are longer, are read block by block."""
+"""Largest table that is read as a whole [bytes]: a million rows of twenty columns, or a drive's seven million samples.
+Its cells need ten times as much memory. Runs, which are longer, are read in blocks."""
 
 LARGEST_SHEET = 20_000_000
 """Largest CMM report that is read [bytes]: a hundred thousand features."""
@@ -87,7 +87,7 @@ LARGEST_PROGRAM = 1_000_000
 """Largest Python file of the user's own that is read [bytes]: ten thousand lines."""
 
 LONGEST_LINE = 1_000_000
-"""Bytes of a line that are kept: a row of a thousand columns has twenty thousand."""
+"""Greatest number of kept bytes of a line; a row of a thousand columns has twenty thousand."""
 
 _SPACE = b" \t\r\v\f\xef\xbb\xbf"
 
@@ -106,7 +106,7 @@ def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:
 
 
 def without_faults(read: Callable[[list[Problem]], _Found | None]) -> _Found:
-    """Return what a reader returns that adds to a list of faults.
+    """Call a reader that adds to a list of faults, and return its result.
 
     Raises:
         InputError: every fault with its place.

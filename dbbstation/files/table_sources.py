@@ -1,4 +1,4 @@
-"""Own physics on a table: classes of Python files that derive from the caller's contract."""
+"""Load own physics on a table: classes of Python files that derive from the caller's contract."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`dbb-bar/1`: a bar that was put on its calibrator, and what it read there."""
+"""`dbb-bar/1`: the reading of a bar on its calibrator."""
 
 import math
 from datetime import datetime
@@ -23,23 +23,23 @@ class CalibratorSchema(Schema):
     """The block of known length that the bar was put on."""
 
     serial_number: Annotated[str, Field(min_length=1)]
-    """Of the block."""
+    """Serial number of the block."""
     length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
-    """Length that its certificate states, at 20 degC [mm]."""
+    """Length at 20 degC by its certificate [mm]."""
     uncertainty_um: _Uncertainty
-    """Standard uncertainty of that length: half of a certificate's U (k = 2) [µm]."""
+    """Standard uncertainty of the length: half of a certificate's U (k = 2) [µm]."""
     certified: Day
     """Date of the certificate."""
     valid_until: Day | None = None
-    """Last day on which it holds."""
+    """Last day on which the certificate is valid."""
     certificate: str = ""
-    """Its number and who issued it."""
+    """Number and issuer of the certificate."""
     expansion_um_m_k: ExpansionUmMK = 0.0
-    """Thermal expansion; that of Zerodur, below 0.05, is taken for zero [µm/(m K)]."""
+    """Thermal expansion; absent: zero, since Zerodur has less than 0.05 [µm/(m K)]."""
 
 
 class ReadingsSchema(Schema):
-    """What the instrument showed while the bar stood on the calibrator."""
+    """Readings of the instrument while the bar was on the calibrator."""
 
     instrument: str
     """Name of the instrument."""
@@ -63,19 +63,19 @@ class BarFile(Schema):
     serial_number: Annotated[str, Field(min_length=1)]
     """Of the bar."""
     calibrated: Moment
-    """When it stood on the calibrator."""
+    """Time of the reading on the calibrator."""
     temp_c: TemperatureDegc
     """Temperature of the bar then [degC]."""
     temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)]
-    """Standard uncertainty of a temperature of the bar, then and while it measures [K]."""
+    """Standard uncertainty of a temperature of the bar, on the calibrator and during measurements [K]."""
     expansion_um_m_k: ExpansionUmMK
     """Thermal expansion of the bar [µm/(m K)]."""
     ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
-    """Largest deviation of its ball from a sphere by its certificate [µm]."""
+    """Largest deviation of the bar's ball from a sphere, by the ball's certificate [µm]."""
     calibrator: CalibratorSchema
-    """What it was put on."""
+    """The calibrator of the bar."""
     readings: ReadingsSchema
-    """What it read there."""
+    """The readings on the calibrator."""
 
     @property
     def length_mm(self) -> float:
@@ -85,18 +85,18 @@ class BarFile(Schema):
 
     @property
     def uncertainty_mm(self) -> float:
-        """Return the standard uncertainty of reading less true distance: calibrator and mean reading [mm]."""
+        """Return the standard uncertainty of reading minus true distance, from calibrator and mean reading [mm]."""
         return 1e-3 * math.hypot(self.calibrator.uncertainty_um, self.readings.uncertainty_um)
 
     @property
     def misread(self) -> str:
-        """Return what is wrong with the reading, a sentence; empty if plausible."""
+        """Return a sentence on an implausible reading; empty if it is plausible."""
         if 1e3 * abs(self.readings.mean_mm - self.length_mm) <= LARGEST_OFF_UM:
             return ""
         return f"the bar read {self.readings.mean_mm:g} mm on a calibrator of {self.length_mm:g} mm"
 
     def to_bar(self, stroke_mm: float | None) -> Bar:
-        """Return the bar as a session notes it.
+        """Return the bar in the form of a session.
 
         Args:
             stroke_mm: travel of its gauge by the instrument file; None if not stated.
@@ -151,8 +151,8 @@ def write_bar(path: Path, bar: BarFile, *, force: bool = False) -> None:
 
 
 LARGEST_OFF_UM = 1000.0
-"""A display that was preset by hand is off by some micrometres; one that is off by a millimetre was not preset, or the calibrator is
-another one [µm]."""
+"""Largest plausible error of a display [µm]. A display that was preset by hand errs by some micrometres. An error of a
+millimetre means that it was not preset, or that the calibrator is another one."""
 
 AFTER_MISREAD = "preset the display to the calibrator's length, or check which calibrator and bar it was"
-"""What to do about such a display."""
+"""Advice for such a display."""

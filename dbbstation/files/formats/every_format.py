@@ -33,7 +33,7 @@ _SCHEMAS = (
 )
 
 SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _SCHEMAS}
-"""Schema of each format by its name with its version."""
+"""Schema of each format, by name with version."""
 
 
 def json_schema(name: str, schema: type[Schema]) -> dict[str, object]:

@@ -16,12 +16,12 @@ from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_documen
 from dbbstation.files.yaml.text import Location, YamlDocument, parse_yaml
 
 BY_CMM, UNDER_SPINDLE = "cmm", "under-spindle"
-"""How a ball is placed: where a CMM measured it, or at an unknown place."""
+"""Position of a ball: measured by a CMM, or unknown."""
 
 _CLOSEST_BORES_MM = 5.0
 
 _OF_THE_CMM = ("bore", "holder", "uncertainty_um")
-"""What only a ball has that a CMM measured."""
+"""Keys that only CMM-measured balls have."""
 
 
 def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
@@ -44,7 +44,7 @@ class JigSchema(Schema):
     bores: Annotated[dict[int, tuple[Coordinate, Coordinate]], AfterValidator(_spaced)]
     """Number of each bore with its x, y as designed, jig frame [mm]."""
     origin_in_machine_mm: Point
-    """Where the jig frame's origin stands in the machine frame: x, y, z [mm]."""
+    """Position of the jig frame's origin in the machine frame: x, y, z [mm]."""
     rotation_about_z_deg: Annotated[float, Quantity("deg", 0, 360, signed=True)] = 0.0
     """Angle from the machine's +X to the jig's +X, towards +Y positive [deg]."""
     cmm_temp_c: TemperatureDegc | None = None
@@ -54,28 +54,28 @@ class JigSchema(Schema):
 
 
 class HolderSchema(Schema):
-    """What a ball stands on."""
+    """A holder, which carries a ball."""
 
     repeatability_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)]
-    """Scatter of the ball's place from one putting-up to the next, one standard deviation per axis [µm]."""
+    """Standard deviation per axis of the ball's position between mountings [µm]."""
 
 
 class BallSchema(Schema):
-    """A ball as the coordinate measuring machine found it, or one that is put up under the spindle."""
+    """A ball that a CMM measured, or a ball that is put up under the spindle."""
 
     placed: Literal["cmm", "under-spindle"] = "cmm"
-    """`cmm`: a CMM measured where it stands; `under-spindle`: the machine drives there and it is put up at the tool tip,
-    as the standard circular test does: its place is unknown."""
+    """`cmm`: a CMM measured its position; `under-spindle`: it is put up at the tool tip, as in the standard circular
+    test, and its position is unknown."""
     bore: int | None = None
-    """Bore that it stands in; null for a ball that stands in none."""
+    """Bore of the ball; null for a ball without bore."""
     holder: str | None = None
-    """Holder that it stands on; only of a ball placed by CMM."""
+    """Holder of the ball; only for a ball measured by CMM."""
     centre_mm: Point
-    """Centre: x, y, z, jig frame; under the spindle, where the machine is told to stand when it is put up [mm]."""
+    """Centre: x, y, z, jig frame; under the spindle, the machine's commanded position when it is put up [mm]."""
     uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)] | None = None
-    """Uncertainty of each coordinate, one standard deviation; only of a ball placed by CMM [µm]."""
+    """Standard uncertainty of each coordinate; only for a ball measured by CMM [µm]."""
     form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
-    """Largest deviation from a sphere that its certificate states; part of U of figures where the bar states that of its ball [µm]."""
+    """Largest deviation from a sphere by its certificate [µm]; it enters U of figures if the bar's ball has one too."""
 
 
 class JigFile(Schema):
@@ -84,7 +84,7 @@ class JigFile(Schema):
     format: Literal["dbb-jig/1"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)] | None = None
-    """What people call the plate."""
+    """Name of the plate."""
     jig: JigSchema
     """The plate."""
     holders: dict[str, HolderSchema]
@@ -104,7 +104,7 @@ def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
 
 
 def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Problem]) -> None:  # noqa: ANN401
-    """Check bores and holders of balls on the raw data, independently of other faults.
+    """Check the bores and holders of balls in the raw data, independently of other faults.
 
     Args:
         jig: mapping with the bores; None without a plate.

@@ -1,4 +1,4 @@
-"""`dbb-job/1`: a measurement that an operator runs again and again, with everything that was decided about it beforehand."""
+"""`dbb-job/1`: a measurement that an operator repeats, with everything that was decided in advance."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,16 +18,16 @@ from dbbstation.files.yaml.text import YamlDocument
 _Text = Annotated[str, Field(min_length=1)]
 
 MayChange = Literal["operator", "order", "port", "temperature"]
-"""What may be left to the operator."""
+"""Choices that may be left to the operator."""
 
 
 class JobFile(Schema):
-    """A measurement with its limits: what, on what, by what, and what the operator may change."""
+    """A measurement with its plan, machine, instrument and limits, and with the operator's choices."""
 
     format: Literal["dbb-job/1"]
     """Name and version of this format."""
     name: _Text
-    """What the operator reads."""
+    """Name of the job for the operator."""
     plan: _Text
     """The plan, a path from this file's folder."""
     machine: _Text
@@ -37,33 +37,33 @@ class JobFile(Schema):
     profile: str = ""
     """Its variant; absent: the usual one."""
     port: _Text
-    """Name or URL of the port; `virtual machine`: a virtual one, to try the job."""
+    """Name or URL of the port; `virtual machine` tries the job without hardware."""
     baud: Annotated[int, Field(ge=1)] | None = None
-    """Baud rate, where the instrument is not set to the usual one [1/s]."""
+    """Baud rate, if the instrument is not set to the usual one [1/s]."""
     bar: str = ""
     """Calibration of the bar, a path from this file's folder."""
     bar_waiver: str = ""
-    """Why it is measured without; one of both where the port is a real one."""
+    """Reason for measuring without this file; a real port needs one of both."""
     sessions: str = "."
-    """Folder that a session is made in each time, a path from this file's folder."""
+    """Folder of the job's sessions, a path from this file's folder."""
     serial_number: str = ""
     """Of the machine."""
     operator: str = ""
-    """Who measures, where that is always the same."""
+    """The operator, if always the same."""
     order: str = ""
-    """Order number, where that is always the same."""
+    """Order number, if always the same."""
     place: str = ""
-    """Where is measured, for a certificate."""
+    """Place of the measurement, for a certificate."""
     model: str = ""
-    """Model of the machine, a path from this file's folder; the report holds the circles beside it."""
+    """Model of the machine, a path from this file's folder; the report compares the circles with it."""
     trouble: str = ""
-    """What the operator reads where a limit is exceeded or the station cannot go on, such as whom to call."""
+    """Text for the operator if a limit is exceeded or the station cannot continue, such as whom to call."""
     required: tuple[Literal["operator", "order", "temperature"], ...] = ()
-    """What has to be given before a session begins."""
+    """Facts that the operator must state before a session."""
     tolerances: Annotated[tuple[ToleranceSettings, ...], Field(min_length=1)]
-    """What the circles may have."""
+    """Tolerances of the circles."""
     may_change: tuple[MayChange, ...] = ()
-    """What the operator may change before a session; nothing else can be."""
+    """The only choices of the operator before a session."""
 
 
 def read_job(path: Path) -> JobFile:

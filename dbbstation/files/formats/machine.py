@@ -86,12 +86,12 @@ class ComplianceSchema(Schema):
 
 
 class StrutMassesSchema(Schema):
-    """What each of the six struts weighs, on the line through its joints."""
+    """Masses of each of the six struts, on the line through its joints."""
 
     strut_kg: Annotated[float, Quantity("kg", 0, 2_000)]
-    """What lies evenly between base joint and platform joint, whatever the length [kg]."""
+    """Mass that is spread evenly between base joint and platform joint at every length [kg]."""
     motor_kg: Annotated[float, Quantity("kg", 0, 2_000)]
-    """What sits behind the base joint, turning with the strut [kg]."""
+    """Mass behind the base joint that turns with the strut [kg]."""
     motor_length_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True)]
     """Length of that part; its centre is half of it behind the joint [mm]."""
     screw_kg: Annotated[float, Quantity("kg", 0, 2_000)] = 0.0
@@ -110,25 +110,25 @@ class JointAxesSchema(Schema):
 
 
 class ControlSchema(Schema):
-    """What the control corrects by itself, as `dbbstation control` writes it."""
+    """Corrections of the control itself, as `dbbstation control` writes them."""
 
     correction: Literal["kinematics", "parameters"]
-    """A kinematics made of a model, or parameters and tables for the control's own."""
+    """A kinematics made of a model, or parameters and tables for the control's own kinematics."""
     model_sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     """SHA-256 of the model file that it was made from."""
     date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
-    """When that was."""
+    """Date of the correction."""
     sources: dict[str, dict[str, float]]
-    """Error sources that it takes out, by name, with their parameters in the sources' units."""
+    """Corrected error sources by name, with their parameters in the sources' units."""
 
 
 class MachineParts(Schema):
-    """The machine itself: what a machine file holds beside its `format` line, and a model holds inline."""
+    """The machine: the content of a machine file without its `format` line, also inline in models."""
 
     name: Annotated[str, Field(min_length=1)]
-    """What people call the machine."""
+    """Name of the machine."""
     rotation: Literal["Rx(A) Ry(B) Rz(C)", "Rz(C) Ry(B) Rx(A)"]
-    """How the tilt angles turn platform axes into machine axes; the second is that of LinuxCNC's genhexkins."""
+    """Rotation of platform axes into machine axes by the tilt angles; LinuxCNC's genhexkins uses the second."""
     base_joints_mm: tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm]
     """Centres of the base joints of struts 1 to 6, machine frame, Z up [mm]."""
     platform_joints_mm: tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm]
@@ -141,8 +141,8 @@ class MachineParts(Schema):
         0.0,
         0.0,
     )
-    """Strut errors that the controller already corrects: it drives strut i to F_i(T) minus this; positive where the
-    strut is longer than the controller believed [mm]."""
+    """Strut errors that the controller already corrects: it drives strut i to F_i(T) minus this value; positive if the
+    strut is longer than the controller assumed [mm]."""
     travel: TravelSchema
     """Limits that plans and programs are checked against."""
     screw_lead_mm: Annotated[float, Quantity("mm", 0.5, 200)] | None = None
@@ -158,15 +158,15 @@ class MachineParts(Schema):
     """Acceleration of the tool tip that the control plans with [mm/s²], for the pieces of compensated programs. Without
     it 1000."""
     masses: MassesSchema | None = None
-    """What gravity acts on; needed by the sources that model it."""
+    """Masses that gravity acts on, for the sources that model gravity."""
     compliance: ComplianceSchema | None = None
-    """Compliance of the struts as designed; needed by the sources that model gravity."""
+    """Design compliance of the struts, for the sources that model gravity."""
     strut_masses: StrutMassesSchema | None = None
-    """Weight of struts and motors; needed by the source that models it."""
+    """Weight of struts and motors, for the source that models it."""
     joint_axes: JointAxesSchema | None = None
-    """Axes of universal joints; needed by the source that models how they turn the screws."""
+    """Axes of the universal joints, for the source that models how they turn the screws."""
     control: ControlSchema | None = None
-    """What the control corrects by itself; absent where it drives by the nominal machine."""
+    """Corrections of the control itself; absent if it uses the nominal machine."""
 
     def to_domain(self) -> Machine:
         """Return the machine that calculations use."""
@@ -195,7 +195,7 @@ class MachineParts(Schema):
 
 
 def machine_parts(machine: Machine) -> MachineParts:
-    """Return a machine as files hold it, the exact inverse of `MachineParts.to_domain`."""
+    """Return a machine in the form of files, the exact inverse of `MachineParts.to_domain`."""
 
     def points(joints: Floats) -> tuple[tuple[float, ...], ...]:
         return tuple(tuple(joint) for joint in joints.tolist())
@@ -235,7 +235,7 @@ def machine_data(parts: MachineParts) -> dict[str, object]:
 
 
 class MachineFile(MachineParts):
-    """A hexapod machine tool as its controller believes it: joints, travel, screws, masses."""
+    """The nominal machine of the controller: joints, travel, screws, masses."""
 
     format: Literal["dbb-machine/1"]
     """Name and version of this format."""

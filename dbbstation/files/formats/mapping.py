@@ -1,4 +1,4 @@
-"""`dbb-mapping/1`: what the columns of a recording made elsewhere mean, written once and used for every file of its kind."""
+"""`dbb-mapping/1`: the meaning of the columns of another program's recordings, written once for all files of a kind."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ RUN = "run"
 IGNORED = "ignored"
 
 OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED, RUN)
-"""Meanings of columns that say which run a row belongs to, the same in all rows of a run."""
+"""Meanings of columns that identify the run of a row, the same in all rows of a run."""
 
 _OF_KIND = {ColumnKind.TEMPERATURE: _TEMPERATURES, ColumnKind.CURRENT: _CURRENTS}
 
@@ -51,10 +51,10 @@ UNITS: dict[str, dict[str, float]] = {
     DEVIATION: _LENGTHS,
     **{name: _OF_KIND[column.kind] for name, column in columns.COLUMNS.items() if column.kind in _OF_KIND},
 }
-"""Units of every meaning that has one, with what one of it is in the unit of a run file."""
+"""Units of every meaning, with the factor to the unit of a run file."""
 
 MEANINGS = (*UNITS, columns.STATUS, *OF_RUNS, IGNORED)
-"""Everything that a column can be."""
+"""All meanings of columns."""
 
 _SEPARATORS = {name: sign for sign, name in SEPARATORS.items()}
 
@@ -87,7 +87,7 @@ class ColumnSchema(Schema):
     """`time`, `angle`, `length` (between the ball centres), `deviation` (of the length from `zero_mm`, longer positive), `test`,
     `direction`, `repeat`, `mounting`, `state`, `started`, `run` (the same in all rows of a run, whatever stands there), `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
     unit: str | None = None
-    """Unit of its numbers; absent where the column is a text, a count or ignored."""
+    """Unit of its numbers; absent if the column is a text, a count or ignored."""
 
     @model_validator(mode="after")
     def _has_unit(self) -> Self:
@@ -102,46 +102,49 @@ class ColumnSchema(Schema):
 
 
 class AngleSchema(Schema):
-    """How the angles of the files lie in the machine."""
+    """Relation of the files' angles to the machine."""
 
     zero_deg: Annotated[float, Quantity("deg", 0, 720, signed=True)] | None = None
-    """Angle in the machine, from +X towards +Y, at which the files write 0; absent: where the plan starts the turn [deg]."""
+    """Machine angle, from +X towards +Y, at the files' angle 0; absent: the start of the plan's turn [deg]."""
     span_deg: Annotated[float, Quantity("deg", 300, 3_600)] | None = None
-    """What the angles of a run span, where that is neither a turn nor the plan's path with its overshoot [deg]."""
+    """Range of a run's angles, if neither a turn nor the plan's path with its overshoot [deg]."""
     grows: Literal["ccw", "cw", "travel"]
-    """Sense in which the numbers grow, seen from +Z: always `ccw`, always `cw`, or with the `travel` of the run."""
+    """Direction of growing numbers, seen from +Z: always `ccw`, always `cw`, or with the `travel` of the run."""
 
 
 class MappingFile(Schema):
-    """What the columns of recordings made elsewhere mean."""
+    """The meaning of the columns of another program's recordings."""
 
     format: Literal["dbb-mapping/1"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)] | None = None
-    """What people call the program that wrote the files."""
+    """Name of the program that wrote the files."""
     encoding: Literal["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"] = "utf-8"
     """Of the files' text: Windows code pages are western, central European, Cyrillic and Japanese, GB 18030 is Chinese; a byte order mark in a file takes precedence."""
     separator: Literal["comma", "semicolon", "tab"] | None = None
-    """What stands between columns; absent: a comma, or a semicolon where the decimal sign is a comma."""
+    """Separator of columns; absent: a comma, or with decimal commas a semicolon."""
     decimal: Literal[".", ","] | None = None
-    """Decimal sign; absent: a dot. Where neither is said, the shop's settings hold, or else it is found by looking."""
+    """Decimal sign; absent: a dot. If both are absent, the shop's settings apply, else the format is detected."""
     columns: Annotated[dict[str, ColumnSchema], Field(min_length=1)]
-    """Meaning of each column by its name in the file; one that is not named here is refused."""
+    """Meaning of each column by its name in the file; other columns are refused."""
     angle: AngleSchema | None = None
-    """How angles lie in the machine; needed where a column is an angle."""
+    """Relation of angles to the machine; required if a column is an angle."""
     trace: Literal["whole", "turn"] | None = None
-    """Of files with times and without angles: the `whole` run with feed-in and feed-out, or the full `turn` alone."""
+    """Content of files with times and without angles: the `whole` run with feed-in and feed-out, or the full `turn`
+    alone."""
     zero_mm: Annotated[float, Quantity("mm", 20, 2_000)] | None = None
-    """Length of the bar at which the deviation is 0; needed where a column is a deviation [mm]."""
+    """Length of the bar at which the deviation is 0; required if a column is a deviation [mm]."""
     file_name: str | None = None
-    """What the names of files say, such as `{test}_{direction}` or `{test}-{direction}-{repeat}`; without the ending."""
+    """Pattern of file names without ending, such as `{test}_{direction}` or `{test}-{direction}-{repeat}`."""
     words: dict[str, Literal["ccw", "cw"]] = Field(default_factory=dict)
-    """Directions as the files write them."""
+    """Words for directions in the files."""
     split: Literal["column", "gaps", "direction"] | None = None
-    """Of files with several runs: parted by a `column` that is `run`, by `gaps` (pauses, times that begin anew, empty lines), or where the
-    angles change their `direction`; absent: by columns that say test, direction and repeat, else a file is one run."""
+    """Division of files with several runs: by a `column` that is `run`, by `gaps` (pauses, restarting times, empty
+    lines), or by changes of the angles' `direction`; absent: by columns with test, direction and repeat, else a file is
+    one run."""
     zone: Annotated[str, AfterValidator(_zone)] | None = None
-    """Time zone of dates that have none, such as `Europe/Berlin` or hours and minutes from UTC. Where it is absent, that of the computer that imports."""
+    """Time zone of dates without one, such as `Europe/Berlin` or hours and minutes from UTC; absent: the importing
+    computer's."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -177,7 +180,7 @@ class MappingFile(Schema):
 
     @property
     def numbers(self) -> NumberLanguage | None:
-        """Return how numbers are written; None if not stated."""
+        """Return the number format; None if not stated."""
         if self.separator is None and self.decimal is None:
             return None
         decimal = self.decimal or PLAIN.decimal

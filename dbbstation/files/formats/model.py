@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Parameter
 
 _ROUNDING = 1e-9
-"""How far rounding may leave a covariance from symmetric, as a correlation."""
+"""Largest asymmetry of a covariance by rounding, as a correlation."""
 
 _NEGATIVE = 1e-6
-"""How far below zero rounding may leave an eigenvalue of the correlations."""
+"""Most negative eigenvalue of the correlations that rounding explains."""
 
 
 def read_model(
@@ -108,7 +108,7 @@ def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Probl
 
 
 class _Sources:
-    """Turns named sources of a document into fitted ones."""
+    """Turns the named sources of a document into fitted sources."""
 
     def __init__(
         self, document: YamlDocument, machine: Machine, known: Mapping[str, ErrorSource], faults: list[Problem]
@@ -211,7 +211,7 @@ def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem
 
 
 def covariance_fault(covariance: Floats) -> str | None:
-    """Return why a matrix, shape (k, k), is no covariance, or None."""
+    """Return why a matrix, shape (k, k), is not a covariance, or None."""
     variance = np.diag(covariance)
     if (variance < 0).any():
         return f"the variance in row {int(np.argmax(variance < 0)) + 1} is negative"
@@ -233,7 +233,7 @@ def covariance_fault(covariance: Floats) -> str | None:
 def write_model(
     path: Path, model: IdentifiedModel, *, provenance: Provenance | None = None, force: bool = False
 ) -> None:
-    """Write a model exactly, with its provenance.
+    """Write a model with exact numbers and its provenance.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
@@ -256,7 +256,7 @@ def model_text(model: IdentifiedModel, provenance: Provenance | None = None) -> 
 
 
 def model_data(model: IdentifiedModel) -> dict[str, object]:
-    """Return a model as its file holds it."""
+    """Return the content of a model's file."""
     count = len(model.covariance_rows)
     fault = None if model.covariance.shape == (count, count) else f"{model.covariance.shape} for {count} rows"
     if fault := fault or covariance_fault(model.covariance):

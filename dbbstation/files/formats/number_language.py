@@ -1,4 +1,4 @@
-"""How tables write numbers: decimal sign and separator of columns."""
+"""Number format of tables: decimal sign and separator of columns."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from dbbstation.errors import InputError
 
 NUMBER = r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
-"""A number as files hold it, as a regular expression. `float` takes digits of every script and `_` as well, NumPy does not."""
+"""Regular expression of a number in files. Unlike NumPy, `float` also accepts `_` and digits of every script."""
 
 _NUMBER = re.compile(NUMBER)
 
@@ -24,7 +24,7 @@ def is_number(text: str) -> bool:
 
 @dataclass(frozen=True)
 class NumberLanguage:
-    """Decimal sign and separator of columns, without signs between thousands.
+    """Decimal sign and separator of columns; signs between thousands are not allowed.
 
     Raises:
         InputError: both are commas.
@@ -46,13 +46,13 @@ class NumberLanguage:
 
     @property
     def text(self) -> str:
-        """Return the expectation in words."""
+        """Return the expected format in words."""
         sign = "a comma" if self.decimal == "," else "a dot"
         return f"the decimal sign is {sign}, columns are separated by a {SEPARATORS[self.separator]}"
 
 
 PLAIN = NumberLanguage()
-"""That of all files that this program writes."""
+"""Number format of all files that this program writes."""
 
 SIGNS = {name: sign for sign, name in SEPARATORS.items()}
 """Separators of columns by name."""

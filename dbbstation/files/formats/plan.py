@@ -1,4 +1,4 @@
-"""`dbb-plan/1`: which circles are measured, about which balls."""
+"""`dbb-plan/1`: the circles to measure, and their balls."""
 
 import math
 from dataclasses import dataclass
@@ -29,10 +29,10 @@ from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, 
 from dbbstation.system.names import is_device
 
 NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
-"""A plan that puts all its balls up under the spindle needs no plate: places are in the machine frame."""
+"""Plate of a plan with all balls under the spindle: positions are in the machine frame."""
 
 _RADIANS_BELOW_DEG = 0.6
-"""A plan whose greatest tilt is smaller than this was written in radians: 0.6 rad is 34 deg."""
+"""Greatest tilt below which a plan seems to be in radians [deg]: 0.6 rad is 34 deg."""
 
 
 def _once(directions: tuple[str, ...]) -> tuple[str, ...]:
@@ -52,7 +52,7 @@ _Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 
 
 class PathSchema(Schema):
-    """How every circle is travelled."""
+    """Path of every circle."""
 
     radius_mm: _Radius
     """Length of the bar R, distance between the ball centres [mm]."""
@@ -63,7 +63,7 @@ class PathSchema(Schema):
     overshoot_deg: _Overshoot = 0.0
     """Arc travelled before and after the full turn [deg]."""
     feed_in_mm: _FeedIn = 0.0
-    """How far outside the circle the feed-in starts, along the bar, outwards positive [mm]."""
+    """Distance of the feed-in's start outside the circle, along the bar [mm]."""
     directions: _Directions = ("ccw", "cw")
     """Senses of travel in the order they are run."""
 
@@ -80,7 +80,7 @@ class PathOverride(Schema):
     overshoot_deg: _Overshoot | None = None
     """Arc travelled before and after the full turn [deg]."""
     feed_in_mm: _FeedIn | None = None
-    """How far outside the circle the feed-in starts [mm]."""
+    """Distance of the feed-in's start outside the circle [mm]."""
     directions: _Directions | None = None
     """Senses of travel in the order they are run."""
 
@@ -104,7 +104,7 @@ class TestSchema(Schema):
     """Angle of the bar above the horizontal, moving ball higher positive [deg]: the tool tip's circle then has the
     radius R cos e and lies R sin e above the ball."""
     path: PathOverride | None = None
-    """Parts of the plan's path that this test has otherwise."""
+    """Parts of the path in which this test differs from the plan."""
 
 
 class PlanFile(Schema):
@@ -113,7 +113,7 @@ class PlanFile(Schema):
     format: Literal["dbb-plan/1"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)]
-    """What people call the plan."""
+    """Name of the plan."""
     path: PathSchema
     """How the circles are travelled."""
     jig: (
@@ -123,8 +123,8 @@ class PlanFile(Schema):
         ]
         | None
     ) = None
-    """The plate; or the path of a `dbb-jig/1` file, from this file's folder, that holds plate, holders and balls. Absent
-    where every ball is put up under the spindle: places are in the machine frame then."""
+    """The plate, or the path of a `dbb-jig/1` file with plate, holders and balls, from this file's folder. Absent if
+    every ball is put up under the spindle: positions are then in the machine frame."""
     holders: dict[str, HolderSchema] = Field(default_factory=dict)
     """Holders by name."""
     balls: dict[str, BallSchema] = Field(default_factory=dict)
@@ -132,9 +132,9 @@ class PlanFile(Schema):
     tests: Annotated[tuple[TestSchema, ...], Field(min_length=1)]
     """Tests in the order they are run."""
     repeat_at_end: tuple[str, ...] = ()
-    """Tests measured once more after all others, so that drift and height do not mix."""
+    """Tests that are repeated at the end, to separate drift and height."""
     largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
-    """Share of a run's samples that may be lost; a run that lost more is repeated [%]. Absent: 0.5."""
+    """Largest share of lost samples; a run that lost more is repeated [%]. Absent: 0.5."""
 
 
 @dataclass(frozen=True)
@@ -176,12 +176,12 @@ class InlinePlan:
 
 
 def plan_text(plan: InlinePlan) -> str:
-    """Return the text of a plan's file, jig inline."""
+    """Return the text of a plan's file, with the jig inline."""
     return yaml_text(plan_data(plan))
 
 
 def plan_data(plan: InlinePlan) -> dict[str, object]:
-    """Return a plan as its file holds it, jig inline."""
+    """Return the content of a plan's file, with the jig inline."""
     data = plan.plan.model_dump(exclude_none=True)
     for ball in data["balls"].values():
         if ball["placed"] != UNDER_SPINDLE:
@@ -266,7 +266,7 @@ def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) 
 
 
 def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem]) -> None:
-    """Check tests against balls and each other on the raw data, independently of other faults."""
+    """Check tests and their balls in the raw data, independently of other faults."""
     tests = document.entries("tests")
     names = [test.get("name") for _, test in tests]
     for index in twice(names):
@@ -289,7 +289,7 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
 
 
 def _check_file_names(document: YamlDocument, names: list[Any], faults: list[Problem]) -> None:
-    """Refuse test names that cannot all be file names on Windows, since runs and programs use them."""
+    """Refuse test names that are no distinct file names on Windows, since runs and programs use them."""
     seen: dict[str, str] = {}
     for (location, _), name in zip(document.entries("tests"), names, strict=True):
         if not isinstance(name, str):
@@ -304,9 +304,9 @@ def _check_file_names(document: YamlDocument, names: list[Any], faults: list[Pro
 
 
 def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> None:
-    """Refuse a ball set up under the spindle at one tilt and measured at another.
+    """Refuse a ball that is set up under the spindle at one tilt and measured at another.
 
-    A micrometer reading against the spindle holds for one tilt.
+    A micrometer reading at the spindle is valid for one tilt.
     """
     balls = document.entries("balls")
     under = {location[-1] for location, ball in balls if ball.get("placed") == UNDER_SPINDLE}

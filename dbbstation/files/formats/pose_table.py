@@ -1,4 +1,4 @@
-"""CSV tables of poses: `x_mm,y_mm,z_mm,a_deg,b_deg,c_deg`; further columns are kept."""
+"""Read and write CSV tables of poses, `x_mm,y_mm,z_mm,a_deg,b_deg,c_deg`; further columns are kept."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
 REASON_COLUMN = "u_not_known_because"
-"""Why the cell of an uncertainty is empty; empty itself where all three are known."""
+"""Column with the reason for empty uncertainties; its cell is empty if all three are known."""
 WARNING_COLUMN = "model_warning"
-"""What speaks against the model, the same in all rows; there only where something does."""
+"""Column with an objection to the model, the same in all rows; absent without one."""
 MOST_FAULTS = 20
 ELSE = "other tables need --decimal and --separator, or `numbers` in the settings"
 

@@ -1,4 +1,4 @@
-"""Numbers with a unit for schemas; a plausible range detects the wrong unit."""
+"""Numbers with units for schemas; a plausible range detects a wrong unit."""
 
 import math
 from collections.abc import Iterable
@@ -17,14 +17,14 @@ _MISTAKEN: dict[str, tuple[tuple[str, float], ...]] = {
     "µm/(m K)": (("1/K", 1e6),),
     "kg": (("g", 1e-3), ("t", 1e3)),
 }
-"""What people write by mistake: another unit, and what one of it is in the right one."""
+"""Usual mistakes for each unit: another unit, and its factor to the right one."""
 
 _KELVIN_AT_0_DEGC = 273.15
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number in a unit, plausible between two sizes.
+    """A number in a unit, with the range of plausible sizes.
 
     Attributes:
         least: smallest plausible value, absolute if `signed`.
@@ -38,7 +38,7 @@ class Quantity:
     signed: bool = False
 
     def fits(self, value: float) -> bool:
-        """Whether a value is plausible."""
+        """Return whether a value is plausible."""
         size = abs(value) if self.signed else value
         return self.least <= size <= self.most or (self.or_zero and value == 0)
 
@@ -57,7 +57,7 @@ class Quantity:
         )
 
     def guess(self, value: float) -> str:
-        """Return the unit that a value suggests, or an empty text."""
+        """Return the unit that an implausible value suggests, or an empty text."""
         for unit, factor in _MISTAKEN.get(self.unit, ()):
             if self.fits(value * factor):
                 return f" (it looks like {unit})"
@@ -142,7 +142,7 @@ ExpansionUmMK = Annotated[float, Quantity("µm/(m K)", 0.01, 50, or_zero=True)]
 
 
 def twice(values: Iterable[Any]) -> list[int]:
-    """Return indices of values that occurred earlier; mappings are not compared."""
+    """Return indices of repeated values; mappings are not compared."""
     seen: set[Any] = set()
     again = []
     for index, value in enumerate(values):

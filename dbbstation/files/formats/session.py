@@ -1,4 +1,4 @@
-"""`dbb-session/1`: what was done in a session, one entry per run."""
+"""`dbb-session/1`: the record of a session, one entry per run."""
 
 from datetime import date, datetime
 from pathlib import PurePosixPath
@@ -43,7 +43,7 @@ def _day(text: str) -> str:
 _NOT_READ = (None, None, None)
 
 BAR_LENGTH = Quantity("mm", 20, 2_000)
-"""Lengths that ball bars have."""
+"""Plausible lengths of ball bars."""
 
 InsidePath = Annotated[str, AfterValidator(_inside)]
 Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$"), AfterValidator(_day)]
@@ -55,31 +55,31 @@ class BarSchema(Schema):
     """The bar and the calibration of its length, which is compared with the plan and never added to readings."""
 
     serial_number: str = ""
-    """Of the bar."""
+    """Serial number of the bar."""
     calibrated_length_mm: Annotated[float, BAR_LENGTH]
-    """Distance between the ball centres that the calibration found [mm]."""
+    """Calibrated distance between the ball centres [mm]."""
     calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
-    """Uncertainty of that length, one standard deviation [mm]."""
+    """Standard uncertainty of this length [mm]."""
     stroke_mm: Annotated[float, Quantity("mm", 0.1, 100)] | None = None
-    """How far its gauge travels from that length, either way; circles of other radii cannot have been run with it [mm]."""
+    """Travel of its gauge from this length, either way; circles of other radii are impossible [mm]."""
     calibrated: Moment | None = None
     """When."""
     temp_c: TemperatureDegc | None = None
-    """Temperature of the bar then [degC]."""
+    """Temperature of the bar at its calibration [degC]."""
     expansion_um_m_k: ExpansionUmMK | None = None
     """Thermal expansion of the bar [µm/(m K)]."""
     reading_mm: Annotated[float, BAR_LENGTH] | None = None
-    """What it read on its calibrator; the fit knows the difference, recorded lengths stay as read [mm]."""
+    """Reading on the calibrator. The fit accounts for the difference; recorded lengths are never corrected [mm]."""
     temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
-    """Standard uncertainty of a temperature of the bar; where it is stated, the fit knows what the bar grew by [K]."""
+    """Standard uncertainty of a temperature of the bar; if stated, the fit accounts for the bar's growth [K]."""
     calibrator_serial_number: str | None = None
     """Of the calibrator."""
     calibrator_certificate: str | None = None
-    """Number of its certificate and who issued it."""
+    """Number and issuer of its certificate."""
     calibrator_certified: Day | None = None
     """Date of its certificate."""
     calibrator_valid_until: Day | None = None
-    """Last day on which it holds."""
+    """Last day on which the certificate is valid."""
     ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
     """Largest deviation of the bar's ball from a sphere by its certificate [µm]."""
 
@@ -92,9 +92,9 @@ class InstrumentSchema(Schema):
     profile: str = ""
     """Its variant; empty: the usual one."""
     port: str = ""
-    """Name or URL of the port that it was read at."""
+    """Name or URL of the instrument's port."""
     virtual: bool
-    """Whether machine and instrument are virtual: what was read says nothing of a real machine."""
+    """Whether machine and instrument are virtual, so that the readings describe no real machine."""
 
 
 class ProgramSchema(Schema):
@@ -109,14 +109,14 @@ class ProgramSchema(Schema):
 
 
 class CountsSchema(Schema):
-    """What came over the line during a run, and what did not."""
+    """Counts of received, lost and rejected samples of a run."""
 
     received: Annotated[int, Field(ge=0)]
     """Samples in the run file."""
     lost: Annotated[int, Field(ge=0)]
-    """Samples that the line lost between them."""
+    """Samples that the line lost."""
     rejected: dict[str, Annotated[int, Field(ge=1)]] = Field(default={})
-    """Samples of the file that no calculation uses, by what the instrument said of them, such as `overrange`."""
+    """Samples of the file that no calculation uses, by the instrument's status, such as `overrange`."""
 
 
 class RunSchema(Schema):
@@ -129,29 +129,29 @@ class RunSchema(Schema):
     repeat: Annotated[int, Field(ge=1)]
     """Counts the runs of this test and direction, from 1."""
     mounting: Annotated[int, Field(ge=1)] | None = None
-    """Counts how often a ball was put up; runs with one number at one ball share the ball's place. Absent: one
-    mounting per test."""
+    """Number of the ball's mounting; runs with the same number and ball share the ball's position. Absent: one mounting
+    per test."""
     file: InsidePath
     """Path in the session folder."""
     started: Moment | None = None
-    """When the first sample was taken."""
+    """Time of the first sample."""
     state: Literal["recording", "complete", "accepted", "rejected"]
-    """`recording`: the station died here; `complete`: not judged yet."""
+    """`recording`: the recording was interrupted; `complete`: not judged yet."""
     reason: str | None = None
-    """Why it was rejected."""
+    """Reason for a rejection."""
     sha256: Sha256Hex | None = None
     """Of the run file; absent only while recording."""
     chain_sha256: Sha256Hex | None = None
-    """Covers this entry and the `chain_sha256` of the sealed run before it in the list."""
+    """Hash of this entry and the previous sealed run's `chain_sha256`."""
     counts: CountsSchema | None = None
-    """Samples received, rejected and lost; absent where the recording was made elsewhere."""
+    """Samples received, rejected and lost; absent if another program recorded them."""
     instrument: InstrumentSchema | None = None
-    """What read it; absent in recordings made elsewhere."""
+    """Instrument of the run; absent in other programs' recordings."""
     program: ProgramSchema | None = None
-    """What was commanded, where that was not the plan's nominal circle."""
+    """The NC program, if not the plan's nominal circle."""
     centre_mm: Point | None = None
-    """Centre of the circle as programmed: x, y, z, machine frame, where rounding in the program makes it differ from
-    the plan [mm]."""
+    """Centre of the programmed circle: x, y, z, machine frame, if rounding in the program changes the plan's centre
+    [mm]."""
 
     @model_validator(mode="after")
     def _sealed(self) -> Self:
@@ -168,100 +168,100 @@ _Reading = Annotated[float, Quantity("µm", 0, 5_000, signed=True)]
 
 
 class SetUpErrorsSchema(Schema):
-    """What a micrometer read of balls that were put up under the spindle, for one mounting."""
+    """Micrometer readings of balls under the spindle, for one mounting."""
 
     test: str
-    """A test that was run on the mounting."""
+    """A test of this mounting."""
     mounting: Annotated[int, Field(ge=1)] | None = None
-    """Number of the mounting as the runs have it; absent where they have none."""
+    """Number of the mounting in the runs; absent if they have none."""
     fixed_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
-    """Fixed ball less tool tip while the machine stands at the ball's commanded place: x, y, z, machine frame; null where
-    nobody measured [µm]."""
+    """Fixed ball minus tool tip with the machine at the ball's commanded position: x, y, z, machine frame; null if not
+    measured [µm]."""
     moving_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
-    """Moving ball less tool tip: x, y, z, platform frame; null where nobody measured [µm]."""
+    """Moving ball minus tool tip: x, y, z, platform frame; null if not measured [µm]."""
     uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000)]
-    """Of each reading, one standard deviation [µm]."""
+    """Standard uncertainty of each reading [µm]."""
 
 
 class LogSchema(Schema):
-    """How far the event log of the session went when this file was written."""
+    """Position in the session's event log when this file was written."""
 
     events: Annotated[int, Field(ge=1)]
     """Number of its events."""
     sha256: Sha256Hex
-    """Link of the last of them."""
+    """Link of the last event."""
 
 
 class SealSchema(Schema):
-    """Hashes of the files beside the runs when the session was sealed, and the number of runs."""
+    """Hashes of machine, plan and jig when the session was sealed, and the number of runs."""
 
     files: dict[str, Sha256Hex]
-    """SHA-256 of machine, plan and the jig file that the plan may name, by their paths as this file names them."""
+    """SHA-256 of machine, plan and the plan's jig file, by their paths in this file."""
     runs: Annotated[int, Field(ge=0)]
     """Number of sealed runs."""
     chain_sha256: Sha256Hex | None = None
-    """`chain_sha256` of the last of them; absent where there is none."""
+    """`chain_sha256` of the last sealed run; absent if there is none."""
     log: LogSchema | None = None
-    """The event log that covers everything in this file; every seal that is read names one."""
+    """The event log of this file; every valid seal names one."""
 
 
 class AmendmentSchema(Schema):
-    """A change of what was sealed, made on purpose."""
+    """A deliberate change of a sealed file."""
 
     what: str
-    """File that was changed, as `seal.files` names it; `runs` for the list of runs."""
+    """Changed file, named as in `seal.files`; `runs` for the list of runs."""
     former_sha256: Sha256Hex | None = None
-    """Of the file before; of the list: `chain_sha256` of its last run. Absent where there was none."""
+    """Hash of the former file, or `chain_sha256` of the former list's last run; absent if there was none."""
     sha256: Sha256Hex | None = None
     """The same now."""
     former: InsidePath | None = None
-    """Where the file is kept as it was before, in the session folder."""
+    """Path of the former file in the session folder."""
     reason: Annotated[str, Field(min_length=1)]
-    """Why, in the words of who did it."""
+    """Reason, as the user stated it."""
     made: Moment
     """When."""
 
 
 class NoteSchema(Schema):
-    """What somebody noted while it was measured."""
+    """A note during the measurement."""
 
     made: Moment
     """When."""
     text: str = ""
     """In their words."""
     ambient_temp_c: TemperatureDegc | None = None
-    """Temperature of the shop then [degC]."""
+    """Temperature of the shop at this time [degC]."""
 
 
 class SessionFile(Schema):
-    """What was done: paths of machine and plan, the bar, one entry per run."""
+    """Record of a session: paths of machine and plan, the bar, one entry per run."""
 
     format: Literal["dbb-session/1"]
     """Name and version of this format."""
     machine: InsidePath
-    """The nominal model that the controller had while measuring, `dbb-machine/1`."""
+    """The controller's nominal machine during the measurement, `dbb-machine/1`."""
     plan: InsidePath
     """The test plan as run, `dbb-plan/1`."""
     serial_number: str = ""
     """Of the machine."""
     operator: str = ""
-    """Who measured."""
+    """Name of the operator."""
     job: str = ""
-    """Job or order number: what it was measured for."""
+    """Job or order number of the measurement."""
     ambient_temp_c: TemperatureDegc | None = None
     """Temperature of the shop [degC]."""
     instrument: InstrumentSchema | None = None
-    """What the session was begun with; all its runs are virtual, or none."""
+    """Instrument at the session's start; its runs are all virtual or all real."""
     bar: BarSchema | None = None
     """The bar."""
     bar_waiver: str = ""
-    """Why it was measured without a fresh calibration of the bar."""
+    """Reason for measuring without a fresh calibration of the bar."""
     seal: SealSchema | None = None
-    """What was sealed; absent in sessions that were written by hand."""
+    """The seal; absent in sessions that were written by hand."""
     amendments: tuple[AmendmentSchema, ...] = ()
-    """What was changed on purpose after it was sealed, oldest first."""
+    """Deliberate changes of sealed files, oldest first."""
     notes: tuple[NoteSchema, ...] = ()
-    """What was noted while it was measured, oldest first."""
+    """Notes during the measurement, oldest first."""
     set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
     """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
     runs: tuple[RunSchema, ...] = ()

@@ -22,11 +22,11 @@ OF_USER = "settings.yaml"
 """Name of the file in the user's configuration folder."""
 
 _OPEN = frozenset({"program", "limits", "report"})
-"""Blocks whose keys stand for themselves: two files may each give some. The other blocks are one thing, such as one bar,
-and come from one file whole."""
+"""Blocks with independent keys, which several files may state. Every other block describes one thing, such as one bar,
+and comes from one file as a whole."""
 
 _PART_OF = {"profile": "instrument"}
-"""Keys that say something about another one, and hold only where that one comes from the same file."""
+"""Keys that depend on another key, and apply only if both come from the same file."""
 
 _PROTOCOL_ENDINGS = (".yaml", ".yml")
 
@@ -51,7 +51,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Settings:
-    """Values in force, from several files.
+    """Values that apply, from several files.
 
     Attributes:
         values: by dotted key, such as `limits.largest_correction_mm`; absent if not stated.
@@ -66,7 +66,7 @@ class Settings:
 
 
 def settings_files(beside: Path) -> list[Path]:
-    """Return existing settings files, the strongest first: that in `beside`, then the user's."""
+    """Return existing settings files, the strongest first: the file in `beside`, then the user's."""
     import platformdirs  # noqa: PLC0415 - only commands that take settings look for them
 
     user = platformdirs.user_config_path("dbbstation", appauthor=False, roaming=True) / OF_USER

@@ -1,4 +1,4 @@
-"""`dbb-settings/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+"""`dbb-settings/1`: the settings of a shop: instrument, port, bar, limits, number formats, tolerances."""
 
 from typing import Annotated, Literal
 
@@ -17,14 +17,14 @@ _Word = Annotated[str, Field(min_length=1)]
 
 
 class BarSettings(Schema):
-    """The ball bar of the shop, as a session file has it."""
+    """The shop's ball bar, with the keys of a session file."""
 
     serial_number: str = ""
-    """Of the bar."""
+    """Serial number of the bar."""
     calibrated_length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
-    """Distance between the ball centres [mm]; held against the plan's radii, never added to readings."""
+    """Distance between the ball centres [mm]; compared with the plan's radii, never added to readings."""
     calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
-    """Standard uncertainty of that length [mm]."""
+    """Standard uncertainty of this length [mm]."""
     temp_c: TemperatureDegc | None = None
     """Temperature of the bar at its calibration [degC]."""
 
@@ -48,7 +48,7 @@ class LimitSettings(Schema):
     largest_correction_mm: Annotated[float, Quantity("mm", 1e-3, LARGEST_ALLOWED_MM)] | None = None
     """A model that shifts any point by more is refused [mm]."""
     largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
-    """A run that lost more of its samples is repeated, where the plan does not say [%]."""
+    """A run that lost more of its samples is repeated, if the plan states no limit [%]."""
     largest_bar_age_h: Annotated[float, Quantity("h", 0.1, 10_000)] | None = None
     """A calibration of the bar that is older is stale [h]."""
 
@@ -59,7 +59,7 @@ class NumberSettings(Schema):
     decimal: Literal[".", ","] | None = None
     """Decimal sign."""
     separator: Literal[",", ";", "\t"] | None = None
-    """What stands between columns; absent: a semicolon with a decimal comma, else a comma."""
+    """Separator of columns; absent: a semicolon with decimal commas, else a comma."""
 
     @model_validator(mode="after")
     def _apart(self) -> "NumberSettings":
@@ -69,7 +69,7 @@ class NumberSettings(Schema):
 
 
 class ToleranceSettings(Schema):
-    """What some circles may have."""
+    """A tolerance of some circles."""
 
     quantity: Literal[tuple(map(str, CircleFigure))]  # type: ignore[valid-type]  # the figures have one list
     """Figure of the circle."""
@@ -78,12 +78,12 @@ class ToleranceSettings(Schema):
     unit: Literal["µm", "mm"]
     """Unit of `largest`."""
     tests: tuple[_Word, ...] = ()
-    """Tests that it holds for; absent: all."""
+    """Tests of the tolerance; absent: all."""
     directions: tuple[Literal["ccw", "cw"], ...] = ()
-    """Senses of travel that it holds for; absent: both. Figures of both directions take none."""
+    """Directions of the tolerance; absent: both. It is not allowed for figures of both directions."""
     filter: Literal["none", 15, 30, 50, 150] | None = None
-    """Filter of G, F, G(b) and H: `none`, or its cut-off in undulations per revolution, Gaussian but for 30, which is cut off sharply;
-    absent: 30."""
+    """Filter of G, F, G(b) and H: `none`, or its cut-off in undulations per revolution; absent: 30. It is Gaussian, but
+    sharp at 30."""
 
     @model_validator(mode="after")
     def _plausible(self) -> "ToleranceSettings":
@@ -110,26 +110,26 @@ class ReportSettings(Schema):
     """What stands at the head of reports."""
 
     laboratory: _Word | None = None
-    """Who measures: name and address."""
+    """Name and address of the measuring laboratory."""
     customer: _Word | None = None
-    """Who has the machine: name and address."""
+    """Name and address of the machine's owner."""
     logo: _Word | None = None
     """Picture of the shop, PNG or JPEG; a path from this file's folder."""
 
 
 class SettingsFile(Schema):
-    """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
+    """Defaults of a shop's commands; every key except the format may be absent."""
 
     format: Literal["dbb-settings/1"]
     """Name and version of this format."""
     instrument: _Word | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""
     profile: _Word | None = None
-    """Variant of the instrument, where it is not the usual one."""
+    """Variant of the instrument, if not the usual one."""
     port: _Word | None = None
     """Port that the instrument is connected to, or a URL."""
     baud: Annotated[int, Field(ge=1)] | None = None
-    """Baud rate, where the instrument is not set to the usual one."""
+    """Baud rate, if the instrument is not set to the usual one."""
     serial_number: _Word | None = None
     """Of the machine; noted in every session."""
     bar: BarSettings | None = None
@@ -141,9 +141,10 @@ class SettingsFile(Schema):
     numbers: NumberSettings | None = None
     """How numbers are written in tables from elsewhere."""
     simulators: tuple[Annotated[str, Field(pattern="^[0-9a-f]{64}$")], ...] | None = None
-    """Simulators that `mismatch` may run, by the SHA-256 that it names; not taken from a file beside sessions, which others may write."""
+    """Simulators that `mismatch` may run, by the SHA-256 that it prints; ignored in a file beside sessions, which
+    others may write."""
     tolerances: tuple[ToleranceSettings, ...] | None = None
-    """What circles may have."""
+    """Tolerances of circles."""
     report: ReportSettings = ReportSettings()
     """What stands at the head of reports."""
 

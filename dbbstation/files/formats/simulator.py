@@ -1,4 +1,4 @@
-"""`dbb-simulator/1`: a simulator of one's own, its parameters, outputs, and ports at which something may act."""
+"""`dbb-simulator/1`: a user's simulator with its parameters, outputs and ports."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _name(text: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_name)]
-"""What a Python program can call something."""
+"""A name that Python allows."""
 
 BASE = "Simulator"
 """Class that a simulator derives from."""
@@ -35,18 +35,18 @@ CONTRACT = "see `A simulator in the loop` in docs/mismatch-simulator.md"
 
 
 class ParameterSchema(Schema):
-    """One number of the simulator that is fitted anew."""
+    """One parameter of the simulator that is refitted."""
 
     value: float
-    """What it is set to, in its unit."""
+    """Its present value, in its unit."""
     unit: str = ""
     """Its unit, as printed."""
     uncertainty: Annotated[float, Field(gt=0.0)] | None = None
-    """Standard uncertainty to which it is known, in its unit; absent: nothing is known of it but the bounds."""
+    """Prior standard uncertainty, in its unit; absent: only the bounds are known."""
     low: float | None = None
-    """Least value that it can have."""
+    """Least possible value."""
     high: float | None = None
-    """Greatest value that it can have."""
+    """Greatest possible value."""
 
     @model_validator(mode="after")
     def _inside(self) -> Self:
@@ -68,7 +68,7 @@ class OutputSchema(Schema):
     unit: str = ""
     """Unit of both."""
     filter_s: Annotated[float, Field(gt=0.0)] | None = None
-    """Time constant of the sensor's filter, of first order, which simulated values pass [s]; absent: none."""
+    """Time constant of the sensor's first-order filter, applied to simulated values [s]; absent: no filter."""
 
 
 class SignalSchema(Schema):
@@ -77,19 +77,19 @@ class SignalSchema(Schema):
     unit: str = ""
     """Its unit; angles in rad, deg or turn."""
     result: bool = False
-    """Whether it results from what is simulated, so that it shows a difference and is no cause of it."""
+    """Whether it results from the simulation, so that it cannot cause a difference."""
 
 
 class PortSchema(Schema):
-    """One place of the simulator where something may act."""
+    """One point of the simulator at which a missing term may act."""
 
     about: str = ""
-    """What it is, in words."""
+    """Description of the port."""
     unit: str = ""
-    """Unit of what acts there."""
+    """Unit of the term."""
     signals: dict[Name, str | SignalSchema] = Field(default_factory=dict)
-    """Quantities that are known there, with their units; angles in rad, deg or turn. One that results from what is simulated is given as
-    `{unit: N m, result: true}`."""
+    """Known quantities at the port, with their units; angles in rad, deg or turn. Write a quantity that results from
+    the simulation as `{unit: N m, result: true}`."""
 
     @property
     def units(self) -> dict[str, str]:
@@ -103,35 +103,35 @@ class PortSchema(Schema):
 
 
 class SimulatorFile(Schema):
-    """A simulator in the loop."""
+    """File of a simulator in the loop."""
 
     format: Literal["dbb-simulator/1"]
     """Name and version of this format."""
     name: Annotated[str, Field(min_length=1)]
-    """What people call it."""
+    """Name of the simulator."""
     python: Annotated[str, Field(min_length=1)] | None = None
     """Python file with a class that derives from `Simulator`, beside this file. It is executed."""
     program: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] | None = None
-    """Program and its arguments, in place of `python`: it reads `inputs.csv` and `parameters.json` and writes `outputs.csv` in the folder
-    where it is run. It is executed."""
+    """Program and its arguments, in place of `python`: it reads `inputs.csv` and `parameters.json` and writes
+    `outputs.csv` in its working folder. It is executed."""
     fmu: Annotated[str, Field(min_length=1)] | None = None
     """FMU (FMI 2 or 3) beside this file, in place of `python`. It is executed by FMPy, an extra of the installation."""
     variables: dict[str, str] = Field(default_factory=dict)
-    """Names of variables of the FMU, by the names here, where they differ; a signal is named `port.signal`, or `signal`."""
+    """Variables of the FMU by the names here, if they differ; a signal is named `port.signal`, or `signal`."""
     time: Annotated[str, Field(min_length=1)]
-    """Column of the recordings that says when, rising [s]."""
+    """Column of the recordings with the rising time [s]."""
     inputs: dict[Name, str] = Field(default_factory=dict)
-    """Columns of the recordings that the simulator is given, by the name that it is given them by; `t` is the time."""
+    """Columns of the recordings for the simulator, by the simulator's name for each; `t` is the time."""
     parameters: dict[Name, ParameterSchema] = Field(default_factory=dict)
-    """Numbers that are fitted anew with everything that is tried."""
+    """Parameters that are refitted with every tried term."""
     states: dict[Name, ParameterSchema] = Field(default_factory=dict)
-    """Initial states: the same, but for each recording by itself."""
+    """Initial states, which are refitted for each recording separately."""
     outputs: Annotated[dict[Name, OutputSchema], Field(min_length=1)]
-    """What is compared; several count by the noise of each."""
+    """Compared outputs; several are weighted by their noise."""
     ports: Annotated[dict[Name, PortSchema], Field(min_length=1)]
-    """Where something may act."""
+    """Points at which a missing term may act."""
     time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 60.0
-    """Longest time that one simulation may take [s]; one that takes longer is refused with its input."""
+    """Longest time of one simulation [s]; a longer one is refused with its input."""
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
@@ -148,7 +148,7 @@ class SimulatorFile(Schema):
 
 
 def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:
-    """Read a simulator's file and inspect, but do not run, its Python; None with faults added to `faults`."""
+    """Read a simulator's file and inspect its Python without running it; None with faults added to `faults`."""
     document = read_document(path, SimulatorFile, faults)
     found = None if document is None else validate(document, SimulatorFile, faults)
     if document is None or found is None:
@@ -241,4 +241,4 @@ def _last(node: ast.expr) -> str:
 
 
 ARGUMENTS = 4
-"""Of `simulate`, `self` among them."""
+"""Number of arguments of `simulate`, with `self`."""

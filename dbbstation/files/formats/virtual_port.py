@@ -3,7 +3,8 @@
 import re
 
 SLOWEST, FASTEST = 0.01, 50.0
-"""Factors by which a virtual machine may run faster than real time: below it stands still for who looks on, above it computers do not keep up."""
+"""Slowest and fastest speed of a virtual machine relative to real time: slower ones seem to stand still, and computers
+are too slow for faster ones."""
 
 _NAME = "virtual machine"
 _NAMED = re.compile(rf"{_NAME}(?:, ([0-9]+(?:\.[0-9]+)?) times faster)?")
@@ -24,5 +25,5 @@ def time_scale_of(port: str) -> float | None:
 
 
 def misspelt(port: str) -> bool:
-    """Return whether a name begins like a virtual machine's and is none."""
+    """Return whether a name is a misspelt name of a virtual machine."""
     return port.strip().lower().startswith("virtual") and time_scale_of(port) is None

@@ -1,4 +1,4 @@
-"""Change a seal deliberately: the former file is kept, and the session notes the change."""
+"""Change sealed files deliberately: the former file is kept, and the session notes the change."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 def amend(
     folder: Path, reason: str, *, made: datetime, plan: Path | None = None, machine: Path | None = None
 ) -> tuple[Amendment, ...]:
-    """Accept a session as it is now, with another plan or machine if given, and note why.
+    """Accept a session as it is, or with another plan or machine, and note the reason.
 
     Args:
         plan: replaces the session's plan, with its jig inline; None: unchanged.
@@ -130,7 +130,7 @@ def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[Sessi
 
 
 def _kept(folder: Path, name: str, seal: Seal) -> str:
-    """Return where a sealed file is kept in its former state; empty if nowhere."""
+    """Return the path of a sealed file's former copy; empty without one."""
     stored = seal.files.get(name, "")
     copy = copy_name(name, stored)
     return copy if stored and hashes(folder, (copy,)).get(copy) == stored else ""

@@ -1,4 +1,4 @@
-"""Anchors: the link of a session's last event, noted elsewhere, reveals later changes."""
+"""Anchors: the hash of a session's last event, noted elsewhere, reveals later changes."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.seal import Seal
 
 SHORTEST = 16
-"""Hex digits of an anchor that are enough: nobody finds another log with the same sixteen."""
+"""Least number of hex digits of an anchor: nobody can make another log with the same sixteen."""
 
 
 def anchor_of(seal: Seal | None) -> str:
-    """Return a session's anchor, its last event; empty without a seal."""
+    """Return a session's anchor, the link of its last event; empty without a seal."""
     return "" if seal is None else seal.anchor
 
 
 def links_of(folder: Path) -> tuple[str, ...]:
-    """Return every anchor that a session has had, by its files."""
+    """Return every anchor that a session ever had, from its files."""
     log = read_event_log(folder, [])
     return () if log is None else log.links
 
 
 def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
-    """Return when each run was sealed, by test, direction and repeat, as far as the event log has dates."""
+    """Return when each run was sealed, by test, direction and repeat, if the event log has the date."""
     log, found = read_event_log(folder, []), dict[tuple[str, str, int], datetime]()
     for event in () if log is None else log.events:
         for run in (*event.runs, *(event.all_runs or ())):
@@ -39,14 +39,14 @@ def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
 
 
 def impossible_day(at: datetime) -> str:
-    """Return a run's day, and why this day is impossible, or an empty text."""
+    """Return a run's day with the reason if it is impossible, or an empty text."""
     if at > datetime.now(UTC) + timedelta(days=1):  # zones differ by up to 26 hours
         return f"{at:%Y-%m-%d}, which is still to come"
     return f"{at:%Y-%m-%d}, before there were ball bars" if at.year < FIRST_BARS else ""
 
 
 FIRST_BARS = 1982
-"""Year of the first paper on the magnetic ball bar [Bryan 1982]; zero of a clock is 1970, of a table 1900."""
+"""Year of the first paper on the magnetic ball bar [Bryan 1982]. A clock at zero gives 1970, a spreadsheet 1900."""
 
 
 def anchor_told(folder: Path, anchor: str) -> Problem:

@@ -1,4 +1,4 @@
-"""Check that a bar's length and stroke can run the plan."""
+"""Check that a bar's length and stroke suit the plan."""
 
 from __future__ import annotations
 

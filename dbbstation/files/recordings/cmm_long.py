@@ -1,4 +1,4 @@
-"""Sheets with a row per coordinate, as Calypso writes them, turned into a row per ball."""
+"""Convert sheets with a row per coordinate, as Calypso writes them, to a row per ball."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _AXIS_CELL = re.compile(
 
 
 def is_long(table: TableFile, columns: Mapping[str, str]) -> bool:
-    """Return whether a table has a column of axes and one of values instead of x, y, z."""
+    """Return whether a table has columns of axes and values instead of x, y, z."""
     if {"x", "y"} & set(columns):
         return False
     return _axis_column(table, columns) is not None and _named(table, columns, "value", _VALUE) is not None

@@ -1,4 +1,4 @@
-"""Ball centres from sheets of a coordinate measuring machine, CSV or DMIS, and the jig file made of them."""
+"""Read ball centres from CMM sheets, CSV or DMIS, and make the jig file."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def jig_of_sheet(
     uncertainty_um: float | None,
     cmm_temp_c: float | None,
 ) -> JigFile:
-    """Return a jig with the balls of a sheet; plate and holders stay.
+    """Return a jig with the balls of a sheet; plate and holders stay unchanged.
 
     Args:
         uncertainty_um: for balls without a stated one; None: refuse them.
@@ -196,11 +196,12 @@ _NOT_MEASURED = {
     "tol",
     "tolerance",
 }
-"""Words beside an axis; `U` and `u` are different things, and so is what another program means by them: they are named, not guessed."""
+"""Words beside an axis in names of other columns. Programs use `U` and `u` differently, so these columns must be named
+by the user."""
 
 
 def _usual(key: str, table: TableFile) -> str | None:
-    """Return the column of this role by its name, such as `X`, `x_mm` or `X Ist [mm]`; `U(x) [µm]` is not guessed."""
+    """Return the column whose name means this role, such as `X`, `x_mm` or `X Ist [mm]`; `U(x) [µm]` is not guessed."""
     if key.startswith("u"):
         return None
     wanted = _NAMES.get(key, {key})
@@ -228,7 +229,7 @@ def _bad_cells(table: TableFile, name: str) -> list[Problem]:
 
 
 LIKE_A_CMM_UM = (0.01, 100.0)
-"""Standard uncertainties of a ball's centre that a CMM can have [µm]: outside, the unit that nobody stated is another one."""
+"""Range of a CMM's standard uncertainty of a ball's centre [µm]; values outside indicate another, unstated unit."""
 
 
 def _is_like_a_cmm(one: Measured) -> bool:
@@ -242,7 +243,7 @@ def _unlike_a_cmm(one: Measured, file: str, unit: str) -> Problem:
 
 
 def _said_unit(name: str, units: Mapping[str, str]) -> str:
-    """Return a column's unit: below its name, in brackets, or at its end; else empty."""
+    """Return a column's unit from below its name, from brackets, or from the name's end; else empty."""
     for text in (units.get(name, ""), *re.findall(r"[\[(]\s*([^\])]*?)\s*[\])]", name), name.rpartition("_")[2]):
         plain = text.strip(" []()").lower().replace("μ", "µ")
         known = {"um": "µm", "in": "inch", "uinch": "µinch", "uin": "µinch"}.get(plain, plain)

@@ -1,7 +1,8 @@
-"""Measured points in the output of a CMM in DMIS [ISO 22093]: `FA(NAME)=FEAT/SPHERE,OUTER,CART,x,y,z,d` and `FEAT/POINT,CART,x,y,z,i,j,k`.
+"""Read measured points from a CMM's output in DMIS [ISO 22093]: `FA(NAME)=FEAT/SPHERE,OUTER,CART,x,y,z,d` and `FEAT/POINT,CART,x,y,z,i,j,k`.
 
-Read are actual features (`FA`) in cartesian coordinates, `UNITS/`, comments (`$$`) and lines continued by `$`. The
-statements follow manuals of CMM programs (PTC Creo, Supported DMIS Commands); the standard's text was not available.
+The module reads actual features (`FA`) in cartesian coordinates, `UNITS/`, comments (`$$`) and lines continued by `$`.
+The statements follow manuals of CMM programs (PTC Creo, Supported DMIS Commands); the standard's text was not
+available.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def _of_the_whole(found: list[DmisPoint], factor: float, file: str, faults: list
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """Return statements with their first line number, comments removed, continued lines joined."""
+    """Return statements with their first line numbers; comments are removed and continued lines joined."""
     first, parts = 0, list[str]()
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("$$")[0].strip()

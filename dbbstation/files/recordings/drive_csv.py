@@ -1,4 +1,4 @@
-"""Recordings of one drive: CSV with `t_s,position_mm` and `force_n` or `motor_current_a`; `#` begins a comment."""
+"""Read recordings of a drive: CSV with `t_s,position_mm` and `force_n` or `motor_current_a`; `#` begins a comment."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class DriveFile:
     warnings: tuple[Problem, ...]
 
     def recording(self, force_per_ampere_n: float | None = None) -> DriveRecording:
-        """Return the recording; force is a column, or current times a factor.
+        """Return the recording. The force is a column, or the current times a factor.
 
         Args:
             force_per_ampere_n: force at 1 A, positive towards greater positions [N/A].

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class RunState(StrEnum):
-    """How far a run has come."""
+    """State of a run."""
 
     RECORDING = "recording"
     COMPLETE = "complete"
@@ -30,7 +30,7 @@ class RunState(StrEnum):
 
 @dataclass(frozen=True)
 class CommandedProgram:
-    """An NC program that was commanded.
+    """The NC program of a run.
 
     Attributes:
         model_sha256: model of its compensation; empty if none.
@@ -43,7 +43,7 @@ class CommandedProgram:
 
 @dataclass(frozen=True)
 class ReadBy:
-    """What read the lengths of a session or a run.
+    """The instrument of a session or a run.
 
     Attributes:
         name: of the instrument or its protocol file.
@@ -64,13 +64,13 @@ class ReadBy:
 
 
 def read_by(instrument: InstrumentSchema | None) -> ReadBy | None:
-    """Return an instrument for the rest of the program."""
+    """Return a file's instrument in the program's form."""
     return None if instrument is None else ReadBy(**instrument.model_dump())
 
 
 @dataclass(frozen=True)
 class Counts:
-    """What came over the line during a run.
+    """Counts of samples during a run.
 
     Attributes:
         rejected: unused samples by the instrument's status, and unreadable bytes by fault (`unreadable checksum`).
@@ -94,7 +94,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Note:
-    """A note of somebody who measured.
+    """A note by the operator.
 
     Attributes:
         text: empty for a temperature alone.
@@ -107,7 +107,7 @@ class Note:
 
 
 def note_entry(note: NoteSchema) -> Note:
-    """Return a note for the rest of the program."""
+    """Return a file's note in the program's form."""
     return Note(datetime.fromisoformat(note.made), note.text, note.ambient_temp_c)
 
 
@@ -149,7 +149,7 @@ class RunEntry:
 
 
 def run_entry(run: RunSchema, folder: Path) -> RunEntry:
-    """Return the entry of a run for the rest of the program."""
+    """Return a file's entry of a run in the program's form."""
     return RunEntry(
         test=run.test,
         direction=Direction(run.direction),
@@ -183,11 +183,11 @@ def counts_in(header: Mapping[str, str]) -> Counts | None:
 
 
 def count_in(text: str) -> int | None:
-    """Return a text's whole number from 0, or None."""
+    """Return the non-negative integer of a text, or None."""
     return int(text) if re.fullmatch(r"[0-9]{1,12}", text) else None
 
 
 def bar_entry(bar: BarSchema) -> Bar:
-    """Return the bar of a session file for the rest of the program."""
+    """Return a session file's bar in the program's form."""
     moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
     return Bar(**{**bar.model_dump(), "calibrated": moment})

@@ -1,6 +1,6 @@
-"""The event log of a session: every verdict, reason, condition and amendment, one line each, chained.
+"""The event log of a session: a chained line for each verdict, reason, condition and amendment.
 
-A line reaches the disk before the session file changes. docs/formats.md describes the lines.
+Each line is on the disk before the session file changes. docs/formats.md describes the lines.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 EVENTS_FILE = "events.log"
-"""In the session folder."""
+"""Name of the log in the session folder."""
 
 _LINK_LENGTH = 64
 _LINE = re.compile(rb"([0-9a-f]{64})  (\{.*\})")
@@ -57,7 +57,7 @@ class LoggedEvent:
 
 @dataclass(frozen=True)
 class EventLog:
-    """The log as it was read.
+    """The content of a log.
 
     Attributes:
         events: up to the first damaged line.
@@ -93,7 +93,7 @@ def run_key(run: Mapping[str, Any]) -> tuple[str, str, int]:
 
 
 def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, object]:
-    """Return the event members that lead from one state to another; empty if equal."""
+    """Return the members of an event that changes one state to another; empty if they are equal."""
     keys = [key for key in (*after, *(key for key in before if key not in after)) if key != "runs"]
     set_to = {key: after.get(key) for key in keys if before.get(key) != after.get(key)}
     old = {run_key(run): run for run in before.get("runs", ())}
@@ -149,7 +149,7 @@ def _event(line: bytes, before: str) -> LoggedEvent | None:
 
 
 def link(before: str, text: bytes) -> str:
-    """Return the link of a line: SHA-256 of the previous link and the JSON text, a line feed behind each."""
+    """Return the link of a line: SHA-256 of the previous link and the JSON text, each followed by a line feed."""
     return hashlib.sha256(before.encode() + b"\n" + text + b"\n").hexdigest()
 
 
@@ -167,7 +167,7 @@ def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, A
 
 
 def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str, Any]) -> EventLog:
-    """Append an event, synced to disk; arguments as of `line_of`. An unfinished last line is removed.
+    """Append an event and write it to the disk; arguments as for `line_of`. An unfinished last line is removed.
 
     Raises:
         OutputError: the log has changed since it was read, or the disk refuses; it is restored.
@@ -210,7 +210,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
 
 
 def _parted(log: EventLog, handle: int) -> int:
-    """Replace the log by a copy if its file has hard links, such as a backup, so that these stay unchanged."""
+    """Replace the log by a copy if its file has hard links, so that a linked backup stays unchanged."""
     os.close(handle)  # Windows replaces no file that is open
     try:
         write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
@@ -220,7 +220,7 @@ def _parted(log: EventLog, handle: int) -> int:
 
 
 def set_back(log: EventLog) -> list[str]:
-    """Return where an event is dated before its predecessor."""
+    """Return the line of an event that is dated before its predecessor."""
     dated = [(number, event, event.at) for number, event in enumerate(log.events, start=1) if event.at is not None]
     told = []
     for (_, _, before), (number, event, at) in pairwise(dated):
@@ -234,11 +234,12 @@ def set_back(log: EventLog) -> list[str]:
 
 
 CLOCK_S = 1.0
-"""Events are dated to the second, and network time corrects clocks by less [s]."""
+"""Largest backward step of a clock that is ignored [s]: events are dated to the second, and network time corrects
+clocks by less."""
 
 
 def taken_back(log: EventLog) -> None:
-    """Take back an appended event, if the disk allows."""
+    """Remove an appended event, if the disk allows."""
     with contextlib.suppress(OSError):
         handle = open_to_change(log.path)
         try:
@@ -262,7 +263,7 @@ def _refuse_another(log: EventLog, handle: int) -> None:
 
 
 _LONGEST_LAST = 1_000_000
-"""Bytes of the last line that are looked at: an event with a list of a thousand runs has half of them."""
+"""Greatest number of bytes that are read of the last line; an event with a list of a thousand runs has half of them."""
 
 
 def _ends_with(line: bytes, last: str) -> bool:
@@ -286,7 +287,7 @@ def runs_told(event: LoggedEvent) -> str:
 
 
 def keys_told(event: LoggedEvent) -> Sequence[str]:
-    """Return the keys of an event beside the runs, except those that change with every run."""
+    """Return the keys of an event other than runs, without those that change with every run."""
     return [key for key in event.set_to if key != "seal" or event.what not in _OF_RUNS]
 
 

@@ -1,4 +1,4 @@
-"""Sessions and models in a folder."""
+"""Find sessions and models in a folder."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 DEEPEST = 4
-"""Folders inside one another that are looked through: year, machine, month, session."""
+"""Greatest depth of searched folders: year, machine, month, session."""
 
 _MODEL_MARK = b"format: dbb-model/"
-"""How a model file begins; other YAML files are not read."""
+"""First characters of a model file; other YAML files are not read."""
 
 _MARK_WITHIN = 4096
-"""Bytes of a file in which the mark is looked for."""
+"""Number of first bytes of a file that may contain the mark."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Tables of other programs: title text, units below names, any separator, decimal commas, CRLF, byte order marks."""
+"""Read tables of other programs: title text, units below names, any separator, decimal commas, CRLF, byte order marks."""
 
 from __future__ import annotations
 
@@ -28,29 +28,30 @@ _LANGUAGES = (
     NumberLanguage(",", ";"),
     NumberLanguage(",", "\t"),
 )
-"""Ways of writing tables; the first of those that fit as well."""
+"""Number formats of tables; of equally good ones, the first is used."""
 
 _SIGNS = ",;\t"
 
 _MINUS = "\N{MINUS SIGN}"
-"""As text programs write it in place of a hyphen."""
+"""The minus sign that some programs write instead of a hyphen."""
 
 _STATED = "so say the mapping, the options or the shop's settings: --decimal and --separator say otherwise"
 
 _LOOKED_AT = 300
-"""Lines that tell how a table is written, and in which it begins: text before it is some pages at the most."""
+"""Number of first lines that determine the format and must contain the table's begin."""
 
 
 _NAMES_WITHIN = 3
-"""Lines above the first row in which the names of the columns stand: a line of units and an empty one may come between."""
+"""Number of lines above the first row that may contain the names of columns, since a line of units and an empty line
+may follow them."""
 
 _UNIT = re.compile(r"[\[(].*[\])]|[µμu]?m|mm|in|inch|mil|deg|°|rad|s|ms|min|°?c|degc|k|m?a|-", re.IGNORECASE)
-"""A cell that is a unit."""
+"""Pattern of a cell with a unit."""
 
 
 @dataclass(frozen=True, eq=False)
 class ForeignTable:
-    """A table made elsewhere.
+    """A table of another program.
 
     Attributes:
         units: below the column names, by name; else empty.
@@ -143,7 +144,7 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
 
 
 def _without_last_separator(lines: list[str], separator: str) -> list[str]:
-    """Return lines without the separator at their ends, if all of the widest have one."""
+    """Return lines without a final separator, if all of the widest lines have one."""
     widest = max((line.count(separator) for line in lines), default=0)
     wide = [line for line in lines if line.count(separator) == widest]
     if widest < 2 or not all(line.rstrip(" ").endswith(separator) for line in wide):  # noqa: PLR2004 - one ends the first cell
@@ -194,11 +195,11 @@ _WIDE = ("utf-16-be", "utf-16-le")
 _RUN = re.compile(rb"[\x80-\xff]+")
 _JAPANESE = re.compile(r"[\u3000-\u30ff\u4e00-\u9fff\uff01-\uff5e]+")
 _WESTERN = 2
-"""Bytes beyond ASCII that follow one another in western words at the most; Cyrillic and Asian words have more."""
+"""Greatest number of successive non-ASCII bytes in western words; Cyrillic and Asian words have more."""
 
 
 def _encoding(data: bytes) -> str:
-    """Return the encoding that a text fits beyond doubt, else UTF-8, which is then refused with its place."""
+    """Return the only encoding that fits a text, else UTF-8; decoding then fails with a position."""
     zeros = data[::2].count(0), data[1::2].count(0)
     if max(zeros) > len(data) // 10:  # digits have one in two bytes
         return _WIDE[zeros[0] < zeros[1]]
@@ -245,7 +246,7 @@ def _is_row(row: list[str], language: NumberLanguage) -> bool:
 
 
 def _goes_on(rows: list[list[str]], k: int, language: NumberLanguage) -> bool:
-    """Return whether the next line is a row too, because a single line of numbers may be a date."""
+    """Return whether the next line is also a row, because a single line of numbers may be a date."""
     following = next((row for row in rows[k + 1 :] if row), None)
     return following is not None and len(following) == len(rows[k]) and _is_row(following, language)
 

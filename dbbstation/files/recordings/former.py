@@ -1,4 +1,4 @@
-"""Sessions measured before on the same machine, plan and jig."""
+"""Find earlier sessions of the same machine, plan and jig."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session import SessionFolder
 
 DEPTH = 2
-"""Folders below the one that is searched: sessions of a machine, of a month."""
+"""Depth of folders below the searched one: sessions of a machine, of a month."""
 
 MOST = 30
-"""Sessions that are read, the newest first; reading one takes some hundredths of a second."""
+"""Greatest number of sessions that are read, the newest first; each needs some hundredths of a second."""
 
 
 def former_sessions(
     now: SessionFolder, under: Path, tests: set[str] | None = None
 ) -> list[tuple[datetime, SessionFolder]]:
-    """Return earlier sessions of the same machine, plan and jig, the last first; real or virtual ones as this."""
+    """Return earlier sessions of the same machine, plan and jig, the last first; only real ones for a real session, only virtual ones for a virtual one."""
     accepted = now.in_state(RunState.ACCEPTED)
     began = min((run.started for run in accepted if run.started is not None), default=None)
     tests = tests or {run.test for run in accepted} or set(now.plan.tests)

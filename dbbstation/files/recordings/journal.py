@@ -1,4 +1,4 @@
-"""The journal of a run: samples are written as they arrive, and synced once a second.
+"""The journal of a run: samples are written on arrival, and synced once a second.
 
 Each line has its CRC-32, because a power cut may mix pages.
 """
@@ -33,7 +33,8 @@ _LOG = logging.getLogger(__name__)
 _MANY = 1000
 
 SYNC_INTERVAL_S = 0.5
-"""Time between two syncs. A sample is on the disk within a second: a sync itself and what comes in batches take time, too [s]."""
+"""Time between two syncs [s], so short that each sample is on the disk within a second, in spite of the sync's own time
+and of batches."""
 
 
 def run_name(test: str, direction: Direction, repeat: int) -> str:
@@ -56,7 +57,7 @@ def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str
 
 
 def run_foot(counts: Counts) -> bytes:
-    """Return the last lines of a sealed run file, with its counts.
+    """Return the last lines of a sealed run file, which contain its counts.
 
     A run file without these lines was interrupted.
     """
@@ -202,7 +203,7 @@ class RunWriter:
         return b"".join(pieces)
 
     def read(self) -> RunFile:
-        """Read what was written.
+        """Read the samples back.
 
         Raises:
             InputError: it cannot be read, or was altered.

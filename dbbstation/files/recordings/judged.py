@@ -1,4 +1,4 @@
-"""Runs of a session for judging: recordings and expected circles."""
+"""Prepare runs of a session for judging: recordings and expected circles."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 JUDGED = (RunState.ACCEPTED, RunState.COMPLETE)
-"""Runs that are judged: what was rejected is not used, what is being recorded is not whole."""
+"""States of judged runs: rejected runs are unused, and running ones incomplete."""
 
 
 def judge_session(
@@ -84,12 +84,12 @@ def run_of(
 
 
 def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
-    """Return all circles of a plan by a model; none without a model, since all are alike then."""
+    """Return all circles of a plan by a model; empty without a model, since all are then alike."""
     return () if model is None else circles_of_plan(session, model)
 
 
 def circles_of_plan(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
-    """Return all circles of a plan as a model expects them, else the nominal machine."""
+    """Return all circles of a plan as expected by a model, else by the nominal machine."""
     found = []
     for name, test in session.plan.tests.items():
         for direction in test.directions:

@@ -1,4 +1,4 @@
-"""One writer per session folder, by a lock of the operating system.
+"""Allow one writer per session folder, by a lock of the operating system.
 
 The lock ends with its process, so a power cut leaves none.
 """
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 LOCK_FILE = ".lock"
-"""In the session folder; nothing reads it but this."""
+"""Name of the lock's file in the session folder; only this module reads it."""
 
 PATIENCE_S = 2.0
-"""How long a command that notes one thing waits for another that does [s]."""
+"""Longest wait of a command that writes one note for another such command [s]."""
 
 _PAUSE_S = 0.01
 
@@ -63,7 +63,7 @@ class SessionLock:
         self.close()
 
     def close(self) -> None:
-        """Let others write; may be called twice."""
+        """Unlock the session for others; may be called twice."""
         file, self._file = getattr(self, "_file", None), None
         if file is not None:
             os.close(file)

@@ -1,4 +1,4 @@
-"""Make a session folder: empty to record into, or whole, as of a simulation."""
+"""Make a session folder: empty for recording, or complete, such as a simulation's."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def write_session(
     more: Mapping[str, str | bytes] | None = None,
     at: datetime | None = None,
 ) -> None:
-    """Write a whole session at once, all or nothing; `at` as of `make_session_folder`.
+    """Write a complete session or nothing; `at` as for `make_session_folder`.
 
     Raises:
         OutputError: the folder exists, lies in another session, or cannot be written.
@@ -113,7 +113,7 @@ def make_session_folder(
     files: Mapping[str, str | bytes],
     at: datetime | None = None,
 ) -> None:
-    """Make a sealed session folder with its event log, all or nothing.
+    """Make a sealed session folder with its event log, completely or not at all.
 
     Args:
         files: content by relative path, besides machine, plan and session file.

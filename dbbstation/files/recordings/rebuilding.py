@@ -1,4 +1,4 @@
-"""Write the session file anew from its event log."""
+"""Write the session file again from its event log."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Run files `runs/*.csv`: one circle, one direction, raw.
+"""Read run files `runs/*.csv`: one circle in one direction, raw.
 
-Blocks become lines (`run_lines`), checked numbers (`run_numbers`), then a recording. Of an interrupted file (`.csv.part`)
-the good lines are returned and the others named.
+Blocks become lines (`run_lines`), then checked numbers (`run_numbers`), then a recording. An interrupted file
+(`.csv.part`) gives its good lines; the others are named.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PART = ".part"
 
 @dataclass(frozen=True, eq=False)
 class RunFile:
-    """A run with the other content of its file.
+    """A run, and the other content of its file.
 
     Attributes:
         header: `# key: value` lines, by key.
@@ -51,7 +51,7 @@ class RunFile:
 
 
 def read_run(path: Path, *, sha256: str = "") -> RunFile:
-    """Read a run file; of a `.part` the good lines.
+    """Read a run file, or the good lines of a `.part`.
 
     Args:
         sha256: expected; empty: not checked.
@@ -101,13 +101,13 @@ def sha256_of(path: Path) -> str:
 
 
 def sealed_or_part(path: Path) -> Path:
-    """Return a run's file, which may have been sealed just before the program ended."""
+    """Return a run's file, sealed or `.part`; it may have been sealed just before the program ended."""
     sealed = path.with_suffix("") if path.suffix == PART else path
     return sealed if not path.exists() and sealed.exists() else path
 
 
 def changed(file: str) -> Problem:
-    """Return the problem of a file with another hash than noted."""
+    """Return the problem of a file whose hash differs from the noted one."""
     what = "the file was changed after it was recorded: its SHA-256 is not the one in the session"
     return Problem(file, 0, 0, what, "restore the file as recorded, or reject the run")
 
@@ -155,7 +155,7 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
 
 
 _BY_THEMSELVES = (columns.TIME, columns.LENGTH, columns.THETA)
-"""Columns that a recording has in places of their own."""
+"""Columns that are separate attributes of a recording."""
 
 
 def _recording(file: str, numbers: Mapping[str, Floats], usable: Flags | None) -> Recording:

@@ -1,4 +1,4 @@
-"""Lines of a run file in pieces: header removed, rows checked."""
+"""Read lines of a run file in pieces, remove the header and check the rows."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NUMBER = re.compile(NUMBER.encode())
 
 
 _MOST_KNOWN = 10_000
-"""Texts that are kept once: of a column with more nearly every one is another."""
+"""Greatest number of distinct texts of a column that are stored once; with more, nearly all texts differ."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Lines:
         return tuple(name for name in self.columns if not columns.is_known(name))
 
     def keep(self, rows: slice) -> Lines:
-        """Return the file with only these rows."""
+        """Return the lines with only these rows."""
         return replace(self, rows=self.rows[rows], numbers=self.numbers[rows], ended=True)
 
     def texts(self, name: str, known: dict[bytes, str] | None = None) -> list[str]:
@@ -101,7 +101,7 @@ class Lines:
 def pieces_of(
     blocks: Iterable[bytes], file: str, faults: list[Problem], warnings: list[Problem], *, partial: bool
 ) -> Iterator[Lines]:
-    """Yield a run file's usable lines in pieces; nothing more after a fault.
+    """Yield a run file's usable lines in pieces, up to the first fault.
 
     Args:
         faults: grows by what makes the file useless.
@@ -145,7 +145,7 @@ def _whole(pieces: Iterable[Lines]) -> Lines | None:
 
 
 def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[Lines]:
-    """Split a run file in pieces. A file without header gives no piece and a reason in `faults`.
+    """Split a run file into pieces. A file without header has no piece and a reason in `faults`.
 
     All pieces share one header, complete after the last piece.
     """
@@ -185,11 +185,11 @@ def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> I
 
 
 _LONGEST_FOOT = 1000
-"""Lines `# key: value` that may stand below the rows: the program writes ten."""
+"""Greatest number of lines `# key: value` below the rows; the program writes ten."""
 
 
 def _lines(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[tuple[list[bytes], bool]]:
-    """Yield the lines of each block; the last may lack its end and has False."""
+    """Yield the lines of each block, and True; the last line may lack its end and has False."""
     left = b""
     number = 1
     for block in blocks:
@@ -220,7 +220,7 @@ def _names(line: bytes, file: str, number: int, faults: list[Problem]) -> tuple[
 
 
 def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
-    """Return a run file's columns without its samples; none, with the reason in `faults`, without a header."""
+    """Return a run file's columns without reading samples. A file without header has none, and a reason in `faults`."""
     try:
         head = first_line(path)
     except OSError as error:
@@ -251,7 +251,7 @@ def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Pr
 
 
 def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
-    """Drop a last line without end unless its CRC is right, because digits may be missing."""
+    """Drop a last line without line end unless its CRC is right, because digits may be missing."""
     if lines.ended or not lines.rows:
         return lines
     number, last = lines.numbers[-1], lines.rows[-1]
@@ -296,8 +296,8 @@ def _fault_of_fields(fields: list[bytes], names: tuple[str, ...]) -> tuple[str, 
 def good_lines(lines: Lines) -> tuple[Lines, list[Problem]]:
     """Return trusted rows of an interrupted recording in time order, and faults of the others.
 
-    A power cut may leave pages empty, stale or reordered. The checksum decides; without one, readable rows with rising
-    time count.
+    After a power cut, pages may be empty, old or reordered. The checksum decides; without one, readable rows with
+    rising time are trusted.
     """
     kept: list[tuple[bytes, int]] = []
     problems: list[Problem] = []

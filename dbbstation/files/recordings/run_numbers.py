@@ -1,4 +1,4 @@
-"""Numbers of a run file: columns, rising time, plausible sizes."""
+"""Read the numbers of a run file, and check rising time and plausible sizes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Counted:
 
     @property
     def enough(self) -> bool:
-        """Return whether the rest need not be read."""
+        """Return whether further lines need not be read."""
         return self.count >= _MOST_COUNTED
 
     def told(self) -> list[Problem]:
@@ -42,7 +42,7 @@ class Counted:
 
 
 _MOST_COUNTED = 10_000
-"""Faults that are counted: ten thousand bad lines tell no more than the file's first hundred."""
+"""Greatest number of counted faults; ten thousand tell no more than the first hundred."""
 
 
 class Numbers:

@@ -1,8 +1,8 @@
 """The seal of a session: hashes of machine, plan and jig, and a chain through its runs.
 
-Every sealed run's entry has a link: the SHA-256 of the previous link and of the entry's content. Removing, exchanging
-or changing an entry breaks a link; the seal's count and last link reveal removed ends. Copies in the folder `sealed`
-show which key changed. The seal reveals mistakes; it cannot prevent a new seal of everything.
+Every sealed run's entry has a link: the SHA-256 of the previous link and of the entry's content. A removed, exchanged
+or changed entry breaks a link. The seal's count and last link reveal removed last entries. Copies in the folder
+`sealed` show which key changed. The seal reveals mistakes, but cannot prevent a new seal of everything.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ SEALED = "sealed"
 """Folder in the session with a copy of every file that was ever sealed."""
 
 AMEND = "restore it, or say why it was changed: `dbbstation session amend {folder} --reason TEXT`"
-"""What to do about a file that is not the sealed one."""
+"""Advice for a file that differs from the sealed one."""
 
 RUNS = "runs"
-"""What an amendment of the list of runs is called."""
+"""Name of an amendment of the list of runs."""
 
 _NAMED_DIGITS = 16
-"""Hex digits of its SHA-256 that stand in the name of a copy."""
+"""Number of hex digits of its SHA-256 in the name of a copy."""
 
 _MOST_NAMED = 4
-"""Changed keys that are named; a file that was exchanged has hundreds."""
+"""Greatest number of named changes; an exchanged file has hundreds."""
 
 
 @dataclass(frozen=True)
 class Seal:
-    """State of a session when it was sealed.
+    """The state of a session when it was sealed.
 
     Attributes:
         files: SHA-256 by path as the session file names it.
@@ -61,7 +61,7 @@ class Seal:
 
 @dataclass(frozen=True)
 class Amendment:
-    """A deliberate change of what was sealed.
+    """A deliberate change of a sealed file.
 
     Attributes:
         what: path in the seal, or `runs`.
@@ -85,7 +85,7 @@ class Amendment:
 
 
 def seal_entry(seal: SealSchema | None) -> Seal | None:
-    """Return the seal for the rest of the program."""
+    """Return a file's seal in the program's form."""
     if seal is None:
         return None
     events, anchor = (0, "") if seal.log is None else (seal.log.events, seal.log.sha256)
@@ -93,7 +93,7 @@ def seal_entry(seal: SealSchema | None) -> Seal | None:
 
 
 def amendment_entry(entry: AmendmentSchema) -> Amendment:
-    """Return an amendment for the rest of the program."""
+    """Return a file's amendment in the program's form."""
     texts = (entry.what, entry.former_sha256 or "", entry.sha256 or "", entry.former or "", entry.reason)
     return Amendment(*texts, datetime.fromisoformat(entry.made))
 
@@ -136,7 +136,7 @@ def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
 
 
 def is_copy(name: str) -> bool:
-    """Return whether a path is that of a kept copy."""
+    """Return whether a path belongs to a kept copy."""
     return name.startswith(f"{SEALED}/")
 
 
@@ -169,7 +169,7 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
 
 
 def fits_name(name: str, digest: str) -> bool:
-    """Return whether a kept copy has the hash of its name."""
+    """Return whether a kept copy has the hash in its name."""
     stem = name.rpartition("/")[2].partition(".")[0]
     return stem.endswith(f"-{digest[:_NAMED_DIGITS]}")
 
@@ -178,8 +178,8 @@ def link(before: str, run: RunEntry) -> str:
     """Return the link of a sealed run in the chain.
 
     It is the SHA-256 of these lines in UTF-8, each with a line end, empty if absent: link of the previous sealed run,
-    test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of run file, program and its model, x, y and z
-    of the centre as programmed [mm].
+    test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of run file, program and its model, and x, y and
+    z of the programmed centre [mm].
     """
     program = ("", "") if run.program is None else (run.program.sha256, run.program.model_sha256)
     started = "" if run.started is None else run.started.astimezone(UTC).isoformat()
@@ -189,7 +189,7 @@ def link(before: str, run: RunEntry) -> str:
 
 
 def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
-    """Return runs with chain links added for newly sealed runs, behind the earlier links."""
+    """Return runs with links for newly sealed runs, which continue the chain."""
     done = [run for run in runs if run.chain_sha256]
     behind = runs.index(done[-1]) if done else -1
     kept = [run for run in runs if not (run.sha256 and not run.chain_sha256 and runs.index(run) < behind)]
@@ -202,7 +202,7 @@ def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
 
 
 def sealed_over(files: Mapping[str, str], runs: Sequence[RunEntry]) -> Seal:
-    """Return the seal over files and linked runs."""
+    """Return the seal of files and linked runs."""
     links = [run.chain_sha256 for run in runs if run.chain_sha256]
     return Seal(dict(files), len(links), links[-1] if links else "")
 

@@ -1,4 +1,4 @@
-"""Seal recordings made elsewhere: hashes and chain go into the existing session file."""
+"""Seal recordings of other programs: add hashes and a chain to the existing session file."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sealing:
-    """What sealing a session would do.
+    """The changes by which a session is sealed.
 
     Attributes:
         chained: text with hashes and chain, and the old seal.
@@ -69,7 +69,7 @@ class Sealing:
 
     @property
     def anything(self) -> bool:
-        """Return whether the session lacks something."""
+        """Return whether any part of the seal is missing."""
         return self.text != self.before or not self.logged or bool(self.copies)
 
 

@@ -56,13 +56,13 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 SESSION_FILE = session_name.SESSION_FILE
-"""What a session folder is known by."""
+"""File that marks a session folder."""
 
 _UNLIKE_RADIUS = 0.2
-"""Share of the bar's length that readings may be off; no ball bar reaches that far."""
+"""Largest relative difference of readings from the bar's length; no ball bar has such a travel."""
 
 _SLOWEST, _FASTEST = 50.0, 0.05
-"""Times as long as the circle should take, between which a recording's duration is plausible."""
+"""Range of plausible durations of a recording, over the circle's nominal duration."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -93,16 +93,16 @@ class SessionFolder(SessionDetails):
 
     @property
     def virtual(self) -> bool | None:
-        """Return whether its runs come from a virtual machine; None if unknown."""
+        """Return whether the session's runs come from a virtual machine; None if unknown."""
         stated = [one.virtual for one in (self.instrument, *(run.instrument for run in self.runs)) if one is not None]
         return any(stated) if stated else None
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
-        """Return the runs in these states, repeats in counting order."""
+        """Return the runs in these states, with repeats in numerical order."""
         return repeats_in_order(run for run in self.runs if run.state in states)
 
     def circle(self, run: RunEntry) -> Circle:
-        """Return a run's commanded circle, its centre as programmed."""
+        """Return a run's commanded circle, with its programmed centre."""
         circle = self.plan.tests[run.test].run(run.direction)
         return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
 
@@ -191,14 +191,14 @@ class SessionFolder(SessionDetails):
         return read
 
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
-        """Return a note about lost samples beyond the plan's limit."""
+        """Return a note if more samples were lost than the plan allows."""
         lost, kept = lost_on_turn(recording, self.circle(run))
         unusable = unusable_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
 
     def unusable(self, run: RunEntry) -> str:
-        """Return why a run's file gives no figures; empty if it does."""
+        """Return why no figures follow from a run's file; empty if they do."""
         try:
             recording = self.load(run).recording
             if lost := self.loss(run, recording):
@@ -239,7 +239,7 @@ class SessionFolder(SessionDetails):
 def read_session(path: Path, *, keeps: bool = False) -> SessionFolder:
     """Read a session from its folder or session file.
 
-    Hashes of all files are checked here; runs when they are loaded.
+    The hashes of all files are checked here, those of runs when they are loaded.
 
     Raises:
         InputError: every fault of session, machine and plan, every missing or changed file.
@@ -256,7 +256,7 @@ def opened(session: Path | SessionFolder) -> SessionFolder:
 
 
 def no_session(folder: Path) -> Problem:
-    """Return the fault of a folder without a session, with sessions nearby."""
+    """Return the fault of a folder without a session, and name sessions nearby."""
     if (folder / EVENTS_FILE).is_file():
         what = f"the session file {SESSION_FILE} is gone, its event log is there"
         return Problem(str(folder), 0, 0, what, REBUILD.format(folder=folder))
@@ -278,7 +278,7 @@ def _other_than_session(path: Path) -> Problem | None:
 
 
 MOST_NAMED = 4
-"""Sessions that are named beside a folder that is none."""
+"""Greatest number of nearby sessions in a message."""
 
 
 def parse_session(
@@ -371,7 +371,7 @@ def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
 
 
 def part_entry(path: Path) -> RunEntry | None:
-    """Return a run file's own statement of its run, or None."""
+    """Return the entry that a run file states in its header, or None."""
     data = read_bytes(path, [])
     lines = None if data is None else split_file(data, str(path), [])
     header = {} if lines is None else lines.header

@@ -22,7 +22,7 @@ _RECORDING = "recording"
 
 
 def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
-    """Check runs against each other, plan and disk on the raw data, independently of other faults."""
+    """Check runs in the raw data, with plan and disk, independently of other faults."""
     runs = document.entries("runs")
     for key, what in ((("test", "direction", "repeat"), "this run"), (("file",), "this file")):
         values = [tuple(map(str, map(run.get, key))) for _, run in runs]

@@ -1,4 +1,4 @@
-"""A session's notes beside its runs."""
+"""Facts that a session notes in addition to its runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SessionDetails:
-    """A session's notes beside its runs; all optional.
+    """Facts that a session notes in addition to its runs; all are optional.
 
     Attributes:
         bar_waiver: why the bar has no fresh calibration; empty if it has.

@@ -1,9 +1,9 @@
-"""Names in a session folder."""
+"""Names of files and folders in a session folder."""
 
 from dbbstation.files import recorded_ground
 
 SESSION_FILE = recorded_ground.SESSION_FILE
-"""What a session folder is known by."""
+"""File that marks a session folder."""
 
 MACHINE_FILE, PLAN_FILE, RUNS, PROGRAMS = "machine.yaml", "plan.yaml", "runs", "programs"
-"""What stands beside it in a session that this program makes."""
+"""Other names in a session of this program."""

@@ -1,4 +1,4 @@
-"""Micrometer readings of balls under the spindle, one entry per mounting."""
+"""Read micrometer readings of balls under the spindle, one entry per mounting."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
 
 Readings: TypeAlias = tuple[float | None, float | None, float | None]
-"""x, y, z [µm]; None where nobody measured."""
+"""x, y, z [µm]; None if not measured."""
 
 
 @dataclass(frozen=True)
 class SetUpReadings:
-    """A micrometer's readings at one mounting, in the file's unit, so that they are written back unchanged.
+    """A micrometer's readings at one mounting, in the file's unit, so that they can be written unchanged.
 
     Attributes:
         mounting: None: that of the test's runs without a number.
@@ -48,12 +48,12 @@ class SetUpReadings:
 
 
 def set_up_readings(entry: SetUpErrorsSchema) -> SetUpReadings:
-    """Return an entry of a session file for the rest of the program."""
+    """Return a session file's entry in the program's form."""
     return SetUpReadings(entry.test, entry.mounting, entry.fixed_ball_um, entry.moving_ball_um, entry.uncertainty_um)
 
 
 def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
-    """Return the current readings of a session file, whatever its runs.
+    """Return the current readings of a session file, without checking its runs.
 
     Raises:
         InputError: every fault of the file's text and of its readings.
@@ -69,12 +69,12 @@ def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
 
 
 def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
-    """Return a mounting's name in its session: by number, else by test."""
+    """Return a mounting's name in its session, by its number, else by the test."""
     return f"{plan.tests[test].ball.name}, {f'test {test}' if mounting is None else f'mounting {mounting}'}"
 
 
 def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[Problem]) -> None:
-    """Check readings against runs, plan and each other on the raw data, independently of other faults."""
+    """Check readings in the raw data, with runs and plan, independently of other faults."""
     mountings: dict[str, list[Any]] = {}
     for _, run in document.entries("runs"):
         test = run.get("test")

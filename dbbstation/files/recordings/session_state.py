@@ -1,4 +1,4 @@
-"""Compare a session file with its event log: which is ahead, and what differs."""
+"""Compare a session file with its event log, and find which is newer and what differs."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 READINGS = "set_up_errors"
-"""The one list that people write into a session file: what is added to it is no change of what was sealed."""
+"""The only list that people write into a session file; additions do not break the seal."""
 
 SEALED = "sealed"
 """First event of a session that had no seal."""
 
 NO_MARK = "the seal names no event log"
-"""A seal is written with the log that covers it: somebody took the log away."""
+"""Message for a seal without log: every seal is written with a log, so the log was removed."""
 
 _MOST_NAMED = 6
-"""Changes that are named; a session file that was exchanged has hundreds."""
+"""Greatest number of named changes; an exchanged session file has hundreds."""
 
 
 def session_state(data: Mapping[str, Any]) -> dict[str, object]:
-    """Return a session file's data in normal form: lists, no empty values, format or log mark."""
+    """Return a session file's data in normal form, with lists, but without empty values, format and log mark."""
     seal = data.get("seal")
     plain = {key: value for key, value in data.items() if key != "format"}
     if isinstance(seal, dict):
@@ -43,7 +43,7 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - as plain as it came
 
 
 def mark_of(data: Mapping[str, Any]) -> tuple[int, str] | None:
-    """Return the log's position by the session file: event count and last link; None without a log."""
+    """Return the log's position as the session file states it: event count and last link; None without a log."""
     seal = data.get("seal")
     mark = seal.get("log") if isinstance(seal, dict) else None
     return (mark["events"], mark["sha256"]) if isinstance(mark, dict) and {"events", "sha256"} <= mark.keys() else None
@@ -53,13 +53,13 @@ class Stands(Enum):
     """Relation of a session file to its event log."""
 
     ALONE = auto()
-    """There is no log: it has no seal."""
+    """There is no log: the session has no seal."""
     SAME = auto()
-    """The file says what the log says."""
+    """File and log agree."""
     BEHIND = auto()
-    """The file says what the log said some events ago: its writer died in between, or a former copy was restored."""
+    """The file agrees with an earlier state of the log: its writer was interrupted, or a former copy was restored."""
     UNLIKE = auto()
-    """Anything else: one of the two was changed."""
+    """File and log disagree: one of the two was changed."""
 
 
 @dataclass(frozen=True)

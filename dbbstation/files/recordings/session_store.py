@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 REBUILD = "`dbbstation session rebuild {folder}` writes it as the event log has it"
-"""What to do about a session file that is not as it was."""
+"""Advice for a changed session file."""
 
 
 def now() -> datetime:
@@ -74,7 +74,7 @@ def _with_mark(data: Mapping[str, Any], state: Mapping[str, Any], events: int, s
 
 
 def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument | None, EventLog | None]:
-    """Read a session file and its log; no document, with faults added to `faults`, if unreadable."""
+    """Read a session file and its log; if unreadable, return no document and add faults to `faults`."""
     found: list[Problem] = []
     document = read_document(file, SessionFile, found)
     log = read_event_log(file.parent, found)
@@ -112,7 +112,7 @@ def _rebuild(file: Path) -> str:
 class SessionStore:
     """Reads and writes a session file with its log, under the session's lock.
 
-    A damaged, missing or outdated session file is written anew from the log; what was there is kept.
+    A damaged, missing or outdated session file is written again from the log; the former file is kept.
 
     Args:
         anew: write the session file from the log in any case.
@@ -150,7 +150,7 @@ class SessionStore:
             self._put(text_of(self.data))
 
     def write(self, data: Mapping[str, Any], what: str, text: Callable[[Mapping[str, Any]], str] = text_of) -> None:
-        """Log what has changed, then write the session file.
+        """Log the changes, then write the session file.
 
         Raises:
             OutputError: the file has changed since it was read, or the disk refuses; both are restored.
@@ -189,20 +189,20 @@ class SessionStore:
         self.state = state
 
     def text_by_log(self) -> bytes:
-        """Return the session file's text by its log."""
+        """Return the session file's text from its log."""
         return text_of(marked(self.log.state(), self.log)).encode()
 
     def go_on_from_log(self) -> None:
-        """Count the next writing as a change of the log's state, not of the file's."""
+        """Compare the next writing with the log's state, not with the file's."""
         self.state = self.log.state()
 
     def begin_anew(self) -> None:
-        """Remove an unreliable log that the caller has copied elsewhere."""
+        """Remove an unreliable log, which the caller has already copied."""
         (self._file.parent / EVENTS_FILE).unlink(missing_ok=True)
         self.log = EventLog(self._file.parent / EVENTS_FILE)
 
     def changed_meanwhile(self) -> dict[str, object] | None:
-        """Return the content of a session file that somebody has changed since, or None.
+        """Return the content of a session file that was changed in the meantime, or None.
 
         Raises:
             InputError: it exists and cannot be read.
@@ -217,7 +217,7 @@ class SessionStore:
         return data
 
     def accept_readings(self, data: Mapping[str, Any]) -> None:
-        """Accept a session file into which somebody wrote readings only.
+        """Accept a session file to which only readings were added.
 
         Raises:
             OutputError: something else was changed too.
@@ -240,7 +240,7 @@ class SessionStore:
         )
 
     def _on_disk(self, faults: list[Problem]) -> tuple[bytes | None, dict[str, object] | None]:
-        """Return bytes and data of the session file; no data, with the reason in `faults`, if damaged or missing."""
+        """Return bytes and data of the session file. If it is damaged or missing, return no data and add the reason to `faults`."""
         found = read_bytes(self._file, faults, is_input=False)
         text = None if found is None else decode(found, str(self._file), faults)
         document = None if text is None else parse_yaml(text, str(self._file), faults)

@@ -45,7 +45,7 @@ def session_data(
 
 
 def text_of(data: Mapping[str, object]) -> str:
-    """Return the text of a session file, keys in their usual order."""
+    """Return the text of a session file, with keys in their usual order."""
     ordered = {key: data[key] for key in SessionFile.model_fields if key in data}
     return yaml_text({"format": format_of(SessionFile), **ordered})
 

@@ -1,4 +1,4 @@
-"""Keep a session file correct while runs are recorded and judged."""
+"""Update a session folder while runs are recorded and judged."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class SessionWriter:
-    """Keeps one session folder while runs are recorded.
+    """Writes one session folder while runs are recorded.
 
     Every step survives a crash: a run's `.part` exists before the session file names it, and is sealed before it is complete.
     """
@@ -53,12 +53,12 @@ class SessionWriter:
         self.close()
 
     def close(self) -> None:
-        """Let others write; may be called twice."""
+        """Unlock the session for others; may be called twice."""
         self._lock.close()
 
     @property
     def locked(self) -> bool:
-        """Return whether others cannot write; False on a file system without locks."""
+        """Return whether the session is locked for others; False on a file system without locks."""
         return self._lock.held
 
     @classmethod
@@ -116,7 +116,7 @@ class SessionWriter:
 
     @property
     def session(self) -> SessionFolder:
-        """Return the session as on disk."""
+        """Return the session as it is on the disk."""
         return self._session
 
     @property
@@ -144,7 +144,7 @@ class SessionWriter:
         centre_mm: tuple[float, float, float] | None = None,
         instrument: ReadBy | None = None,
     ) -> RunWriter:
-        """Start a test's next repeat: make its `.part` and note it as `recording`.
+        """Start a test's next repeat: make its `.part` file and note it as `recording`.
 
         Args:
             started: first sample, with its zone.

@@ -1,4 +1,4 @@
-"""Tables of any columns: CSV with a header line; `#` begins a comment; commas, semicolons or tabs."""
+"""Read tables of any columns: CSV with a header line, and commas, semicolons or tabs; `#` begins a comment."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ OF_SHEETS = frozenset({"#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "
 """Cells that a spreadsheet could not compute, in small letters."""
 
 NO_NUMBER = frozenset({"", "nan", "na", "n/a", "null", "none", "-"}) | OF_SHEETS
-"""Cells that say that there is no number, in small letters."""
+"""Cells that mean a missing number, in small letters."""
 
 _COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 """A number with a decimal comma."""
@@ -40,7 +40,7 @@ _WHOLE = re.compile(r"[+-]?\d+")
 
 @dataclass(frozen=True, eq=False)
 class TableFile:
-    """One file of columns.
+    """A table from one file.
 
     Attributes:
         names: in order.
@@ -62,7 +62,7 @@ class TableFile:
         return len(self.lines)
 
     def faults_of(self, name: str) -> list[Problem]:
-        """Return cells of a column that are neither number nor empty, with lines."""
+        """Return a column's cells that are neither numbers nor empty, with their lines."""
         found: list[Problem] = []
         if np.isfinite(self.values[name]).all():
             return found
@@ -180,7 +180,7 @@ def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table")
 
 
 def _seconds(cells: Sequence[str]) -> Floats | None:
-    """Return seconds after the first of dates and times [ISO 8601]; NaN if empty, None if any is another text."""
+    """Return dates and times [ISO 8601] as seconds after the first; NaN if empty, None if any cell has another text."""
     try:
         at = [None if cell.lower() in NO_NUMBER else datetime.fromisoformat(cell) for cell in cells]
         first = next(one for one in at if one is not None)
@@ -190,7 +190,7 @@ def _seconds(cells: Sequence[str]) -> Floats | None:
 
 
 def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:
-    """Return the fault of a missing column, with likely ones."""
+    """Return the fault of a missing column, and name likely columns."""
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     remedy = f"did you mean `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
     return Problem(file, line, 0, f"there is no column `{name}`", remedy)

@@ -20,12 +20,12 @@ _BEGINNINGS = (
     (b"%PDF", "this is a PDF", "export the numbers as text from the program that made it"),
     (b"\x1f\x8b", "this file is compressed", "unpack it first"),
 )
-"""First bytes, what they tell, and what to do."""
+"""First bytes of files, the kind that they mean, and advice."""
 
 _MARKUP = re.compile(rb"\s*<(\?xml|!doctype|html|[A-Za-z][\w:.-]*[\s/>])", re.IGNORECASE)
 
 _LOOKED_AT = 4_000
-"""Bytes of the beginning that tell what a file is."""
+"""Number of first bytes that determine the kind of a file."""
 
 
 def kind_of(data: bytes) -> tuple[str, str] | None:

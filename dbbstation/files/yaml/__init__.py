@@ -1,1 +1,1 @@
-"""YAML with the line and column of every node: read, checked, written."""
+"""Read, check and write YAML, with the line and column of every node."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 _ONE_LINE, _ONE_LINE_IN_LIST = 140, 500
-"""Longest text of a mapping that is put on one line; entries of a list may be long, so that columns line up."""
+"""Longest mapping on one line; entries of a list may be longer, so that columns line up."""
 
 _PLAIN = re.compile(
     r"[A-Za-z]([A-Za-z0-9 ._/()+-]*[A-Za-z0-9_/()+-])?"

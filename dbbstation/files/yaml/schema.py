@@ -1,4 +1,4 @@
-"""Common base of schemas, strict and frozen; complaints become problems with a place."""
+"""Common base of schemas, strict and frozen; faults become problems with a position."""
 
 import difflib
 from collections.abc import Iterator
@@ -24,15 +24,15 @@ FORMATS = {
     "dbb-mapping": "the mapping of recordings made elsewhere",
     "dbb-simulator": "a simulator of one's own",
 }
-"""Every format by the name before its version, with what it is called in messages."""
+"""Names of the formats in messages, by the name before the version."""
 
 
 BEFORE_FIRST = "24b5a22b"
-"""Commit that reads what was written before the first release, in formats with a version of 2 or more."""
+"""Commit that reads files from before the first release, in formats with a version of 2 or more."""
 
 
 class Schema(BaseModel):
-    """Base of every part of a file format; the docstring under each field tells its unit and sign."""
+    """Base of every part of a file format; the docstring under each field states its unit and sign."""
 
     model_config = ConfigDict(
         strict=True,
@@ -149,7 +149,7 @@ def _place(document: YamlDocument, detail: ErrorDetails) -> tuple[int, int]:
 
 
 def dotted(location: Location) -> str:
-    """Return a location as people write it: `tests[3].ball`."""
+    """Return a location as text, such as `tests[3].ball`."""
     text = ""
     for step in location:
         text += f"[{step}]" if isinstance(step, int) else f".{shortened(step)}" if text else shortened(step)
@@ -179,7 +179,7 @@ def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Loca
 
 
 def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
-    """Return the keys that a schema knows at a location."""
+    """Return the keys of a schema at a location."""
     root = schema.model_json_schema()
     definitions = root.get("$defs", {})
 

@@ -1,7 +1,7 @@
-"""YAML text to plain data with the line and column of every key and value.
+"""Convert YAML text to plain data, with the line and column of every key and value.
 
-ruamel.yaml composes nodes; only YAML 1.2 scalars are accepted, without tags, merge keys or double keys. Sequences become
-tuples, times stay text.
+ruamel.yaml composes nodes. Only YAML 1.2 scalars are accepted, without tags, merge keys or double keys. Sequences
+become tuples; times remain text.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _PLAIN_TEXT = {"str", "timestamp", "value"}
 
 @dataclass(frozen=True)
 class YamlDocument:
-    """A YAML file's data with their places.
+    """A YAML file's data with their positions.
 
     Attributes:
         data: mappings, tuples, text, numbers, booleans and None.
@@ -60,7 +60,7 @@ class YamlDocument:
     def entries(self, *location: str | int) -> list[tuple[Location, dict[Any, Any]]]:
         """Return the mappings in a sequence or mapping; empty for other types.
 
-        Checks across entries thus work on files with other faults.
+        So checks across entries work even if the file has other faults.
         """
         within = self.data
         for step in location:
@@ -70,26 +70,27 @@ class YamlDocument:
 
 
 LARGEST_BYTES = 10_000_000
-"""Largest YAML file that is read: twice what `MOST_NODES` numbers of full precision take."""
+"""Largest YAML file that is read [bytes]: twice the size of `MOST_NODES` numbers of full precision."""
 
 MOST_NODES = 250_000
-"""Keys and values that a document may have. A model with 490 parameters and their whole covariance has as many, a session
-of ten thousand runs too; both are ten times what anybody has recorded. Reading them takes ten seconds and 250 MB."""
+"""Greatest number of keys and values of a document, as in a model with 490 parameters and their covariance, or in a
+session of ten thousand runs. Both are ten times larger than any recorded ones. Reading them needs ten seconds and 250
+MB."""
 
 MOST_VALUES = MOST_NODES
-"""Values, aliases written out: nine aliases of nine aliases and so on would fill any memory."""
+"""Greatest number of values with all aliases expanded: nested aliases would fill any memory."""
 
 DEEPEST = 50
-"""Lists and mappings that may stand in one another: the formats have eight."""
+"""Greatest depth of nested lists and mappings; the formats have eight."""
 
 SHORT = 10_000
-"""Characters of a text that is kept when it was parsed, with 63 others: 5 MB of plans, machines and instruments, 60 MB at most."""
+"""Greatest number of characters of a parsed text that stays in memory, with 63 others: usually 5 MB, at most 60 MB."""
 
 LONGEST_TAG = 1000
-"""Characters of a tag. None is allowed, but each is read to its end first."""
+"""Greatest number of characters of a tag. Tags are refused, but each is first read to its end."""
 
 LONGEST_S = 60.0
-"""Time that a document may take [s]: six times what `MOST_NODES` take, for a slow computer."""
+"""Longest time of reading a document [s]: six times the time for `MOST_NODES`, for a slow computer."""
 
 
 def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
@@ -152,7 +153,7 @@ class _OverBudgetError(Exception):
 
 
 class _BoundedScanner(Scanner):
-    """Refuses overlong tags, for which ruamel.yaml takes quadratic time."""
+    """Refuses overlong tags, for which ruamel.yaml needs quadratic time."""
 
     def scan_tag(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
         if not self.reader.prefix(LONGEST_TAG).split(maxsplit=1)[0][LONGEST_TAG - 1 :]:

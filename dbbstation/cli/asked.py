@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from dbbstation.cli.instrument_options import LineOptions
     from dbbstation.cli.session_options import RecordingOptions
-    from dbbstation.files.recordings.entries import ReadBy
+    from dbbstation.files.formats.session import ReadBy
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.station.assembly import Job
 
@@ -92,6 +92,6 @@ class Asked:
 
     def read_by(self, protocol: Protocol) -> ReadBy:
         """Return what a session notes of the instrument."""
-        from dbbstation.files.recordings.entries import ReadBy
+        from dbbstation.files.formats.session import ReadBy
 
         return ReadBy(protocol.name, self.line.profile or "", self.line.port, is_virtual(self.line.port))

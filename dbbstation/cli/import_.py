@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from dbbstation.cli.asking import Asker
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.session import SessionDetails
     from dbbstation.files.recordings.foreign_csv import ForeignTable
-    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Plan
     from dbbstation.results.imported import ImportResult
@@ -158,7 +158,7 @@ def _read(
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
-    from dbbstation.files.recordings.entries import Note
+    from dbbstation.files.formats.session import Note
     from dbbstation.tasks.importing.runs import Reader
     from dbbstation.tasks.importing.session import originals
     from dbbstation.text.counting import repeats_in_order

@@ -18,7 +18,7 @@ from dbbstation.station.states import State
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.commands import Command
 

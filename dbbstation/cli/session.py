@@ -16,7 +16,7 @@ from dbbstation.tasks.declare import Option
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
 
 _Folder = Annotated[Path, Option("of the session.", kind="argument", metavar="FOLDER")]
@@ -281,14 +281,14 @@ def _told(name: str, run: RunEntry) -> Answer:
 
 
 def _repeated(read: SessionFolder) -> list[tuple[str, int]]:
-    from dbbstation.files.recordings.entries import RunState
+    from dbbstation.files.formats.session import RunState
 
     counted = Counter(f"{run.test} {run.direction}" for run in read.in_state(RunState.ACCEPTED))
     return [(circle, runs) for circle, runs in counted.items() if runs > 1]
 
 
 def _missing(read: SessionFolder) -> list[str]:
-    from dbbstation.files.recordings.entries import RunState
+    from dbbstation.files.formats.session import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
     planned = [(name, direction) for name, test in read.plan.tests.items() for direction in test.directions]
@@ -299,7 +299,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
     import difflib
 
     from dbbstation.errors import InputError
-    from dbbstation.files.recordings.entries import RunState
+    from dbbstation.files.formats.session import RunState
     from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session_writer import SessionWriter
 

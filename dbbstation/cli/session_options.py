@@ -15,7 +15,7 @@ from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.session_details import SessionDetails
+    from dbbstation.files.formats.session import SessionDetails
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
     from dbbstation.station.assembly import Job
@@ -54,7 +54,7 @@ class SessionOptions:
             click.UsageError: a blank name, length without uncertainty, something of the bar without either, or a file and options of the bar.
             InputError: faults of the bar's file.
         """
-        from dbbstation.files.recordings.session_details import SessionDetails
+        from dbbstation.files.formats.session import SessionDetails
 
         for name in ("operator", "job", "serial_number"):
             if (text := getattr(self, name)) and not text.strip():
@@ -69,11 +69,11 @@ class SessionOptions:
                 raise click.UsageError("--bar has all facts of the bar: leave out --bar-length-mm and similar options")
             bar = read_bar(self.bar).to_bar(stroke_mm)
         return SessionDetails(
-            self.serial_number.strip(),
-            self.operator.strip(),
-            self.ambient_temp_c,
-            bar,
-            self.bar_waiver.strip(),
+            serial_number=self.serial_number.strip(),
+            operator=self.operator.strip(),
+            ambient_temp_c=self.ambient_temp_c,
+            bar=bar,
+            bar_waiver=self.bar_waiver.strip(),
             job=self.job.strip(),
         )
 

@@ -46,7 +46,8 @@ _ADAPTERS: dict[Any, TypeAdapter[Any]] = {}
 """Adapters by class, cached because each takes milliseconds to make."""
 
 
-def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
+def adapter(kind: type[Any]) -> TypeAdapter[Any]:
+    """Return the adapter of a class."""
     if kind not in _ADAPTERS:
         _ADAPTERS[kind] = TypeAdapter(kind)
     return _ADAPTERS[kind]
@@ -55,7 +56,7 @@ def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
 def plain(result: object) -> dict[str, Any]:
     """Return a result as dictionaries, lists, texts and numbers."""
     kind: type[Any] = type(result)
-    return _adapter(kind).dump_python(result, mode="json", by_alias=True)
+    return adapter(kind).dump_python(result, mode="json", by_alias=True)
 
 
 def json_of(result: object, indent: int | None = 1, *, escaped: bool = False) -> str:
@@ -69,7 +70,7 @@ def json_of(result: object, indent: int | None = 1, *, escaped: bool = False) ->
 
 def schema_of(kind: type) -> dict[str, Any]:
     """Return the JSON Schema of a result's class."""
-    return _adapter(kind).json_schema(mode="serialization", by_alias=True)
+    return adapter(kind).json_schema(mode="serialization", by_alias=True)
 
 
 def read_json(kind: type[_Kind], text: str | bytes) -> _Kind:
@@ -98,5 +99,5 @@ def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:
     Raises:
         ValueError: a key is missing, or its value is of another type.
     """
-    found: _Kind = _adapter(kind).validate_python(data)
+    found: _Kind = adapter(kind).validate_python(data)
     return found

@@ -16,19 +16,19 @@ from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.mapping import parse_mapping
 from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
-from dbbstation.files.formats.session import BAR_LENGTH
+from dbbstation.files.formats.session import PART, RunState
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.simulator import parse_simulator
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.event_log import read_event_log, set_back
 from dbbstation.files.recordings.judged import JUDGED, judge_session
-from dbbstation.files.recordings.run_csv import PART, read_run
+from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.seal import copy_faults
 from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
 from dbbstation.files.yaml.text import load_yaml
+from dbbstation.plan.bar import BAR_LENGTH
 from dbbstation.quality.finding import Name
 from dbbstation.trace.loss import lost_samples
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.trace.recording import Recording
@@ -288,7 +288,7 @@ def _amended(checked: Checked, session: SessionFolder) -> None:
 def _seal(session: SessionFolder) -> str:
     if session.seal is None:
         return NO_SEAL
-    return f"sealed, {_count(session.seal.events, 'event')}, anchor {anchor_of(session.seal)[:SHORTEST]}"
+    return f"sealed, {_count(session.seal.log.events if session.seal.log else 0, 'event')}, anchor {anchor_of(session.seal)[:SHORTEST]}"
 
 
 NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"

@@ -8,9 +8,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.program_identity import program_identity
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session_name import SESSION_FILE
 
 if TYPE_CHECKING:

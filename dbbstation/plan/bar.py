@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from datetime import date, timedelta
-from typing import TYPE_CHECKING
+from typing import Annotated
 
-if TYPE_CHECKING:
-    from datetime import datetime
+from pydantic import Field
+
+from dbbstation.facts.quantities import ExpansionUmMK, Quantity, TemperatureDegc
+from dbbstation.facts.record import Day, Moment, Record
+
+BAR_LENGTH = Quantity("mm", 20, 2_000)
+"""Plausible lengths of ball bars."""
 
 LONGEST_CALIBRATOR = timedelta(days=5 * 366)
 """Longest age of a calibrator's certificate: the longest usual interval for gauge blocks and step gauges [ILAC-G24]."""
@@ -32,29 +37,37 @@ USUAL_READINGS = 200
 
 
 @dataclass(frozen=True)
-class Bar:
-    """The bar; recorded readings are never changed.
+class Bar(Record):
+    """The bar and the calibration of its length, which is compared with the plan and never added to readings."""
 
-    Attributes:
-        expansion_um_m_k: [µm/(m K)]; None if not noted.
-        stroke_mm: of its gauge in each direction; None if not noted.
-        temp_uncertainty_k: standard, of a bar temperature; None if not noted.
-    """
-
-    serial_number: str
-    calibrated_length_mm: float
-    calibrator_uncertainty_mm: float
-    calibrated: datetime | None
-    temp_c: float | None
-    expansion_um_m_k: float | None
-    stroke_mm: float | None = None
-    reading_mm: float | None = None
-    temp_uncertainty_k: float | None = None
+    serial_number: Annotated[str, Field(default="")]
+    """Serial number of the bar."""
+    calibrated_length_mm: Annotated[float, BAR_LENGTH]
+    """Calibrated distance between the ball centres [mm]."""
+    calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
+    """Standard uncertainty of this length [mm]."""
+    calibrated: Moment | None = None
+    """When."""
+    temp_c: TemperatureDegc | None = None
+    """Temperature of the bar at its calibration [degC]."""
+    expansion_um_m_k: ExpansionUmMK | None = None
+    """Thermal expansion of the bar [µm/(m K)]."""
+    stroke_mm: Annotated[float, Quantity("mm", 0.1, 100)] | None = None
+    """Travel of its gauge from this length, either way; circles of other radii are impossible [mm]."""
+    reading_mm: Annotated[float, BAR_LENGTH] | None = None
+    """Reading on the calibrator. The fit accounts for the difference; recorded lengths are never corrected [mm]."""
+    temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
+    """Standard uncertainty of a temperature of the bar; if stated, the fit accounts for the bar's growth [K]."""
     calibrator_serial_number: str | None = None
+    """Of the calibrator."""
     calibrator_certificate: str | None = None
-    calibrator_certified: str | None = None
-    calibrator_valid_until: str | None = None
-    ball_form_um: float | None = None
+    """Number and issuer of its certificate."""
+    calibrator_certified: Day | None = None
+    """Date of its certificate."""
+    calibrator_valid_until: Day | None = None
+    """Last day on which the certificate is valid."""
+    ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    """Largest deviation of the bar's ball from a sphere by its certificate [µm]."""
 
     def certificate_fault(self, day: date) -> str:
         """Return why the calibrator's certificate is not valid on a day; empty if valid.

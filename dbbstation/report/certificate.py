@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.anchors import impossible_day, sealed_at
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.event_log import CLOCK_S
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
 
 MOST_NAMED = 3

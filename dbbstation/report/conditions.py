@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.anchors import anchor_of
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.report.certificate import sealed_after
 from dbbstation.text.digits import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from dbbstation.files.recordings.entries import Note, RunEntry
+    from dbbstation.files.formats.session import Note, RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.bar import Bar
     from dbbstation.results.circles import MeasuredCircle
@@ -154,10 +154,7 @@ def _logged(circles: Sequence[MeasuredCircle]) -> str:
 def _seal(session: SessionFolder) -> str:
     if session.seal is None:
         return "none"
-    told = (
-        f"{session.seal.runs} sealed runs, {session.seal.events} events"
-        if session.seal.events
-        else f"{session.seal.runs} sealed runs"
-    )
+    events = "" if session.seal.log is None else f", {session.seal.log.events} events"
+    told = f"{session.seal.runs} sealed runs{events}"
     anchor = anchor_of(session.seal)
     return f"{told}, anchor {anchor or 'none'}; unbroken when this was written"

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.budget import Budget, SetUpKnowledge
     from dbbstation.circles.path import Filter
     from dbbstation.circles.spectrum import FormSpectrum
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.quality.finding import Finding
     from dbbstation.quality.judge import Judgement

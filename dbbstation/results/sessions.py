@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Annotated
 
 from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.files.formats.session import Counts
 from dbbstation.files.provenance import Provenance
-from dbbstation.files.recordings.entries import Counts
 from dbbstation.results.frame import Framed
 from dbbstation.trace.recording import Recording
 

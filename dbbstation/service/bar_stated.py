@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import date, datetime
 from typing import TYPE_CHECKING, get_args
 
+from dbbstation.facts.quantities import Quantity
 from dbbstation.files.formats.bar import BarFile, CalibratorSchema
-from dbbstation.files.formats.quantities import Quantity
 from dbbstation.plan.circle import USUAL_STROKE_MM
 
 if TYPE_CHECKING:

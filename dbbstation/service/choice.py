@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from dbbstation.files.formats.bar import read_bar
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import ReadBy
+from dbbstation.files.formats.session import ReadBy, SessionDetails
 from dbbstation.files.recordings.session import SESSION_FILE, read_session
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.plan.duration import circles_s
 from dbbstation.plan.order import LARGEST_LEAK, height_and_drift, mountings
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -156,11 +155,11 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     calibration = None if choice.bar is None else read_bar(choice.bar)
     bar = None if calibration is None else calibration.to_bar(protocol.length.stroke_mm)
     details = SessionDetails(
-        choice.serial_number,
-        choice.operator,
-        choice.ambient_temp_c,
-        bar,
-        choice.bar_waiver.strip(),
+        serial_number=choice.serial_number,
+        operator=choice.operator,
+        ambient_temp_c=choice.ambient_temp_c,
+        bar=bar,
+        bar_waiver=choice.bar_waiver.strip(),
         job=choice.job.strip(),
     )
     job = Job(

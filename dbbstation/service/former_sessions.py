@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.files.atomic import write_bytes
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import content_of, digest_of
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.service.candidates import CandidateFormat, candidates

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.service.live_trace import LiveTrace

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.former import dated_folders
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.duration import circles_s

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
-from dbbstation.files.formats.quantities import TemperatureDegc
-from dbbstation.files.recordings.entries import Note
+from dbbstation.facts.quantities import TemperatureDegc
+from dbbstation.files.formats.session import Note
 from dbbstation.files.recordings.lock import PATIENCE_S
 from dbbstation.files.recordings.session_writer import SessionWriter
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.session import RunState, SessionDetails
 from dbbstation.files.recordings.bar_reach import unlike_bar
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.former import former_sessions
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.plan.duration import circles_s
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import ReadBy, RunEntry
+    from dbbstation.files.formats.session import ReadBy, RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.machine.geometry import Machine

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, TraceError
-from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.judged import circles_of_plan, planned_circles, run_of
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.quality.assigned import Assigned, FormerSitting, effects_of
@@ -24,7 +24,7 @@ from dbbstation.trace.cut import cut
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.files.recordings.entries import CommandedProgram
+    from dbbstation.files.formats.session import CommandedProgram
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.model.identified import IdentifiedModel
@@ -115,12 +115,9 @@ class RunJudge:
             repeat=run.repeat,
             mounting=run.mounting,
             state=RunState.COMPLETE,
-            reason="",
             started=next((known.started for known in self._writer.runs if _key(known) == _key(run)), None),
             path=self._writer.session.folder,
-            sha256="",
             program=self._programs.get((run.test, run.direction)),
-            centre_mm=None,
         )
         one = run_of(self._writer.session, entry, recording, self._model, self._planned)
         self._waiting[_key(run)] = new = seen(one)

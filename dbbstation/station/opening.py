@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import CLOCK_S, EVENTS_FILE
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.files.recordings.session_writer import SessionWriter
@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import ReadBy
+    from dbbstation.files.formats.session import ReadBy, SessionDetails
     from dbbstation.files.recordings.session import SessionFolder
-    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 

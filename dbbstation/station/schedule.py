@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.station.events import RunId
 
 if TYPE_CHECKING:

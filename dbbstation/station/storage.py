@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import OutputError
-from dbbstation.files.recordings.entries import Counts, Note
+from dbbstation.files.formats.session import Counts, Note
 from dbbstation.station import events
 from dbbstation.station.run_record import recording_of
 from dbbstation.trace.columns import STATUS_GOOD, TIME_UNCERTAINTY
@@ -18,7 +18,7 @@ from dbbstation.trace.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from dbbstation.files.recordings.entries import CommandedProgram, ReadBy, RunEntry
+    from dbbstation.files.formats.session import CommandedProgram, ReadBy, RunEntry
     from dbbstation.files.recordings.journal import RunWriter
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.plan.circle import Direction

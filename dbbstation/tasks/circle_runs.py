@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
 from dbbstation.errors import InputError, TraceError
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.judged import judge_session
 from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.results.circles import Circled, MeasuredCircle, MeasuredPair
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.circles.path import Filter
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
     from dbbstation.plan.plan import Ball

@@ -131,7 +131,7 @@ def circle(
     from dbbstation.circles.analysis import analyse
     from dbbstation.circles.budget import SetUpKnowledge
     from dbbstation.circles.path import Filter
-    from dbbstation.files.recordings.entries import RunEntry, RunState
+    from dbbstation.files.formats.session import RunEntry, RunState
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.results.circles import MeasuredCircle, circle_figures
     from dbbstation.trace.cut import cut
@@ -147,6 +147,6 @@ def circle(
         middle, middle, bar_mm, middle, feed_mm_min, start_deg, overshoot_deg, feed_in_mm, 0.0, Direction(direction)
     )
     recording = Recording("circle", times, lengths)
-    entry = RunEntry("circle", planned.direction, 1, None, RunState.ACCEPTED, "", None, Path(), "", None, None)
+    entry = RunEntry(test="circle", direction=planned.direction, repeat=1, state=RunState.ACCEPTED, path=Path())
     analysis = analyse(cut(recording, planned), recording, Filter.of_word(filter))
     return circle_figures(MeasuredCircle("", entry, analysis, "", SetUpKnowledge(), None), analysis)

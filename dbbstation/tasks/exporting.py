@@ -11,8 +11,8 @@ import numpy as np
 from dbbstation.errors import InputError, OutputError, Problem, TraceError
 from dbbstation.files.atomic import streamed, write_text
 from dbbstation.files.csv_rows import csv_text
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.provenance import beside_table
-from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_lines import split_head
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace import columns
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.provenance import Provenance
-    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.recording import Recording

@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.control.commands import nominal_commands
 from dbbstation.errors import InputError, Problem, StationError
-from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.machine.difference import differences, in_words

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Circle

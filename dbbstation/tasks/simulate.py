@@ -66,10 +66,9 @@ def simulate(
         StoppedError: `stop` returned True.
     """
     from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.formats.session import ReadBy, SessionDetails
     from dbbstation.files.own_sources import every_source
-    from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.files.recordings.new_session import FinishedRun, write_session
-    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.results.sessions import SimulatedSession
     from dbbstation.tasks.chosen import chosen_of

@@ -12,8 +12,7 @@ import pytest
 
 from dbbstation.cli import main
 from dbbstation.errors import InputError
-from dbbstation.files.formats.session import SessionFile
-from dbbstation.files.recordings.entries import RunState, run_entry
+from dbbstation.files.formats.session import RunState, SessionFile
 from dbbstation.files.recordings.seal import chained
 from dbbstation.files.recordings.sealing import seal_session, sealing
 from dbbstation.files.recordings.session import read_session
@@ -128,9 +127,7 @@ runs:
     found = sealing(folder)
     digests = [hashlib.sha256((folder / "runs" / name).read_bytes()).hexdigest() for name in names]
     assert found.files == (f"runs/{names[0]}", f"runs/{names[1]}")
-    first, second, never = [
-        run.chain_sha256 for run in chained([run_entry(r, folder) for r in parsed(found.text).runs])
-    ]
+    first, second, never = [run.chain_sha256 for run in chained(parsed(found.text).runs)]
     assert f"  # the first one\n    sha256: {digests[0]}\n    chain_sha256: {first}\n    state: accepted" in found.text
     assert f"file: runs/{names[1]}, sha256: {digests[1]}, chain_sha256: {second}, state: accepted}}" in found.text
     assert never == ""

@@ -17,13 +17,11 @@ import numpy as np
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.formats.session import Counts, Note, ReadBy, SessionDetails, SetUpReadings
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.amending import amend
-from dbbstation.files.recordings.entries import Counts, Note, ReadBy
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.session_details import SessionDetails
-from dbbstation.files.recordings.session_set_up import SetUpReadings
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.machine.geometry import ControlCorrection
 from dbbstation.model.identified import IdentifiedModel
@@ -58,7 +56,13 @@ def make_session(folder: Path) -> None:
         source = read_session(recorded)
         when = BEGUN - timedelta(minutes=20)
         bar = Bar("DBB-0042", 150.0003, 0.0005, when, 20.3, 10.6, 10.0, 150.0005, 0.3, "ZB-150-17")
-        details = SessionDetails("PM600-0007", "first shift", 20.4, bar, "an example: the bar was on its calibrator")
+        details = SessionDetails(
+            serial_number="PM600-0007",
+            operator="first shift",
+            ambient_temp_c=20.4,
+            bar=bar,
+            bar_waiver="an example: the bar was on its calibrator",
+        )
         writer = SessionWriter.create(
             folder, source.machine, read_inline_plan(recorded / "plan.yaml"), details, lambda: BEGUN
         )
@@ -99,7 +103,7 @@ def make_virtual_session(folder: Path) -> None:
         record(recorded, seed=7, plan=subset(table_ii_plan(7), "a"), mechanisms=[RandomKinematics()], rate_hz=5.0)
         source = read_session(recorded)
         by = ReadBy("streaming-encoder", "crc", "virtual machine", virtual=True)
-        details = SessionDetails("PM600-0007", "first shift", 20.4, instrument=by)
+        details = SessionDetails(serial_number="PM600-0007", operator="first shift", ambient_temp_c=20.4, instrument=by)
         plan = read_inline_plan(recorded / "plan.yaml")
         with SessionWriter.create(folder, source.machine, plan, details, lambda: BEGUN) as writer:
             for run in source.runs:
@@ -139,7 +143,15 @@ def make_conventional_session(folder: Path) -> None:
             np.round(np.array(stands[key]) + rng.normal(0.0, 1.0, 3)).tolist()
             for key in ("fixed_ball_um", "moving_ball_um")
         )
-        readings.append(SetUpReadings(test.name, stands["mounting"], tuple(fixed), (*moving[:2], None), 1.0))
+        readings.append(
+            SetUpReadings(
+                test=test.name,
+                mounting=stands["mounting"],
+                fixed_ball_um=tuple(fixed),
+                moving_ball_um=(*moving[:2], None),
+                uncertainty_um=1.0,
+            )
+        )
     write_session(folder, machine, inline, runs, SessionDetails(set_up_errors=tuple(readings)))
 
 

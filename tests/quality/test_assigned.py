@@ -11,8 +11,8 @@ import pytest
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.formats.session import SessionDetails
 from dbbstation.files.recordings.judged import circles_of_plan
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel

@@ -17,7 +17,7 @@ import pytest
 from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.errors import InputError, TravelError
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
-from dbbstation.files.recordings.entries import Note
+from dbbstation.files.formats.session import Note
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.errors import OutputError
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction

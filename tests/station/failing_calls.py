@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from dbbstation.errors import StationError
-from dbbstation.files.recordings.entries import Counts, Note, RunState
+from dbbstation.files.formats.session import Counts, Note, RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import parse_session, read_session
 from dbbstation.files.recordings.session_writer import SessionWriter

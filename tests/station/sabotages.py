@@ -23,8 +23,7 @@ import numpy as np
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import ReadBy
-from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.files.formats.session import ReadBy, SessionDetails
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import at_rate, load_instrument

@@ -11,7 +11,7 @@ import pytest
 from dbbstation.errors import InstrumentError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
-from dbbstation.files.recordings.entries import Counts
+from dbbstation.files.formats.session import Counts
 from dbbstation.files.recordings.journal import RunWriter
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from tests.station.bench import POLLED, bench, lines_of, wait_for

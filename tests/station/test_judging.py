@@ -12,7 +12,7 @@ import pytest
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import parse_session, read_session
 from dbbstation.files.recordings.session_writer import SessionWriter

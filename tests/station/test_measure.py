@@ -14,7 +14,7 @@ import pytest
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
@@ -28,7 +28,7 @@ from tests.station.bench import MACHINE_FILE, POLLED, STREAM, bench, lines_of, w
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.virtual.machine import VirtualMachine
     from tests.station.bench import Bench

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan
 from dbbstation.station.schedule import NextRun, Schedule

@@ -12,7 +12,7 @@ import pytest
 from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import ReadBy
+from dbbstation.files.formats.session import ReadBy
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder

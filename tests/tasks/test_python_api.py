@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import dbbstation as dbb
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 
 SMALL, MODEL = Path("fixtures/sessions/small"), Path("fixtures/models/small.yaml")

@@ -19,10 +19,9 @@ from dbbstation.errors import InputError, InstrumentError
 from dbbstation.facts.held import ReportVerdict, WorstCircle
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.formats.session import Note, SessionDetails
 from dbbstation.files.formats.settings import read_settings
-from dbbstation.files.recordings.entries import Note
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction

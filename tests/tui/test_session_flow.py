@@ -14,7 +14,7 @@ import pytest
 from textual.widgets import OptionList, Static
 
 from dbbstation.errors import InstrumentError
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument

@@ -1,16 +1,15 @@
 """`dbb-bar/1`: the reading of a bar on its calibrator."""
 
 import math
-from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from dbbstation.errors import Problem
+from dbbstation.facts.quantities import ExpansionUmMK, Quantity, TemperatureDegc
+from dbbstation.facts.record import Day, Moment
 from dbbstation.files.atomic import write_text
-from dbbstation.files.formats.quantities import ExpansionUmMK, Quantity, TemperatureDegc
-from dbbstation.files.formats.session import Day, Moment
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
@@ -105,7 +104,7 @@ class BarFile(Schema):
             serial_number=self.serial_number,
             calibrated_length_mm=self.length_mm,
             calibrator_uncertainty_mm=self.uncertainty_mm,
-            calibrated=datetime.fromisoformat(self.calibrated),
+            calibrated=self.calibrated,
             temp_c=self.temp_c,
             expansion_um_m_k=self.expansion_um_m_k,
             stroke_mm=stroke_mm,

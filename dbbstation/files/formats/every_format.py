@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.facts.serialise import adapter
 from dbbstation.files.formats.bar import BarFile
 from dbbstation.files.formats.jig import JigFile
 from dbbstation.files.formats.job import JobFile
@@ -17,6 +18,7 @@ from dbbstation.files.formats.simulator import SimulatorFile
 from dbbstation.files.yaml.schema import format_of
 
 if TYPE_CHECKING:
+    from dbbstation.facts.record import Record
     from dbbstation.files.yaml.schema import Schema
 
 _SCHEMAS = (
@@ -32,11 +34,11 @@ _SCHEMAS = (
     SimulatorFile,
 )
 
-SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _SCHEMAS}
+SCHEMAS: dict[str, type[Schema | Record]] = {format_of(schema): schema for schema in _SCHEMAS}
 """Schema of each format, by name with version."""
 
 
-def json_schema(name: str, schema: type[Schema]) -> dict[str, object]:
+def json_schema(name: str, schema: type[Schema | Record]) -> dict[str, object]:
     """Return the JSON Schema of a format such as `dbb-plan/1`, with units and plausible ranges."""
-    described = schema.model_json_schema()
+    described = adapter(schema).json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described, "title": name}

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.formats.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
+from dbbstation.facts.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_document, validate

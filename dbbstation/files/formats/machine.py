@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from dbbstation.computing.arrays import Floats
 from dbbstation.errors import Problem
-from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
+from dbbstation.facts.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate

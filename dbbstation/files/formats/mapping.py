@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from dbbstation.facts.quantities import Quantity
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
-from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate

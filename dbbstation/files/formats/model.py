@@ -11,10 +11,10 @@ import numpy as np
 
 from dbbstation.catalogue import nearest
 from dbbstation.errors import ModelError, Problem
+from dbbstation.facts.quantities import Quantity
 from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, SourceSchema
-from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from dbbstation.facts.record import Sha256Hex
 from dbbstation.files.formats.machine import MachineParts
-from dbbstation.files.formats.session import Sha256Hex
 from dbbstation.files.yaml.schema import Schema
 
 

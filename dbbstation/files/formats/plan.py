@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Problem
+from dbbstation.facts.quantities import Quantity, twice
 from dbbstation.files.formats.jig import (
     BY_CMM,
     UNDER_SPINDLE,
@@ -19,7 +20,6 @@ from dbbstation.files.formats.jig import (
     check_balls,
     parse_jig,
 )
-from dbbstation.files.formats.quantities import Quantity, twice
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate

@@ -1,14 +1,33 @@
 """`dbb-session/1`: the record of a session, one entry per run."""
 
-from datetime import date, datetime
-from pathlib import PurePosixPath
-from typing import Annotated, Literal, Self
+from __future__ import annotations
 
-from pydantic import AfterValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal, TypeAlias
 
-from dbbstation.files.formats.quantities import ExpansionUmMK, Point, Quantity, TemperatureDegc
-from dbbstation.files.yaml.schema import Schema
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, ValidationInfo
+from pydantic_core import PydanticCustomError, PydanticKnownError
+
+from dbbstation.facts.quantities import Point, Quantity, TemperatureDegc
+from dbbstation.facts.record import LEFT_OUT_EMPTY, Moment, OrEmpty, Record, Sha256Hex, Sha256OrEmpty
+from dbbstation.plan.bar import Bar
+from dbbstation.plan.circle import Direction
+from dbbstation.sources.contract import SetUpErrors
+
+PART = ".part"
+
+
+class RunState(StrEnum):
+    """State of a run."""
+
+    RECORDING = "recording"
+    COMPLETE = "complete"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
 
 
 def _inside(path: str) -> str:
@@ -20,170 +39,162 @@ def _inside(path: str) -> str:
     return path
 
 
-def _moment(text: str) -> str:
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        moment = None
-    if moment is None or moment.tzinfo is None:
-        raise PydanticCustomError(
-            "moment", "`{text}` is not a time with its zone, such as 2026-11-20T08:04:11Z", {"text": text}
-        )
-    return text
+def _in_folder(path: object, info: ValidationInfo) -> Path:
+    if not isinstance(path, str):
+        raise PydanticKnownError("string_type")
+    return sealed_or_part((info.context or Path()) / _inside(path))
 
 
-def _day(text: str) -> str:
-    try:
-        date.fromisoformat(text)
-    except ValueError:
-        raise PydanticCustomError("day", "`{text}` is not a date", {"text": text}) from None
-    return text
+def sealed_or_part(path: Path) -> Path:
+    """Return a run's file, sealed or `.part`; it may have been sealed just before the program ended."""
+    sealed = path.with_suffix("") if path.suffix == PART else path
+    return sealed if not path.exists() and sealed.exists() else path
 
 
 _NOT_READ = (None, None, None)
 
-BAR_LENGTH = Quantity("mm", 20, 2_000)
-"""Plausible lengths of ball bars."""
-
 InsidePath = Annotated[str, AfterValidator(_inside)]
-Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$"), AfterValidator(_day)]
-Moment = Annotated[str, AfterValidator(_moment), Field(json_schema_extra={"format": "date-time"})]
-Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+PathInFolder = Annotated[
+    Path,
+    BeforeValidator(_in_folder, json_schema_input_type=str),
+    PlainSerializer(lambda path, info: path.relative_to(info.context).as_posix()),
+    Field(alias="file"),
+]
+"""Path that a file names relative to the session folder, by the key `file`."""
 
 
-class BarSchema(Schema):
-    """The bar and the calibration of its length, which is compared with the plan and never added to readings."""
-
-    serial_number: str = ""
-    """Serial number of the bar."""
-    calibrated_length_mm: Annotated[float, BAR_LENGTH]
-    """Calibrated distance between the ball centres [mm]."""
-    calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
-    """Standard uncertainty of this length [mm]."""
-    stroke_mm: Annotated[float, Quantity("mm", 0.1, 100)] | None = None
-    """Travel of its gauge from this length, either way; circles of other radii are impossible [mm]."""
-    calibrated: Moment | None = None
-    """When."""
-    temp_c: TemperatureDegc | None = None
-    """Temperature of the bar at its calibration [degC]."""
-    expansion_um_m_k: ExpansionUmMK | None = None
-    """Thermal expansion of the bar [µm/(m K)]."""
-    reading_mm: Annotated[float, BAR_LENGTH] | None = None
-    """Reading on the calibrator. The fit accounts for the difference; recorded lengths are never corrected [mm]."""
-    temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
-    """Standard uncertainty of a temperature of the bar; if stated, the fit accounts for the bar's growth [K]."""
-    calibrator_serial_number: str | None = None
-    """Of the calibrator."""
-    calibrator_certificate: str | None = None
-    """Number and issuer of its certificate."""
-    calibrator_certified: Day | None = None
-    """Date of its certificate."""
-    calibrator_valid_until: Day | None = None
-    """Last day on which the certificate is valid."""
-    ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
-    """Largest deviation of the bar's ball from a sphere by its certificate [µm]."""
-
-
-class InstrumentSchema(Schema):
+@dataclass(frozen=True)
+class ReadBy(Record):
     """The instrument that read the lengths, and whether it is real or virtual."""
 
     name: str
     """Name of the instrument or of its protocol file."""
-    profile: str = ""
+    profile: OrEmpty = ""
     """Its variant; empty: the usual one."""
-    port: str = ""
+    port: OrEmpty = ""
     """Name or URL of the instrument's port."""
-    virtual: bool
+    virtual: bool = False
     """Whether machine and instrument are virtual, so that the readings describe no real machine."""
 
+    @property
+    def text(self) -> str:
+        """Return the instrument in words: `heidenhain-nd281b at /dev/ttyUSB0`."""
+        name = f"{self.name} ({self.profile})" if self.profile else self.name
+        return f"{name} at {self.port}" if self.port else name
 
-class ProgramSchema(Schema):
+
+@dataclass(frozen=True)
+class CommandedProgram(Record):
     """The commanded NC program, if it was not the plan's nominal circle."""
 
-    file: InsidePath
+    path: PathInFolder
     """Path in the session folder."""
     sha256: Sha256Hex
     """Of the program file."""
-    model_sha256: Sha256Hex | None = None
+    model_sha256: Sha256OrEmpty = ""
     """Of the model file that it was compensated with."""
 
 
-class CountsSchema(Schema):
+@dataclass(frozen=True)
+class Counts(Record):
     """Counts of received, lost and rejected samples of a run."""
 
     received: Annotated[int, Field(ge=0)]
     """Samples in the run file."""
     lost: Annotated[int, Field(ge=0)]
     """Samples that the line lost."""
-    rejected: dict[str, Annotated[int, Field(ge=1)]] = Field(default={})
-    """Samples of the file that no calculation uses, by the instrument's status, such as `overrange`."""
+    rejected: Mapping[str, Annotated[int, Field(ge=1)]] = field(default_factory=dict)
+    """Samples of the file that no calculation uses, by what the instrument said of them, such as `overrange`, and
+    unreadable bytes by fault, such as `unreadable checksum`."""
+
+    @property
+    def text(self) -> str:
+        """Return the counts in words: `1200 received, 3 lost, 2 rejected (overrange 2)`."""
+        reasons = ", ".join(f"{reason} {count}" for reason, count in self.rejected.items())
+        told = f"{self.received} received, {self.lost} lost, {sum(self.rejected.values())} rejected"
+        return f"{told} ({reasons})" if reasons else told
 
 
-class RunSchema(Schema):
+@dataclass(frozen=True, kw_only=True)
+class RunEntry(Record):
     """One run: one circle in one direction."""
 
     test: str
     """Test of the plan."""
-    direction: Literal["ccw", "cw"]
+    direction: Annotated[Direction, Field(strict=False)]
     """Sense of travel, seen from +Z."""
     repeat: Annotated[int, Field(ge=1)]
     """Counts the runs of this test and direction, from 1."""
     mounting: Annotated[int, Field(ge=1)] | None = None
     """Number of the ball's mounting; runs with the same number and ball share the ball's position. Absent: one mounting
     per test."""
-    file: InsidePath
+    path: PathInFolder
     """Path in the session folder."""
     started: Moment | None = None
     """Time of the first sample."""
-    state: Literal["recording", "complete", "accepted", "rejected"]
+    state: Annotated[RunState, Field(strict=False)]
     """`recording`: the recording was interrupted; `complete`: not judged yet."""
-    reason: str | None = None
-    """Reason for a rejection."""
-    sha256: Sha256Hex | None = None
+    reason: OrEmpty = ""
+    """Why it was rejected, or accepted without a circle."""
+    sha256: Sha256OrEmpty = ""
     """Of the run file; absent only while recording."""
-    chain_sha256: Sha256Hex | None = None
+    chain_sha256: Sha256OrEmpty = ""
     """Hash of this entry and the previous sealed run's `chain_sha256`."""
-    counts: CountsSchema | None = None
+    counts: Counts | None = None
     """Samples received, rejected and lost; absent if another program recorded them."""
-    instrument: InstrumentSchema | None = None
-    """Instrument of the run; absent in other programs' recordings."""
-    program: ProgramSchema | None = None
-    """The NC program, if not the plan's nominal circle."""
     centre_mm: Point | None = None
     """Centre of the programmed circle: x, y, z, machine frame, if rounding in the program changes the plan's centre
     [mm]."""
+    instrument: ReadBy | None = None
+    """Instrument of the run; absent in other programs' recordings."""
+    program: CommandedProgram | None = None
+    """The NC program, if not the plan's nominal circle."""
 
-    @model_validator(mode="after")
-    def _sealed(self) -> Self:
-        if self.state != "recording" and self.sha256 is None:
-            raise PydanticCustomError(
-                "unsealed",
-                "the run is {state} but has no sha256; only a run in recording has none",
-                {"state": self.state},
-            )
-        return self
+    @property
+    def label(self) -> str:
+        """Return the name of the run for messages."""
+        return f"{self.test} {self.direction} {self.repeat}"
+
+
+def _sealed(run: RunEntry) -> RunEntry:
+    if run.state is not RunState.RECORDING and not run.sha256:
+        raise PydanticCustomError(
+            "unsealed",
+            "the run is {state} but has no sha256; only a run in recording has none",
+            {"state": run.state.value},
+        )
+    return run
 
 
 _Reading = Annotated[float, Quantity("µm", 0, 5_000, signed=True)]
+Readings: TypeAlias = tuple[_Reading | None, _Reading | None, _Reading | None]
+"""x, y, z [µm]; None if not measured."""
 
 
-class SetUpErrorsSchema(Schema):
+@dataclass(frozen=True, kw_only=True)
+class SetUpReadings(Record):
     """Micrometer readings of balls under the spindle, for one mounting."""
 
     test: str
     """A test of this mounting."""
     mounting: Annotated[int, Field(ge=1)] | None = None
     """Number of the mounting in the runs; absent if they have none."""
-    fixed_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
+    fixed_ball_um: Readings = _NOT_READ
     """Fixed ball minus tool tip with the machine at the ball's commanded position: x, y, z, machine frame; null if not
     measured [µm]."""
-    moving_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
+    moving_ball_um: Readings = _NOT_READ
     """Moving ball minus tool tip: x, y, z, platform frame; null if not measured [µm]."""
     uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000)]
     """Standard uncertainty of each reading [µm]."""
 
+    def to_domain(self) -> SetUpErrors:
+        """Return the readings for calculations."""
+        fixed_mm, moving_mm = (np.array(um, dtype=np.float64) / 1e3 for um in (self.fixed_ball_um, self.moving_ball_um))
+        return SetUpErrors(fixed_mm, moving_mm, self.uncertainty_um / 1e3)
 
-class LogSchema(Schema):
+
+@dataclass(frozen=True)
+class LogMark(Record):
     """Position in the session's event log when this file was written."""
 
     events: Annotated[int, Field(ge=1)]
@@ -192,48 +203,91 @@ class LogSchema(Schema):
     """Link of the last event."""
 
 
-class SealSchema(Schema):
+@dataclass(frozen=True)
+class Seal(Record):
     """Hashes of machine, plan and jig when the session was sealed, and the number of runs."""
 
-    files: dict[str, Sha256Hex]
+    files: Mapping[str, Sha256Hex]
     """SHA-256 of machine, plan and the plan's jig file, by their paths in this file."""
     runs: Annotated[int, Field(ge=0)]
     """Number of sealed runs."""
-    chain_sha256: Sha256Hex | None = None
+    chain_sha256: Sha256OrEmpty = ""
     """`chain_sha256` of the last sealed run; absent if there is none."""
-    log: LogSchema | None = None
+    log: LogMark | None = None
     """The event log of this file; every valid seal names one."""
 
 
-class AmendmentSchema(Schema):
+@dataclass(frozen=True)
+class Amendment(Record):
     """A deliberate change of a sealed file."""
 
     what: str
     """Changed file, named as in `seal.files`; `runs` for the list of runs."""
-    former_sha256: Sha256Hex | None = None
+    former_sha256: Annotated[Sha256OrEmpty, Field(default="")]
     """Hash of the former file, or `chain_sha256` of the former list's last run; absent if there was none."""
-    sha256: Sha256Hex | None = None
+    sha256: Annotated[Sha256OrEmpty, Field(default="")]
     """The same now."""
-    former: InsidePath | None = None
+    former: Annotated[OrEmpty, AfterValidator(lambda path: path and _inside(path)), Field(default="")]
     """Path of the former file in the session folder."""
     reason: Annotated[str, Field(min_length=1)]
     """Reason, as the user stated it."""
     made: Moment
     """When."""
 
+    @property
+    def text(self) -> str:
+        """Return the change in words."""
+        kept = f"; as it was: {self.former}" if self.former else ""
+        return f"{self.what} was changed on purpose, {self.made:%Y-%m-%d %H:%M %Z}: {self.reason}{kept}"
 
-class NoteSchema(Schema):
+
+@dataclass(frozen=True)
+class Note(Record):
     """A note during the measurement."""
 
     made: Moment
     """When."""
-    text: str = ""
+    text: OrEmpty = ""
     """In their words."""
     ambient_temp_c: TemperatureDegc | None = None
     """Temperature of the shop at this time [degC]."""
 
 
-class SessionFile(Schema):
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SessionDetails(Record):
+    """What a session notes beside its runs."""
+
+    serial_number: str = ""
+    """Of the machine."""
+    operator: str = ""
+    """Name of the operator."""
+    job: OrEmpty = ""
+    """Job or order number of the measurement."""
+    ambient_temp_c: TemperatureDegc | None = None
+    """Temperature of the shop [degC]."""
+    instrument: ReadBy | None = None
+    """Instrument at the session's start; its runs are all virtual or all real."""
+    bar: Bar | None = None
+    """The bar."""
+    bar_waiver: OrEmpty = ""
+    """Reason for measuring without a fresh calibration of the bar."""
+    seal: Seal | None = None
+    """The seal; absent in sessions that were written by hand."""
+    amendments: Annotated[tuple[Amendment, ...], LEFT_OUT_EMPTY] = ()
+    """Deliberate changes of sealed files, oldest first."""
+    notes: Annotated[tuple[Note, ...], LEFT_OUT_EMPTY] = ()
+    """Notes during the measurement, oldest first."""
+    set_up_errors: Annotated[tuple[SetUpReadings, ...], LEFT_OUT_EMPTY] = ()
+    """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
+
+    @property
+    def noted(self) -> bool:
+        """Return whether anything is noted."""
+        return any(getattr(self, each.name) != each.default for each in fields(SessionDetails))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SessionFile(SessionDetails):
     """Record of a session: paths of machine and plan, the bar, one entry per run."""
 
     format: Literal["dbb-session/1"]
@@ -242,27 +296,5 @@ class SessionFile(Schema):
     """The controller's nominal machine during the measurement, `dbb-machine/1`."""
     plan: InsidePath
     """The test plan as run, `dbb-plan/1`."""
-    serial_number: str = ""
-    """Of the machine."""
-    operator: str = ""
-    """Name of the operator."""
-    job: str = ""
-    """Job or order number of the measurement."""
-    ambient_temp_c: TemperatureDegc | None = None
-    """Temperature of the shop [degC]."""
-    instrument: InstrumentSchema | None = None
-    """Instrument at the session's start; its runs are all virtual or all real."""
-    bar: BarSchema | None = None
-    """The bar."""
-    bar_waiver: str = ""
-    """Reason for measuring without a fresh calibration of the bar."""
-    seal: SealSchema | None = None
-    """The seal; absent in sessions that were written by hand."""
-    amendments: tuple[AmendmentSchema, ...] = ()
-    """Deliberate changes of sealed files, oldest first."""
-    notes: tuple[NoteSchema, ...] = ()
-    """Notes during the measurement, oldest first."""
-    set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
-    """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
-    runs: tuple[RunSchema, ...] = ()
+    runs: tuple[Annotated[RunEntry, AfterValidator(_sealed)], ...] = ()
     """Runs in the order they were started."""

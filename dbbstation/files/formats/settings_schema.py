@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dbbstation.files.formats.quantities import Quantity, TemperatureDegc
+from dbbstation.facts.quantities import Quantity, TemperatureDegc
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
 from dbbstation.plan.circle import Direction

@@ -10,11 +10,11 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.atomic import set_read_only, write_bytes, write_folder
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.plan import plan_text, read_inline_plan
+from dbbstation.files.formats.session import Amendment
 from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
     RUNS,
-    Amendment,
     chain_faults,
     chained,
     copy_name,
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import RunEntry
-    from dbbstation.files.recordings.seal import Seal
+    from dbbstation.files.formats.session import RunEntry, Seal
     from dbbstation.files.recordings.session import SessionFolder
 
 

@@ -11,7 +11,7 @@ from dbbstation.files.recordings.event_log import read_event_log, run_key
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.files.recordings.seal import Seal
+    from dbbstation.files.formats.session import Seal
 
 SHORTEST = 16
 """Least number of hex digits of an anchor: nobody can make another log with the same sixteen."""
@@ -19,7 +19,7 @@ SHORTEST = 16
 
 def anchor_of(seal: Seal | None) -> str:
     """Return a session's anchor, the link of its last event; empty without a seal."""
-    return "" if seal is None else seal.anchor
+    return "" if seal is None or seal.log is None else seal.log.sha256
 
 
 def links_of(folder: Path) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import parse_session
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.machine.difference import differences

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import set_read_only
+from dbbstation.files.formats.session import PART
 from dbbstation.files.gateway import digest_of
-from dbbstation.files.recordings.run_csv import PART, RunFile, parse_run
+from dbbstation.files.recordings.run_csv import RunFile, parse_run
 from dbbstation.files.refused import refusal
 from dbbstation.system.replacing import rename, sync_folder
 from dbbstation.trace import columns
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import Counts
+    from dbbstation.files.formats.session import Counts
     from dbbstation.plan.circle import Direction
 
 _LOG = logging.getLogger(__name__)

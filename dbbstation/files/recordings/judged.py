@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import MachineError, TraceError
-from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.model.expected import SECTORS, expected_circle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation

@@ -10,14 +10,12 @@ from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
-from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.formats.session import CommandedProgram, RunEntry, RunState, SessionDetails, SessionFile
 from dbbstation.files.recorded_ground import refuse_recorded
-from dbbstation.files.recordings.entries import CommandedProgram, RunEntry, RunState
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import run_header, run_line, run_name
 from dbbstation.files.recordings.seal import chained, copy_name, is_copy, sealed_over
 from dbbstation.files.recordings.session_checks import check_bar
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_name import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_store import first_log
 from dbbstation.files.recordings.session_text import session_data, text_of
@@ -98,7 +96,6 @@ def write_session(
             path=folder / name,
             sha256=hashlib.sha256(data).hexdigest(),
             program=program,
-            centre_mm=None,
         )
         entries.append(entry)
     make_session_folder(folder, machine, plan, details or SessionDetails(), entries, files, at)
@@ -143,7 +140,7 @@ def make_session_folder(
 def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
     faults: list[Problem] = []
     document = parse_yaml(text, str(folder / SESSION_FILE), faults)
-    session = None if document is None else validate(document, SessionFile, faults)
+    session = None if document is None else validate(document, SessionFile, faults, folder)
     if document is not None and session is not None and session.bar is not None:
         check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, plan.to_domain(), faults)
     if faults:

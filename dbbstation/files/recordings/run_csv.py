@@ -7,12 +7,14 @@ Blocks become lines (`run_lines`), then checked numbers (`run_numbers`), then a 
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, few
+from dbbstation.files.formats.session import PART, Counts
 from dbbstation.files.gateway import digest_of, opened
 from dbbstation.files.inputs import note_input, note_read
 from dbbstation.files.recordings.run_lines import pieces_of
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats
 
-PART = ".part"
 """Ending, after `.csv`, of a run that is being recorded."""
 
 
@@ -100,12 +101,6 @@ def sha256_of(path: Path) -> str:
         raise InputError([unreadable(path, error)]) from error
 
 
-def sealed_or_part(path: Path) -> Path:
-    """Return a run's file, sealed or `.part`; it may have been sealed just before the program ended."""
-    sealed = path.with_suffix("") if path.suffix == PART else path
-    return sealed if not path.exists() and sealed.exists() else path
-
-
 def changed(file: str) -> Problem:
     """Return the problem of a file whose hash differs from the noted one."""
     what = "the file was changed after it was recorded: its SHA-256 is not the one in the session"
@@ -167,3 +162,18 @@ def _recording(file: str, numbers: Mapping[str, Floats], usable: Flags | None) -
         logged={name: values for name, values in numbers.items() if name not in _BY_THEMSELVES},
         usable=usable,
     )
+
+
+def counts_in(header: Mapping[str, str]) -> Counts | None:
+    """Return the counts in a run file's `# key: value` lines, or None."""
+    received, lost = count_in(header.get("received", "")), count_in(header.get("lost", ""))
+    if received is None or lost is None:
+        return None
+    prefix = "rejected "
+    said = {key.removeprefix(prefix): count_in(value) for key, value in header.items() if key.startswith(prefix)}
+    return Counts(received, lost, {reason: count for reason, count in said.items() if count})
+
+
+def count_in(text: str) -> int | None:
+    """Return the non-negative integer of a text, or None."""
+    return int(text) if re.fullmatch(r"[0-9]{1,12}", text) else None

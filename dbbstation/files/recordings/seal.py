@@ -8,13 +8,14 @@ or changed entry breaks a link. The seal's count and last link reveal removed la
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
+from dataclasses import replace
+from datetime import UTC
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
 from dbbstation.files.atomic import is_leftover, write_folder
+from dbbstation.files.formats.session import Seal
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.changes import changes
 from dbbstation.files.yaml.text import load_yaml
@@ -23,8 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.formats.session import AmendmentSchema, SealSchema
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import Amendment, RunEntry
 
 SEALED = "sealed"
 """Folder in the session with a copy of every file that was ever sealed."""
@@ -40,62 +40,6 @@ _NAMED_DIGITS = 16
 
 _MOST_NAMED = 4
 """Greatest number of named changes; an exchanged file has hundreds."""
-
-
-@dataclass(frozen=True)
-class Seal:
-    """The state of a session when it was sealed.
-
-    Attributes:
-        files: SHA-256 by path as the session file names it.
-        chain_sha256: last link; empty if there is none.
-        events: number in the event log; zero without one.
-    """
-
-    files: Mapping[str, str] = field(default_factory=dict)
-    runs: int = 0
-    chain_sha256: str = ""
-    events: int = 0
-    anchor: str = ""
-
-
-@dataclass(frozen=True)
-class Amendment:
-    """A deliberate change of a sealed file.
-
-    Attributes:
-        what: path in the seal, or `runs`.
-        former_sha256: empty if there was none.
-        sha256: empty if there is none.
-        former: path of the kept former file in the session; empty if none.
-    """
-
-    what: str
-    former_sha256: str
-    sha256: str
-    former: str
-    reason: str
-    made: datetime
-
-    @property
-    def text(self) -> str:
-        """Return the change in words."""
-        kept = f"; as it was: {self.former}" if self.former else ""
-        return f"{self.what} was changed on purpose, {self.made:%Y-%m-%d %H:%M %Z}: {self.reason}{kept}"
-
-
-def seal_entry(seal: SealSchema | None) -> Seal | None:
-    """Return a file's seal in the program's form."""
-    if seal is None:
-        return None
-    events, anchor = (0, "") if seal.log is None else (seal.log.events, seal.log.sha256)
-    return Seal(seal.files, seal.runs, seal.chain_sha256 or "", events, anchor)
-
-
-def amendment_entry(entry: AmendmentSchema) -> Amendment:
-    """Return a file's amendment in the program's form."""
-    texts = (entry.what, entry.former_sha256 or "", entry.sha256 or "", entry.former or "", entry.reason)
-    return Amendment(*texts, datetime.fromisoformat(entry.made))
 
 
 def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:

@@ -9,19 +9,16 @@ from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.formats.session import LogMark, Seal, SessionFile
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.anchors import impossible_day
-from dbbstation.files.recordings.entries import run_entry
 from dbbstation.files.recordings.event_log import read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
-    Seal,
     chained,
     copy_name,
     hashes,
     keep_copies,
-    seal_entry,
     seal_faults,
     sealed_names,
     sealed_over,
@@ -29,7 +26,7 @@ from dbbstation.files.recordings.seal import (
 from dbbstation.files.recordings.session import SESSION_FILE
 from dbbstation.files.recordings.session_state import SEALED, Stands, mark_of, standing
 from dbbstation.files.recordings.session_store import SessionStore, log_faults
-from dbbstation.files.recordings.session_text import seal_data
+from dbbstation.files.recordings.session_text import data_of
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import validate
@@ -39,7 +36,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.event_log import EventLog
 
 
@@ -94,7 +91,7 @@ def seal_session(folder: Path) -> Sealing:
 
 def _marked(seal: Seal, said: Mapping[str, Any]) -> Seal:
     mark = mark_of(said)
-    return seal if mark is None else replace(seal, events=mark[0], anchor=mark[1])
+    return seal if mark is None else replace(seal, log=LogMark(*mark))
 
 
 def sealing(folder: Path) -> Sealing:
@@ -156,12 +153,11 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
 def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog | None]:
     faults: list[Problem] = []
     document = parse_yaml(text, str(path), faults)
-    session = None if document is None else validate(document, SessionFile, faults)
+    session = None if document is None else validate(document, SessionFile, faults, path.parent)
     if session is None:
         raise InputError(faults)
     folder, names = path.parent, (session.machine, session.plan)
-    runs = tuple(run_entry(run, folder) for run in session.runs)
-    seal, log = seal_entry(session.seal), read_event_log(folder, faults)
+    runs, seal, log = session.runs, session.seal, read_event_log(folder, faults)
     # Hashes that are added now are no change of what was sealed.
     if document is not None and standing(document.data, log, but_runs=True).stands is Stands.UNLIKE:
         faults += log_faults(path, document.data, log, but_runs=True)
@@ -183,7 +179,7 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog 
     if faults:
         raise InputError(faults)
     over = sealed_over(found, linked)
-    return linked, over if seal is None else replace(over, events=seal.events, anchor=seal.anchor), log
+    return linked, over if seal is None else replace(over, log=seal.log), log
 
 
 def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, tuple[str, ...]]:
@@ -202,7 +198,7 @@ def _with_seal(text: str, seal: Seal) -> str:
     begin = starts.get("seal", starts.get("set_up_errors", starts["runs"]))
     after = [start for start in starts.values() if start > begin]
     end = begin if "seal" not in starts else min(after, default=len(text))
-    line = yaml_text({"seal": seal_data(seal)})
+    line = yaml_text({"seal": data_of(seal)})
     return text[:begin] + line + text[end:]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -10,31 +10,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, TraceError
+from dbbstation.facts.quantities import Quantity
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
-from dbbstation.files.formats.quantities import Quantity
-from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.formats.session import PART, RunEntry, RunState, SessionDetails, SessionFile
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.places import name_of
 from dbbstation.files.recordings import session_name
-from dbbstation.files.recordings.entries import (
-    RunEntry,
-    RunState,
-    bar_entry,
+from dbbstation.files.recordings.event_log import EVENTS_FILE
+from dbbstation.files.recordings.run_csv import (
+    RunFile,
     count_in,
     counts_in,
-    note_entry,
-    read_by,
-    run_entry,
+    read_run,
 )
-from dbbstation.files.recordings.event_log import EVENTS_FILE
-from dbbstation.files.recordings.run_csv import PART, RunFile, read_run
 from dbbstation.files.recordings.run_lines import split_file
-from dbbstation.files.recordings.seal import amendment_entry, seal_entry, seal_faults
+from dbbstation.files.recordings.seal import seal_faults
 from dbbstation.files.recordings.session_checks import check_bar, check_runs
-from dbbstation.files.recordings.session_details import SessionDetails
-from dbbstation.files.recordings.session_set_up import check_set_up_errors, mounted_name, set_up_readings
+from dbbstation.files.recordings.session_set_up import check_set_up_errors, mounted_name
 from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
 from dbbstation.files.source_text import read_bytes, unreadable, without_faults
 from dbbstation.files.yaml.schema import validate
@@ -299,7 +293,7 @@ def parse_session(
     document, log = document_in_force(file, faults)
     if document is None:
         return None
-    session = validate(document, SessionFile, faults)
+    session = validate(document, SessionFile, faults, folder)
     data = document.data
     named = {key: data.get(key) for key in ("machine", "plan")}
     paths = {key: folder / name for key, name in named.items() if isinstance(name, str)} | dict(instead or {})
@@ -312,8 +306,7 @@ def parse_session(
         check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, planned, faults)
     if session is None:
         return None
-    entries = [run_entry(run, folder) for run in session.runs]
-    seal = seal_entry(session.seal)
+    entries, seal = session.runs, session.seal
     if as_sealed:
         broken = [] if seal is None else seal_faults(folder, file, seal, (session.machine, session.plan), entries)
         faults += [*broken, *log_faults(file, data, log, but_runs=any(one.file == str(file) for one in broken))]
@@ -333,21 +326,11 @@ def parse_session(
         plan_path=folder / session.plan,
         runs=(*entries, *_unlisted(folder, entries, planned, faults)),
         sha256=digest,
-        serial_number=session.serial_number,
-        operator=session.operator,
-        ambient_temp_c=session.ambient_temp_c,
-        bar=None if session.bar is None else bar_entry(session.bar),
-        bar_waiver=session.bar_waiver,
-        set_up_errors=tuple(map(set_up_readings, session.set_up_errors)),
-        seal=seal,
-        amendments=tuple(map(amendment_entry, session.amendments)),
-        notes=tuple(map(note_entry, session.notes)),
-        job=session.job,
-        instrument=read_by(session.instrument),
+        **{each.name: getattr(session, each.name) for each in fields(SessionDetails)},
     )
 
 
-def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
+def _unlisted(folder: Path, entries: Sequence[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
     listed = {run.path.name for run in entries}
     found = []
     for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):
@@ -382,14 +365,8 @@ def part_entry(path: Path) -> RunEntry | None:
         test=header["test"],
         direction=Direction(header["direction"]),
         repeat=repeat,
-        mounting=None,
         state=RunState.RECORDING,
-        reason="",
-        started=None,
         path=path,
-        sha256="",
-        program=None,
-        centre_mm=None,
         counts=counts_in(header),
     )
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING
 
-from dbbstation.files.formats.quantities import twice
+from dbbstation.facts.quantities import twice
+from dbbstation.files.formats.session import sealed_or_part
 from dbbstation.files.recordings.bar_reach import unlike_bar
-from dbbstation.files.recordings.run_csv import changed, sealed_or_part
+from dbbstation.files.recordings.run_csv import changed
 from dbbstation.files.source_text import read_bytes
 
 if TYPE_CHECKING:

@@ -2,54 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.yaml.schema import dotted, read_document, validate
-from dbbstation.sources.contract import SetUpErrors
 
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
-    from dbbstation.computing.arrays import Floats
     from dbbstation.errors import Problem
-    from dbbstation.files.formats.session import SetUpErrorsSchema
+    from dbbstation.files.formats.session import SetUpReadings
     from dbbstation.files.yaml.text import Location, YamlDocument
     from dbbstation.plan.plan import Plan
-
-Readings: TypeAlias = tuple[float | None, float | None, float | None]
-"""x, y, z [µm]; None if not measured."""
-
-
-@dataclass(frozen=True)
-class SetUpReadings:
-    """A micrometer's readings at one mounting, in the file's unit, so that they can be written unchanged.
-
-    Attributes:
-        mounting: None: that of the test's runs without a number.
-        fixed_ball_um: fixed ball less tool tip at the ball's commanded place, machine frame.
-        moving_ball_um: moving ball less tool tip, platform frame.
-    """
-
-    test: str
-    mounting: int | None
-    fixed_ball_um: Readings
-    moving_ball_um: Readings
-    uncertainty_um: float
-
-    def to_domain(self) -> SetUpErrors:
-        """Return the readings for calculations."""
-        return SetUpErrors(_mm(self.fixed_ball_um), _mm(self.moving_ball_um), self.uncertainty_um / 1e3)
-
-
-def set_up_readings(entry: SetUpErrorsSchema) -> SetUpReadings:
-    """Return a session file's entry in the program's form."""
-    return SetUpReadings(entry.test, entry.mounting, entry.fixed_ball_um, entry.moving_ball_um, entry.uncertainty_um)
 
 
 def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
@@ -65,7 +31,7 @@ def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
         check_set_up_errors(document, plan, faults)
     if session is None or faults:
         raise InputError(faults)
-    return tuple(map(set_up_readings, session.set_up_errors))
+    return session.set_up_errors
 
 
 def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
@@ -114,7 +80,3 @@ def _no_such_mounting(
     what = f"{dotted(location)}: no run of test {test} has the mounting {mounting}"
     remedy = f"its mountings: {numbers}" if numbers else "its runs have no numbers: leave `mounting` out"
     return document.problem((*location, "mounting"), what, remedy)
-
-
-def _mm(readings: Readings) -> Floats:
-    return np.array([np.nan if reading is None else reading / 1e3 for reading in readings])

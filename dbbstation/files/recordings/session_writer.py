@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import remove_leftovers, write_bytes
-from dbbstation.files.recordings.entries import CommandedProgram, Note, RunEntry, RunState
+from dbbstation.files.formats.session import CommandedProgram, LogMark, Note, RunEntry, RunState, SessionDetails
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import RunWriter, run_name
 from dbbstation.files.recordings.lock import SessionLock
@@ -16,7 +16,6 @@ from dbbstation.files.recordings.new_session import make_session_folder
 from dbbstation.files.recordings.run_csv import sha256_of
 from dbbstation.files.recordings.seal import chained, hashes, keep_copies, sealed_names, sealed_over
 from dbbstation.files.recordings.session import no_session, part_entry, read_session
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_name import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_set_up import readings_in
 from dbbstation.files.recordings.session_store import SessionStore, now
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import Counts, ReadBy
+    from dbbstation.files.formats.session import Counts, ReadBy
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
@@ -169,10 +168,8 @@ class SessionWriter:
             repeat=repeat,
             mounting=mounting,
             state=RunState.RECORDING,
-            reason="",
             started=started,
             path=writer.path,
-            sha256="",
             program=program,
             centre_mm=centre_mm,
             instrument=instrument,
@@ -285,7 +282,7 @@ class SessionWriter:
             raise
         seal = session.seal
         if seal is not None:
-            seal = replace(seal, events=len(self._store.log.events), anchor=self._store.log.links[-1])
+            seal = replace(seal, log=LogMark(len(self._store.log.events), self._store.log.links[-1]))
         self._session = self._kept = replace(session, sha256=self._store.sha256, seal=seal)
 
     def _take_readings(self) -> None:

@@ -3,12 +3,14 @@
 import difflib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from dbbstation.errors import MOST_FAULTS, Problem, few
+from dbbstation.facts.record import STRICT, Record
+from dbbstation.facts.serialise import adapter
 from dbbstation.files.source_text import shortened
 from dbbstation.files.yaml.text import Location, YamlDocument, load_yaml
 
@@ -34,19 +36,13 @@ BEFORE_FIRST = "24b5a22b"
 class Schema(BaseModel):
     """Base of every part of a file format; the docstring under each field states its unit and sign."""
 
-    model_config = ConfigDict(
-        strict=True,
-        extra="forbid",
-        frozen=True,
-        allow_inf_nan=False,
-        use_attribute_docstrings=True,
-    )
+    model_config = STRICT
 
 
-S = TypeVar("S", bound=Schema)
+S = TypeVar("S", bound=Schema | Record)
 
 
-def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> YamlDocument | None:
+def read_document(path: Path, schema: type[Schema | Record], faults: list[Problem]) -> YamlDocument | None:
     """Read a YAML file by `schema`; None with faults added."""
     document = load_yaml(path, faults)
     if document is None:
@@ -58,10 +54,14 @@ def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> Ya
     return document if _has_format(document, format_of(schema), faults) else None
 
 
-def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> S | None:
-    """Return a document by its schema; None with faults added to `faults`."""
+def validate(document: YamlDocument, schema: type[S], faults: list[Problem], folder: Path | None = None) -> S | None:
+    """Return a document by its schema; None with faults added to `faults`.
+
+    Args:
+        folder: that paths in it are relative to.
+    """
     try:
-        return schema.model_validate(document.data)
+        return adapter(schema).validate_python(document.data, context=folder)
     except ValidationError as error:
         # Naming what a key may have been meant for takes a millisecond: for the first few only.
         every = error.errors(include_url=False)
@@ -73,9 +73,9 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
         return None
 
 
-def format_of(schema: type[Schema]) -> str:
+def format_of(schema: type[Schema | Record]) -> str:
     """Return the name of a format with its version, such as `dbb-plan/1`."""
-    return str(schema.model_fields["format"].annotation.__args__[0])  # type: ignore[union-attr]  # a Literal
+    return str(get_type_hints(schema)["format"].__args__[0])
 
 
 def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) -> bool:
@@ -101,13 +101,13 @@ def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) ->
     return False
 
 
-def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails) -> Problem:
+def _problem(document: YamlDocument, schema: type[Any], detail: ErrorDetails) -> Problem:
     location = _known_part(document, detail["loc"])
     kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == "missing":
         missing = str(detail["loc"][-1])
         return document.problem(location, f"{_within(location)}the key `{missing}` is missing", "add it")
-    if kind in {"extra_forbidden", "invalid_key"}:
+    if kind in {"extra_forbidden", "invalid_key", "unexpected_keyword_argument"}:
         allowed = list(keys_at(schema, location[:-1]))
         near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
         remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(sorted(allowed))}"
@@ -124,11 +124,11 @@ def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -
     if kind == "string_type":
         remedy = "put it in quotes" if isinstance(given, int | float) else "write one word or text in quotes"
         return f"text was expected, not {_shown(given)}", remedy
-    if kind == "literal_error":
+    if kind in {"literal_error", "enum"}:
         return f"{_shown(given)} is not one of {context['expected']}", "use one of these"
     if kind in {"tuple_type", "list_type"}:
         return f"a list [...] was expected, not {_shown(given)}", "put the values in brackets"
-    if kind in {"model_type", "dict_type", "model_attributes_type"}:
+    if kind in {"model_type", "dict_type", "model_attributes_type", "dataclass_type"}:
         return f"`key: value` entries were expected, not {_shown(given)}", "compare it with the example of its format"
     if kind in {"too_long", "too_short"}:
         limit = context.get("max_length", context.get("min_length"))
@@ -178,9 +178,9 @@ def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Loca
     return known
 
 
-def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
+def keys_at(schema: type[Schema | Record], location: Location) -> Iterator[str]:
     """Return the keys of a schema at a location."""
-    root = schema.model_json_schema()
+    root = adapter(schema).json_schema()
     definitions = root.get("$defs", {})
 
     def alternatives(part: dict[str, Any]) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.mapping import DIRECTION, REPEAT, TEST
-from dbbstation.files.recordings.entries import count_in
+from dbbstation.files.recordings.run_csv import count_in
 from dbbstation.plan.circle import Direction
 
 if TYPE_CHECKING:

@@ -26,9 +26,10 @@ from dbbstation.files.formats.mapping import (
     UNITS,
     in_run_units,
 )
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.anchors import impossible_day
-from dbbstation.files.recordings.entries import RunState, count_in
 from dbbstation.files.recordings.new_session import FinishedRun
+from dbbstation.files.recordings.run_csv import count_in
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.tasks.importing.gaps import held_over_gaps, samples_of

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, OutputError, Problem, TraceError
 from dbbstation.files.formats.mapping import mapping_text
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.new_session import write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.system.replacing import remove_tree, rename, sync_folder
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.session import SessionDetails
     from dbbstation.files.provenance import Provenance
-    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.tasks.importing.runs import ImportedRun
 

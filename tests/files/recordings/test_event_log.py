@@ -14,8 +14,8 @@ import pytest
 
 from dbbstation.cli import DONE, FAILED
 from dbbstation.errors import InputError, OutputError
+from dbbstation.files.formats.session import Note, RunState
 from dbbstation.files.recordings.amending import amend
-from dbbstation.files.recordings.entries import Note, RunState
 from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
 from dbbstation.files.recordings.seal import copy_faults
 from dbbstation.files.recordings.sealing import seal_session
@@ -116,7 +116,7 @@ def test_a_log_can_be_followed_with_nothing_but_the_documented_rule(folder: Path
             runs[run["test"], run["direction"], run["repeat"]] = run
         before = link
     session = read_session(folder)
-    assert session.seal.anchor == before
+    assert session.seal.log.sha256 == before
     assert [(r["state"], r.get("reason", "")) for r in runs.values()] == [
         (r.state.value, r.reason) for r in session.runs
     ]
@@ -293,7 +293,7 @@ def test_readings_that_are_written_in_are_no_change_and_those_that_are_changed_a
 
 
 def test_an_anchor_that_was_noted_tells_whether_anything_before_it_was_changed(folder: Path, tmp_path: Path) -> None:
-    anchor = read_session(folder).seal.anchor
+    anchor = read_session(folder).seal.log.sha256
     with SessionWriter.open(folder) as writer:
         writer.judge(writer.runs[0], accepted=False, reason="chip")
     outcome = call("check", folder, "--anchor", anchor[:16].upper())
@@ -315,7 +315,7 @@ def test_an_anchor_that_was_noted_tells_whether_anything_before_it_was_changed(f
 
 def test_the_log_is_listed_with_reasons_and_anchor(folder: Path) -> None:
     listed = call("session", "log", folder, "--json").data
-    assert listed["anchor"] == read_session(folder).seal.anchor
+    assert listed["anchor"] == read_session(folder).seal.log.sha256
     assert [(e["what"], e["about"]) for e in listed["events"][6:8]] == [
         ("rejected", "a-cw-1: operator"),
         ("run started", "a-cw-2"),

@@ -13,7 +13,7 @@ from dbbstation.errors import InputError, OutputError
 from dbbstation.files.checking import check
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.lock import LOCK_FILE, SessionLock
 from dbbstation.files.recordings.session import unlisted_sealed
 from dbbstation.files.recordings.session_writer import SessionWriter

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction

@@ -11,10 +11,9 @@ import pytest
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.formats.session import RunState, SessionDetails
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.bar import Bar
@@ -23,7 +22,12 @@ from dbbstation.plan.circle import Direction
 BEGUN = datetime(2026, 11, 20, 8, 0, 0, 250000, tzinfo=UTC)
 COLUMNS = ("t_s", "length_mm")
 PLAN = read_inline_plan(shipped_folder("protocols") / "plans" / "ten-minute-check.yaml")
-DETAILS = SessionDetails("PM600-0007", "first: shift", 20.4, Bar("", 150.0003, 0.0005, BEGUN, None, None))
+DETAILS = SessionDetails(
+    serial_number="PM600-0007",
+    operator="first: shift",
+    ambient_temp_c=20.4,
+    bar=Bar("", 150.0003, 0.0005, BEGUN, None, None),
+)
 
 
 @pytest.fixture

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BeforeValidator,
@@ -17,7 +19,7 @@ from pydantic import (
     WrapValidator,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticCustomError, PydanticKnownError
+from pydantic_core import CoreSchema, PydanticCustomError, PydanticKnownError, core_schema
 
 from dbbstation.facts.serialise import adapter
 
@@ -48,6 +50,20 @@ class Record:
             for name, said in inherited.items():
                 part["properties"][name] |= {"description": said["description"]}
         return found
+
+
+@dataclass(frozen=True)
+class AsArray:
+    """Marks an array that is a tuple of this kind in a file."""
+
+    kind: Any
+
+    def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_wrap_validator_function(
+            lambda given, check: given if isinstance(given, np.ndarray) else np.array(check(given)),
+            handler.generate_schema(self.kind),
+            serialization=core_schema.plain_serializer_function_ser_schema(np.ndarray.tolist),
+        )
 
 
 def _moment(given: object) -> object:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
+from dbbstation.computing.arrays import Floats
+from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Quantity
+from dbbstation.facts.record import AsArray, Record, Sha256Hex
 from dbbstation.machine.rotation import Rotation
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from dbbstation.computing.arrays import Floats
 
 STRUTS = 6
 
@@ -26,6 +28,25 @@ GREATEST_TURN_DEG_MIN = 36_000.0
 ACCELERATION_MM_S2 = 1000.0
 """Planned acceleration of the tool tip if the machine file states none [mm/s²]: 1 m/s², a tenth of gravity, low for
 machine tools. Segments that keep their feed at this acceleration keep it at higher ones."""
+
+
+_Component = Annotated[float, Quantity("", 0, 1, signed=True)]
+
+_UNIT_WITHIN = 0.01
+"""How far the length of a direction may be from one, written with two or three digits."""
+
+
+def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = math.hypot(*vector)
+    if abs(length - 1.0) > _UNIT_WITHIN:
+        raise PydanticCustomError(
+            "direction", "a direction has the length 1, not {length}", {"length": f"{length:.3g}"}
+        )
+    return vector
+
+
+_Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
+_SIX_DIRECTIONS = AsArray(tuple[_Direction, _Direction, _Direction, _Direction, _Direction, _Direction])
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,91 +73,88 @@ class Hexapod:
 
 
 @dataclass(frozen=True)
-class Travel:
-    """Limits as pairs (least, greatest)."""
+class Travel(Record):
+    """Limits of the machine; pairs are [least, greatest]."""
 
-    xy_radius_mm: float
-    x_mm: tuple[float, float]
-    y_mm: tuple[float, float]
-    z_mm: tuple[float, float]
-    a_deg: tuple[float, float]
-    b_deg: tuple[float, float]
-    c_deg: tuple[float, float]
-    strut_mm: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Masses:
-    """Masses under gravity; None if unknown.
-
-    Attributes:
-        centre_of_gravity_above_tip_mm: on the platform's axis.
-    """
-
-    platform_kg: float
-    centre_of_gravity_above_tip_mm: float
+    xy_radius_mm: Annotated[float, Quantity("mm", 5, 10_000)]
+    """Greatest distance of the tool tip from the Z axis [mm]."""
+    x_mm: LimitsMm
+    """X of the tool tip, machine frame [mm]."""
+    y_mm: LimitsMm
+    """Y of the tool tip, machine frame [mm]."""
+    z_mm: LimitsMm
+    """Z of the tool tip, machine frame, up positive [mm]."""
+    a_deg: LimitsDeg
+    """Tilt A about X [deg]."""
+    b_deg: LimitsDeg
+    """Tilt B about Y [deg]."""
+    c_deg: LimitsDeg
+    """Turn C about Z [deg]."""
+    strut_mm: LimitsMm
+    """Length of a strut between its joints [mm]."""
 
 
 @dataclass(frozen=True)
-class Compliance:
-    """A strut's stretch under axial force, by design [GRAV eq 7].
+class Masses(Record):
+    """What gravity acts on."""
 
-    Attributes:
-        at_1000mm_mm_per_n: for 1000 mm between joints.
-        growing_share: proportional to length, as of a rod; the rest is constant [1].
-    """
-
-    at_1000mm_mm_per_n: float
-    growing_share: float = 0.9
+    platform_kg: Annotated[float, Quantity("kg", 1, 100_000)]
+    """Platform with spindle and tool [kg]."""
+    centre_of_gravity_above_tip_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True, signed=True)]
+    """Height of the platform's centre of gravity above the tool tip, along the platform's axis, up positive [mm]."""
 
 
 @dataclass(frozen=True)
-class StrutMasses:
-    """Masses of each strut on the line through its joints [GRAV Fig 2].
+class Compliance(Record):
+    """How much a strut stretches under an axial force, by design."""
 
-    Attributes:
-        strut_kg: spread evenly between the joints.
-        motor_kg: behind the base joint, turning with the strut.
-        motor_length_mm: its centre is half this length behind the joint.
-        screw_kg: ends at the platform joint and slides through the base joint.
-        screw_length_mm: its rear end protrudes behind the base joint.
-    """
+    at_1000mm_mm_per_n: Annotated[float, Quantity("mm/N", 1e-9, 1e-2)]
+    """Elongation per force of a strut of 1000 mm between its joints, pulling positive [mm/N]."""
+    growing_share: Annotated[float, Quantity("", 0, 1)] = 0.9
+    """Part of that which grows with the strut's length; the rest is the same at every length [1]."""
 
-    strut_kg: float
-    motor_kg: float
-    motor_length_mm: float
-    screw_kg: float = 0.0
-    screw_length_mm: float = 0.0
+
+@dataclass(frozen=True)
+class StrutMasses(Record):
+    """Masses of each of the six struts, on the line through its joints."""
+
+    strut_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    """Mass that is spread evenly between base joint and platform joint at every length [kg]."""
+    motor_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    """Mass behind the base joint that turns with the strut [kg]."""
+    motor_length_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True)]
+    """Length of that part; its centre is half of it behind the joint [mm]."""
+    screw_kg: Annotated[float, Quantity("kg", 0, 2_000)] = 0.0
+    """Screw that ends at the platform joint and slides through the base joint [kg]."""
+    screw_length_mm: Annotated[float, Quantity("mm", 5, 10_000, or_zero=True)] = 0.0
+    """Length of that screw; its rear end sticks out behind the joint [mm]."""
 
 
 @dataclass(frozen=True, eq=False)
-class JointAxes:
-    """Directions of universal joints' axes in base and platform, of any length.
+class JointAxes(Record):
+    """Axes of the universal joints of struts 1 to 6 that are fixed in base and platform, as unit vectors.
 
-    The first axis is fixed in base or platform, the second in the strut, perpendicular to it.
-
-    Attributes:
-        base: machine frame, shape (6, 3) [1].
-        platform: platform frame, shape (6, 3) [1].
+    The second axis of each joint is fixed in the strut, across it.
     """
 
-    base: Floats
-    platform: Floats
+    base: Annotated[Floats, _SIX_DIRECTIONS]
+    """Of the base joints, machine frame [1]."""
+    platform: Annotated[Floats, _SIX_DIRECTIONS]
+    """Of the platform joints, platform frame [1]."""
 
 
 @dataclass(frozen=True)
-class ControlCorrection:
-    """The control's own correction of its machine.
+class ControlCorrection(Record):
+    """Corrections of the control itself, as `dbbstation control` writes them."""
 
-    Attributes:
-        correction: `kinematics`, or `parameters` of a kinematics with tables.
-        sources: values of the corrected error sources, by name and parameter.
-    """
-
-    correction: str
-    model_sha256: str
-    date: str
+    correction: Literal["kinematics", "parameters"]
+    """A kinematics made of a model, or parameters and tables for the control's own kinematics."""
+    model_sha256: Sha256Hex
+    """SHA-256 of the model file that it was made from."""
+    date: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+    """Date of the correction."""
     sources: Mapping[str, Mapping[str, float]]
+    """Corrected error sources by name, with their parameters in the sources' units."""
 
     @property
     def said(self) -> str:

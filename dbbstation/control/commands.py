@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def correction_of(
-    kind: str, digest: str, date: str, taken_out: Iterable[Fitted], machine: Machine
+    kind: Literal["kinematics", "parameters"], digest: str, date: str, taken_out: Iterable[Fitted], machine: Machine
 ) -> ControlCorrection:
     """Return a control's correction in the form of a machine file."""
     sources = {

@@ -1,1 +1,1 @@
-"""Fit and judge models of one measured channel, without knowledge of hexapods."""
+"""Fit and judge models of one measured channel; independent of hexapods."""

@@ -1,4 +1,4 @@
-"""Interchangeable causes: equivalent by all measurements, or one of several."""
+"""Find equivalent causes, and ambiguous causes of which only one is present."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 
 EVEN = 0.5
-"""Probability from which on a cause that is not certain is rather there than not."""
+"""Probability above which an uncertain cause is more probably present than absent."""
 
 EQUIVALENT = 0.999
-"""Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
-other, unless it is so large that even this decides: what is left of one beside the other is 4.5 % of it."""
+"""Cosine between two causes' effects, given base and other causes, above which they are equivalent: only 4.5 % of one
+is outside the other, which decides for very large effects alone."""
 
 
 class Alternatives:
@@ -33,8 +33,8 @@ class Alternatives:
         form_uncertainty: relative inaccuracy of a member's formula.
 
     Attributes:
-        classes: equivalent causes by member, itself first.
-        ambiguities: by uncertain member, causes of which one is present; see `ambiguity`.
+        classes: equivalent causes by member, the member first.
+        ambiguities: results of `ambiguity` by uncertain member.
     """
 
     def __init__(
@@ -55,18 +55,18 @@ class Alternatives:
         }
 
     def probability(self, names: Iterable[str]) -> float:
-        """Return the probability that at least one is present."""
+        """Return the probability that at least one of the causes is present."""
         columns = [self._place[name] for name in names if name in self._place]
-        # A part of a sum can round to more than the whole.
+        # Rounding can make a partial sum exceed the whole.
         return min(1.0, float(self._weights @ self._inside[:, columns].any(axis=1))) if columns else 0.0
 
     def ambiguity(self, name: str) -> tuple[str, ...]:
-        """Return causes of which one is present if this is not, most probable first."""
+        """Return causes, most probable first, of which one is present if the named cause is not."""
         chosen = list(next((equal for equal in self.classes.values() if name in equal), (name,)))
         own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
         both = (self._weights * own) @ self._inside
         every = self._weights @ self._inside
-        # What is there beside it anyway is no alternative to it.
+        # A cause that is mostly present together with it is no alternative.
         alone = {
             other: float(every[k] - both[k])
             for other, k in self._place.items()
@@ -97,7 +97,7 @@ class Alternatives:
         return self._best.log_factor(member.cause.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
 
     def _cosine(self, one: Integers, other: Integers, others: tuple[Member, ...]) -> float:
-        """Return the least cosine between two causes' spans beside base and others; 1: equal effects."""
+        """Return the least cosine between two causes' spans, given base and others; 1 means equal effects."""
         products = self._comparison.beside(others, np.concatenate([one, other]))
         size = len(one)
         a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
@@ -108,7 +108,7 @@ class Alternatives:
 def named_already(
     comparison: ModelComparison, nameless: Sequence[Variant], named: Iterable[tuple[Variant, float]]
 ) -> list[bool]:
-    """Return whether a named cause covers each form of an unmodelled effect, within its formula's inaccuracy.
+    """Return, for each form of an unmodelled effect, whether a named cause contains it within the inaccuracy of its formula.
 
     Args:
         named: forms of named causes, with their relative inaccuracy.
@@ -131,7 +131,7 @@ def named_already(
         whole = np.trace(blocks[:count], axis1=1, axis2=2)
         roots = np.array([_inverse_root(block) for block in blocks[count:]])
         across = products[: count * size, count * size :].reshape(count * size, len(other), size)
-        # Every effect beside every form at once: tens of thousands of pairs.
+        # All pairs of effects and forms together, tens of thousands.
         shown = np.square(np.matmul(across.transpose(1, 0, 2), roots)).sum(axis=2)
         shown = shown.reshape(len(other), count, size).sum(axis=2).T
         apart = np.sqrt(np.maximum(1.0 - shown / np.maximum(whole, 1e-300)[:, None], 0.0))
@@ -140,22 +140,22 @@ def named_already(
 
 
 MOST_ALIKE = 3
-"""Amplitudes of an effect up to which it is asked whether a named cause has it among its forms: a shift in space. With 1 a bumped jig is
-ambiguous with a step over time in two of two sessions; with 6 four sessions are as they are."""
+"""Most amplitudes of an effect that is compared with forms of named causes: a shift in space has three. With 1 a bumped
+jig is ambiguous with a step over time in two of two sessions; with 6 four sessions do not change."""
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:
-    """Return the best replacements of a member that are not much worse."""
+    """Return the best replacements of a member that are at most slightly worse."""
     scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)
     return [scan.best[k] for k in np.argsort(-scan.log_factor)[: BOUNDS.rivals] if scan.log_factor[k] > enough]
 
 
 def standing_out(products: Floats, plausible: Floats) -> Floats:
-    """Return how far combinations of plausible amplitudes stand out, least first, shape (p,).
+    """Return the significances of combinations of plausible amplitudes, ascending, shape (p,).
 
     Args:
-        products: of a cause's columns beside others, by noise, shape (p, p).
+        products: of a cause's columns given others, over noise, shape (p, p).
         plausible: shape (p,).
     """
     return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))

@@ -1,7 +1,7 @@
-"""Random effects eliminated group by group, before shared columns.
+"""Eliminate random effects group by group, before shared columns.
 
-Mountings and balls touch few runs, so the columns form an arrow. Each group becomes a triangle; the work is linear in
-groups. [Bjorck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3]
+Mountings and balls affect few runs, so the normal matrix has arrow form. Each group is reduced to a triangular factor;
+the work is linear in groups. [Bjorck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3]
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Random effects of some blocks alone, as a triangle.
+    """Random effects of some blocks only, as a triangular factor.
 
     Attributes:
         columns: of the group, shape (j,).
         border: shared columns, shape (b,).
-        inner: triangle of the group, shape (j, j).
+        inner: triangular factor of the group, shape (j, j).
         across: same rows over the border, shape (j, b).
         target: same rows, shape (j,).
-        left: information on the border: rows, target last, shape (r, b + 1).
+        left: remaining information on the border as rows, target last, shape (r, b + 1).
     """
 
     columns: Integers
@@ -46,11 +46,11 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """Triangle of all blocks and priors.
+    """Triangular factor of all blocks and priors.
 
     Attributes:
-        alone: random effects that no block touches, known by their priors only, shape (a,).
-        root: triangle over random, then fitted columns, shape (m + f, m + f).
+        alone: random effects outside all blocks, known only by priors, shape (a,).
+        root: triangular factor over random, then fitted columns, shape (m + f, m + f).
         floor: irreducible sum of squares.
     """
 
@@ -64,12 +64,12 @@ class Arrow:
 
     @property
     def root_of_fitted(self) -> Floats:
-        """Return the information on fitted columns, random effects averaged, shape (f, f)."""
+        """Return the root of the information on fitted columns, marginalised over random effects, shape (f, f)."""
         return self.root[len(self.random) :, len(self.random) :]
 
 
 def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
-    """Eliminate groups and triangulate the rest."""
+    """Eliminate groups, then factor the remaining columns."""
     members, border = _split(blocks, known)
     groups = tuple(_group([blocks[k] for k in places], columns, known, noise) for places, columns in members)
     triangle = triangle_of(np.vstack([border.priors(known), *(border.rows(group) for group in groups)]))
@@ -88,10 +88,10 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
 def triangles_without(
     blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
 ) -> Iterator[tuple[Floats, Floats, float]]:
-    """Yield the information on fitted columns without each part's blocks.
+    """Yield the information on fitted columns without the blocks of each part.
 
     Yields:
-        Triangle over the fitted columns, shape (f, f), its target, shape (f,), and the sum of squares that no values take away.
+        Triangular factor, shape (f, f), its target, shape (f,), and the irreducible sum of squares.
     """
     members, border = _split(blocks, known)
     group_of = {place: number for number, (places, _) in enumerate(members) for place in places}
@@ -118,11 +118,11 @@ def triangles_without(
 
 @dataclass(frozen=True, eq=False)
 class _Border:
-    """Remaining columns: random, then fitted.
+    """Columns shared by groups: random, then fitted.
 
     Attributes:
         order: shape (m + f,).
-        place: of each column, shape (k,); -1 for others.
+        place: index of each column in `order`, shape (k,); -1 for others.
     """
 
     order: Integers
@@ -131,7 +131,7 @@ class _Border:
     alone: Integers
 
     def priors(self, known: Columns) -> Floats:
-        """Return prior rows, padded with zeros for a full triangle."""
+        """Return prior rows, padded with zeros to a full triangular factor."""
         total = len(self.order)
         bounded = self.order[np.isfinite(known.prior[self.order])]
         rows = np.zeros((len(bounded) + total + 1, total + 1))
@@ -139,7 +139,7 @@ class _Border:
         return rows
 
     def rows(self, group: Group) -> Floats:
-        """Return a group's rows over these columns, target last."""
+        """Return a group's remaining information over these columns, target last."""
         wide = np.zeros((len(group.left), len(self.order) + 1))
         wide[:, self.place[group.border]] = group.left[:, :-1]
         wide[:, -1] = group.left[:, -1]
@@ -182,10 +182,10 @@ def _group(blocks: Sequence[Block], columns: Integers, known: Columns, noise: fl
 
 
 def _groups(blocks: Sequence[Block], random: Flags) -> list[tuple[list[int], Integers]]:
-    """Return blocks and random effects of each group.
+    """Return the blocks and random effects of each group.
 
-    An effect of many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises rows times columns
-    squared.
+    An effect in many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises the work,
+    rows times squared columns.
     """
     total, count = len(random), sum(len(block.target) for block in blocks)
     together = [(list(range(len(blocks))), np.zeros(0, dtype=np.int64))]

@@ -1,4 +1,4 @@
-"""Columns of all laws and patterns of a channel, and their causes."""
+"""All candidate laws and patterns of a channel, as causes with columns."""
 
 from __future__ import annotations
 
@@ -52,26 +52,26 @@ if TYPE_CHECKING:
     from dbbstation.inference.pieces import Left
 
 TANGENT = 1e-3
-"""Step of a nonlinear parameter for its tangent, in units of the spacing of its grid."""
+"""Step for the derivative by a nonlinear parameter, in units of its grid spacing."""
 
 QUIETEST = 1e-9
-"""Share of the residual below which nothing is noise: digits run out there."""
+"""Least noise relative to the residual; less is rounding."""
 
 LOOKED_FOR = frozenset({Family.WAVE, Family.BUMP, Family.STEP, Family.PULSES, Family.PULSES_BY_DIRECTION})
-"""Families whose members were picked from many by the residual itself."""
+"""Families of patterns that were picked by a search of the residual."""
 
 
 class Bank:
-    """Columns and causes.
+    """Candidate causes with their columns and the noise.
 
     Attributes:
-        whitening: over kept rows; None for uniform white noise.
+        whitening: matrix over kept rows; None for uniform white noise.
         spread: relative noise of each kept row, shape (m,).
-        tails: Student's t degrees of innovations; infinite if Gaussian.
-        measures_beside_members: `measure` uses the hypothesis's residual, not everything's.
-        grows_with: variable of the variance; may be empty.
-        nameless: causes that do not count as the name of an effect.
-        refused: laws that cannot be, with the reason.
+        tails: degrees of freedom of innovations; infinite if Gaussian.
+        measures_beside_members: whether `measure` uses the hypothesis's residual instead of the residual of all causes.
+        grows_with: variable on which the noise variance depends; may be empty.
+        nameless: causes that never name an effect.
+        refused: impossible laws, with reasons.
     """
 
     nameless: frozenset[str] = frozenset()
@@ -93,7 +93,7 @@ class Bank:
         self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
 
     def copy(self) -> Bank:
-        """Return an independent copy that shares existing columns, laws and patterns."""
+        """Return an independently extensible copy that shares present columns, laws and patterns."""
         other: Bank = copy(self)
         other.patterns, other._of_patterns = dict(self.patterns), dict(self._of_patterns)
         other._of_laws, other._everywhere = dict(self._of_laws), list(self._everywhere)
@@ -103,12 +103,12 @@ class Bank:
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """Return all causes that can be, laws first."""
+        """Return all causes that are not refused, laws first."""
         every = (*self._of_laws.values(), *self._of_patterns.values())
         return tuple(cause for cause in every if cause.name not in self.refused)
 
     def worthy(self, left: Left, found: Sequence[Pattern]) -> list[Pattern]:
-        """Return patterns worth their prior odds beside the fit."""
+        """Return patterns whose Bayes factor given the fit outweighs their prior odds."""
         found = [p for p in {p.name: p for p in found}.values() if p.name not in self.patterns]
         if not found:
             return []
@@ -132,14 +132,14 @@ class Bank:
         return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}
 
     def kind_of(self, name: str) -> tuple[str, ...]:
-        """Return a cause's identity apart from place or period."""
+        """Return a cause's name, or family and variables for a picked pattern."""
         pattern = self.patterns.get(name)
         if pattern is None or pattern.family not in LOOKED_FOR:
             return (name,)
         return (pattern.family, *(variable.name for variable in pattern.variables))
 
     def drop(self, names: Iterable[str]) -> None:
-        """Remove useless picked patterns; their columns stay."""
+        """Remove picked patterns; their columns stay."""
         for name in names:
             del self.patterns[name], self._of_patterns[name]
 
@@ -157,16 +157,16 @@ class Bank:
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
-        """Return causes beside the base; rows, shape (m,), may be ignored if the target is zero there.
+        """Return the causes with the base projected out; `but_for` marks rows to ignore, shape (m,), with zero target.
 
         Args:
-            only: needed columns, rising, shape (q,); None: all.
+            only: needed columns, ascending, shape (q,); None for all.
         """
         columns = self._columns if but_for is None else self._columns.but_for(but_for, only)
         return BesideBase(columns, self.channel.known, self.channel.held, self.noise.innovation)
 
     def without(self, rows: Flags, only: Integers | None = None) -> ModelComparison:
-        """Return the comparison without some of all rows, shape (n,), in the same noise; `only` as of `beside`."""
+        """Return the comparison without some rows, shape (n,), with equal noise; `only` as for `beside`."""
         out = rows[self.channel.kept]
         return self.beside(out, only).comparison(np.where(out, 0.0, self.target))
 
@@ -184,14 +184,15 @@ class Bank:
         return [p.name for p in fresh]
 
     def measure(self, members: Sequence[Member]) -> Coloured:
-        """Measure noise beside members or everything, as set."""
+        """Estimate the noise, and whiten columns; see `measures_beside_members`."""
         return self.measure_noise(members if self.measures_beside_members else None)
 
     def measure_noise(self, members: Sequence[Member] | None = None) -> Coloured:
-        """Measure noise from the residual and whiten columns by it.
+        """Estimate the noise from the residual of members, and whiten columns.
 
         Args:
-            members: None: all laws and patterns; picked ones only if worth their odds, since chance peaks absorb noise.
+            members: None for all laws and patterns; picked patterns count only if they outweigh their odds, because
+                chance peaks absorb noise.
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches
@@ -204,7 +205,7 @@ class Bank:
             left = beside.left(np.column_stack([target, draws]), sd)
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
             free = max(len(target) - used, 1.0)
-            # What few rows are left to measure it by may be small by chance, and then lets in what makes it smaller still.
+            # Few remaining rows may give too small a noise by chance; more causes would enter and reduce it further.
             possible = free if self.channel.surely is None else float(chi2.ppf(1.0 - self.channel.surely, free))
             innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / possible))
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
@@ -223,7 +224,7 @@ class Bank:
         return self.noise
 
     def log_likelihood(self) -> float:
-        """Return the kept rows' log likelihood under base and noise, up to a constant."""
+        """Return the kept rows' log likelihood for base and noise, up to a constant."""
         target, innovation = self.target, self.noise.innovation
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
         seen = np.linalg.svd(self.base / innovation, compute_uv=False)
@@ -231,7 +232,7 @@ class Bank:
         return self.log_level() - 0.5 * float(rest @ rest) / innovation**2 - float(np.log(seen).sum())
 
     def log_level(self) -> float:
-        """Return the noise's part of a log likelihood: innovation level and parameter cost."""
+        """Return the part of a log likelihood due to noise level and cost of noise parameters."""
         count = len(self.spread)
         uneven = 0.0 if self.whitening is None else float(np.log(self.whitening.diagonal()).sum())
         parameters = self.noise.parameters + (1 if np.isfinite(self.tails) else 0)
@@ -241,7 +242,7 @@ class Bank:
         return -count * float(np.log(self.noise.innovation)) + uneven - cost
 
     def tails_beyond(self, members: Sequence[Member]) -> float:
-        """Return the innovations' log likelihood gain of Student's t over its weighted Gaussian."""
+        """Return the log likelihood gain of Student's t over the weighted Gaussian."""
         if not np.isfinite(self.tails):
             return 0.0
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0] / self.noise.innovation
@@ -249,7 +250,7 @@ class Bank:
         return float(np.sum(student - np.log(self.trust) + 0.5 * left**2))
 
     def may_have_long_tails(self, members: Sequence[Member]) -> bool:
-        """Return whether innovations have longer than normal tails beside members."""
+        """Return whether innovations given members have longer than normal tails."""
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0]
         return has_long_tails(left / self.trust)
 
@@ -274,12 +275,12 @@ class Bank:
             tried, spread = most_probable_variance(powers, even, np.column_stack([surely, np.square(size[kept])]), odds)
             if tried < cost:
                 cost, best, name = tried, spread, candidate
-        # What is always there is so in the quietest rows as well.
+        # A constant part also exists in the quietest rows.
         least = self.channel.least_noise / self.noise.innovation if name else 0.0
         return np.maximum(np.sqrt(best / np.mean(best)), least), name
 
     def _colour_of(self, left: Floats, draws: Floats, stretches: Sequence[slice], level: Coloured) -> Coloured:
-        """Return the residual's noise before whitening, absorbed power restored; at a level if alike."""
+        """Return the spectrum of the unwhitened noise, with absorbed power restored; only its level if the spectrum is unchanged."""
         pairs = [(bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)) for k in range(draws.shape[1])]
         taken = [r.log_power - w.log_power for w, r in pairs if w is not None and r is not None]
         bands = bands_of(left[:, 0], stretches)
@@ -295,11 +296,11 @@ class Bank:
             if share.min() < np.log(HARDLY_TAKEN):
                 found = with_put_back(found, bands.frequency[seen], share[seen], len(left))
         if found is None or found.independent_samples(stretches) < FEWEST_INDEPENDENT:
-            # What has few independent samples is no noise: it is left to causes.
+            # A process with few independent samples does not count as noise; causes may explain it.
             raw = bands.log_power - share + self.noise.log_power(bands.frequency) - 2.0 * np.log(self.noise.innovation)
             spectrum = Bands(bands.frequency[seen], raw[seen], bands.count[seen])
             found = first_order(spectrum, largest_decay(len(left)), oscillates=found is not None)
-        # Squares say the level best once the colour is right.
+        # Once the spectrum is correct, squares give the best level.
         return level if alike(found.with_innovation(level.innovation), level) else found
 
     def _sizes(self, members: Sequence[Member]) -> Floats:
@@ -336,7 +337,7 @@ class Bank:
             self._columns.add(part)
 
     def whitened(self, rows: Floats) -> Floats:
-        """Return whitened kept rows of all rows, shape (n, ...)."""
+        """Return the kept ones of all rows, whitened, shape (m, ...)."""
         return _whitened(self.channel.kept, self.whitening, rows)
 
     def _whitener(self) -> Callable[[Floats], Floats]:
@@ -358,16 +359,16 @@ class Bank:
         return self._columns.axes
 
     def base_values(self, effect: Floats) -> Floats:
-        """Return base values beside an effect over all rows, shape (k,)."""
+        """Return the refitted base's values for the residual less an effect, shape (k,)."""
         target = self.whitened(self.channel.residual - effect)
         block = compress(np.arange(self.base.shape[1]), self.base, target)
         return solve([block], self.channel.known, self.noise.innovation, self.channel.held).x
 
     def refine(self, name: str, nonlinear: tuple[float, ...], amplitudes: Floats) -> None:
-        """Lay out a law at parameter values, with tangents and slack.
+        """Add columns of a law at parameter values, with tangents and slack.
 
         Args:
-            amplitudes: of all columns, zero for other forms, shape (p,).
+            amplitudes: of all the law's columns, zero for other forms, shape (p,).
         """
         law = self.laws[name]
         exact = law.columns(nonlinear) if law.at is None else law.at(nonlinear, amplitudes)
@@ -380,7 +381,7 @@ class Bank:
         used, plausible = amplitudes != 0.0, law.plausible_of(exact)
         at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / plausible[used])))), 1e-12)
         points = float(np.prod([len(grid) for grid in law.grids]))
-        # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
+        # A tangent covers about 2.5 grid points of a nonlinear parameter.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
         variants = tuple(
             replace(variant, slack=own[width:], slack_sd=sd, slack_at=at, tangents=len(tangents))
@@ -439,7 +440,7 @@ class Bank:
 
 
 def _whitened(kept: Flags, whitening: csr_array | None, rows: Floats) -> Floats:
-    own = rows if kept.all() else rows[kept]  # to pick all rows would copy all columns
+    own = rows if kept.all() else rows[kept]  # selecting all rows would copy all columns
     return own if whitening is None else np.asarray(whitening @ own)
 
 
@@ -467,7 +468,7 @@ def _forms(
 
 
 def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: Sequence[float]) -> list[Floats]:
-    """Return slopes of a law's effect by each nonlinear parameter, shape (n,), by differences of a small part of its spacing."""
+    """Return numerical derivatives of a law's effect by each nonlinear parameter, shape (n,) each."""
     found = []
     for k, spacing in enumerate(spacings):
         ends = [[v + sign * TANGENT * spacing * (i == k) for i, v in enumerate(point)] for sign in (1.0, -1.0)]
@@ -477,7 +478,7 @@ def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: 
 
 
 def amplitudes_of(variant: Variant) -> Integers:
-    """Return a form's amplitude numbers within its law, shape (p,)."""
+    """Return the indices of a form's amplitudes within its law, shape (p,)."""
     if not len(variant.whole):
         return np.arange(len(variant.columns))
     return np.searchsorted(variant.whole, variant.columns)
@@ -493,18 +494,18 @@ def alike(one: Coloured, other: Coloured) -> bool:
 
 
 HARDLY_TAKEN = 0.95
-"""Share of the noise that columns leave of each frequency from which on nothing is put back."""
+"""Remaining share of noise above which absorbed power is not restored."""
 
 
 TIE = 1e-3
-"""Log odds by which a variable is less probable than the one before it in the table: of two that say the same, the first is named."""
+"""Difference in log odds between successive variables of a table, so that the first of two equal variables is named."""
 
 SETTLED = 0.03
-"""Change of the noise that is none: its spectrum is hardly known better."""
+"""Negligible relative change of the noise, about its uncertainty."""
 
 
 def spacing_of(grid: Sequence[float], value: float) -> float:
-    """Return a grid's spacing about a value; for one point, its size."""
+    """Return a grid's spacing about a value; for a single point, its size."""
     if len(grid) == 1:
         return max(abs(grid[0]), 1e-300)
     k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))

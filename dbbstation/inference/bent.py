@@ -1,4 +1,4 @@
-"""Effects shaped by a signal: saturation, dead zone, knee, friction within a speed, scaled hysteresis, integral."""
+"""Nonlinear effects of a signal: saturation, dead zone, knee, friction with a transition speed, scaled hysteresis, integral."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ WIDTHS = {
     Family.SATURATION: tuple(np.geomspace(0.02, 3.0, 6).tolist()),
     Family.DEAD_ZONE: tuple(np.geomspace(0.01, 0.8, 5).tolist()),
 }
-"""Half widths that are tried at first, over the largest value: from what is nearly a step to what is nearly a straight line."""
+"""First tried half-widths over the largest value, from nearly a step to nearly a straight line."""
 
 WIDEST = 0.95
-"""Half width of a sharp bend, over the largest value, at the most: beyond, no row is."""
+"""Largest half-width of a sharp bend, over the largest value: no rows are beyond."""
 
 KNEES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
-"""Places of a knee that are tried at first, in shares of the range."""
+"""First tried places of a knee, in shares of the range."""
 
 SPEEDS = tuple(np.geomspace(0.01, 0.5, 5).tolist())
-"""Speeds within which friction turns over, over the largest: within a smaller one it turns at once, and is hysteresis."""
+"""Tried transition speeds of friction, over the largest speed; with smaller ones friction is hysteresis."""
 
 BENT = 0.1
-"""Probability that an effect that follows a variable, or its direction, departs from a straight line, or a sign, in one of these ways so far
-that it is seen: as that of coming late enough."""
+"""Prior probability that an effect visibly departs from a straight line or a sign in one of these ways; equal to
+`memory.LATE`."""
 
 MADE = 0.9
-"""Share of the simulated value's squares that straight lines over all variables make, from which on they say how it grows with each."""
+"""Share of the simulated value's squares that a linear model must explain before its slopes give directions of growth."""
 
 
 def bent_laws(
@@ -52,10 +52,10 @@ def bent_laws(
     unit: str,
     grows: Mapping[str, float] | None = None,
 ) -> list[Law]:
-    """Return saturation, dead zone and knees of each variable; over time also friction, integral and scaled hysteresis.
+    """Return saturation, dead zone and knees for each variable; with time also friction, integral and scaled hysteresis.
 
     Args:
-        grows: whether the simulated value rises with each variable [`grows_with`], which tells a limit from a dead zone.
+        grows: result of `grows_with`, which distinguishes a limit from a dead zone.
     """
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0]
     bending = [v for v in usable if v.distinct >= DISTINCT]
@@ -84,7 +84,7 @@ def bent_laws(
 
 
 def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) -> dict[str, float]:
-    """Return whether the simulated value rises (1) or falls (-1) with each variable; 0 if not, or not known."""
+    """Return whether the simulated value rises (1) or falls (-1) with each variable; 0 if neither or unknown."""
     variables = [v for v in variables if v.kind is not Kind.TIME and v.distinct >= DISTINCT]
     found = dict.fromkeys((v.name for v in variables), 0.0)
     if not variables or np.ptp(simulated) == 0.0:
@@ -98,7 +98,7 @@ def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) ->
     columns = np.column_stack([(v.values - v.values.mean()) / np.std(v.values) for v in variables])
     slopes = np.linalg.lstsq(columns, own, rcond=None)[0]
     left = float(np.std(own - columns @ slopes))
-    # What is limited, or missing within a width, is no larger than what is simulated.
+    # A limited or missing effect is at most as large as the simulated effect.
     if left**2 <= (1.0 - MADE) * float(np.var(own)):
         for v, slope in zip(variables, slopes.tolist(), strict=True):
             found[v.name] = float(np.sign(slope)) if abs(slope) > max(left, 0.5 * size) else 0.0
@@ -106,16 +106,16 @@ def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) ->
 
 
 SAME = 1e-6
-"""One less the correlation with the simulated value from which on a variable is that value."""
+"""A variable with 1 - correlation below this is the simulated value itself."""
 
 
 def _bend(family: Family, variable: Variable, grows: float, size: float, unit: str, members: int) -> Law:
-    """Return saturation or dead zone, by how the measured value depends on a variable.
+    """Return saturation or dead zone, according to the simulated value's growth with a variable.
 
-    A limit and a dead zone of one width make a straight line together. Where the simulation has that line, an object
-    with a limit lacks what is beyond the width, and one with a dead zone lacks what is within: the sign decides.
+    A limit and a dead zone of one width add up to a straight line. If the simulation contains this line, an object with
+    a limit lacks the part beyond the width, and an object with a dead zone lacks the part within. The sign decides.
     """
-    # About zero if it has both signs, else about the middle of its range.
+    # Centred at zero if it has both signs, else at mid-range.
     middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
     values, largest = variable.values - middle, max(variable.high - middle, middle - variable.low)
     slope = f"{unit}/{variable.unit}" if variable.unit else unit
@@ -197,11 +197,11 @@ def _with_width(
 
 
 SCALES_WITH = frozenset({Kind.FORCE, Kind.SPEED, Kind.ANY})
-"""Kinds that a force may be in proportion to: a load, a current or a speed has a zero of its own, a place or a temperature has none."""
+"""Kinds of variables to which a force may be proportional: load, current and speed have a natural zero, place and temperature do not."""
 
 
 def integral_of(values: Floats, time: Floats, blocks: Sequence[slice]) -> Floats:
-    """Return an integral by trapezoids, zero at each block's first row, shape (n,)."""
+    """Return the integral by the trapezoidal rule, zero at each block's first row, shape (n,)."""
     found = np.zeros(len(time))
     for rows in blocks:
         own = values[rows]
@@ -218,9 +218,9 @@ def _integral(
     unit: str,
     members: int,
 ) -> Law:
-    """Return a law for what accumulates, such as mass or heat, with each run's initial value.
+    """Return a law for accumulating quantities, such as mass or heat, with each run's initial value.
 
-    A signal's own zero is seldom its unit's: a flow that leaves, a bias, a room. It makes a steady drift beside.
+    The balanced value of a signal is seldom zero (outflow, bias, room temperature), so the law includes a linear drift.
     """
     starts = starts_of(blocks) if len(blocks) > 1 else 0
     middle = 0.5 * (variable.low + variable.high)

@@ -1,4 +1,4 @@
-"""Runs compressed to information on their columns, with priors."""
+"""Compress runs to information on their columns; priors of columns."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Block:
     """One run's information on its columns.
 
     Attributes:
-        columns: touched, shape (k,).
-        triangle: of J, shape (r, k), r at most k + 1.
+        columns: that affect the run, shape (k,).
+        triangle: triangular factor of J, shape (r, k), r at most k + 1.
         target: transformed, shape (r,).
-        square: of the target, a bound of what fits explain.
-        noise: own, of another instrument; None: the channel's.
+        square: sum of squares of the target, an upper bound of fitted squares.
+        noise: of another instrument; None for the channel's.
     """
 
     columns: Integers
@@ -36,14 +36,14 @@ class Block:
 
 
 def compress(columns: Integers, jacobian: Floats, target: Floats) -> Block:
-    """Compress a run to its triangle."""
+    """Compress a run to its triangular factor."""
     stacked = np.column_stack([jacobian, target])
     triangle = triangle_of(stacked)[: jacobian.shape[1] + 1]
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
 
 
 def spread(blocks: Sequence[Block], columns: int) -> Floats:
-    """Return all blocks' rows over all columns, target last, shape (r, columns + 1)."""
+    """Return the rows of all blocks over all columns, target last, shape (r, columns + 1)."""
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0
     for block in blocks:
@@ -55,7 +55,7 @@ def spread(blocks: Sequence[Block], columns: int) -> Floats:
 
 
 def spread_over(blocks: Sequence[Block], columns: Integers) -> Floats:
-    """Return all blocks' rows over some columns, shape (k,), target last, shape (r, k + 1)."""
+    """Return the rows of all blocks over some columns, target last, shape (r, k + 1)."""
     order = np.argsort(columns)
     narrow = np.zeros((sum(len(block.target) for block in blocks), len(columns) + 1))
     row = 0
@@ -69,7 +69,7 @@ def spread_over(blocks: Sequence[Block], columns: Integers) -> Floats:
 
 
 def joined(blocks: Sequence[Block], columns: int) -> Block:
-    """Return blocks of one noise as a single block over all columns."""
+    """Join blocks with equal noise to one block over all columns."""
     if any(block.noise is not None for block in blocks):
         raise ValueError("blocks with a noise of their own cannot be joined with others")
     triangle = triangle_of(spread(blocks, columns))
@@ -88,8 +88,8 @@ class Columns:
 
     Attributes:
         prior: standard deviation about zero, infinite if unknown, shape (k,).
-        scale: size that matters, shape (k,): a direction is lost if less certain.
-        random: effects averaged, not reported, shape (k,).
+        scale: relevant size, shape (k,); directions with more uncertainty are lost.
+        random: random effects, marginalised and not reported, shape (k,).
     """
 
     prior: Floats

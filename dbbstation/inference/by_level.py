@@ -1,4 +1,4 @@
-"""Verdicts on single causes, from the levels of their classes."""
+"""Verdicts on single causes, from the answers about their classes."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 Said = tuple[Verdict, tuple[str, ...], str]
-"""A verdict, causes of which one may be there instead, and why."""
+"""A verdict, alternative causes, and the reason."""
 
 MAKES_UP = "Held-out parts are predicted worse than as simulated, and something beside it predicts none: this may make up for that."
-"""Why something that happened once is not sure: its probability is that beside effects which other rows refute."""
+"""Why a single event is uncertain: its probability assumes effects that other rows refute."""
 
 
 class VerdictsByLevel:
-    """Verdicts on members of the best set and on their equivalents.
+    """Verdicts on members of the best set and on equivalent causes.
 
     Args:
         pushes: sizes of all stretches of time, by member.
@@ -42,7 +42,7 @@ class VerdictsByLevel:
     def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
         """Return the verdict on a member, given its size in standard deviations.
 
-        A class may be certain while none of its members is. Held-out parts then refute no member.
+        A class may be certain although each of its members is uncertain. Held-out parts then do not refute members.
         """
         classes = [one for one in self._levels.follows if name in one.members]
         answers = {one.answer for one in classes}
@@ -68,11 +68,11 @@ class VerdictsByLevel:
         return _of_laws(classes, name, self._settled.channel.rows_are)
 
     def instead_of(self, name: str) -> frozenset[str]:
-        """Return members that a named law replaces."""
+        """Return the members that a named law replaces."""
         return frozenset[str]().union(*(one.members for one in self._levels.follows if _named(one, name)))
 
     def alike(self, name: str) -> str:
-        """Return a member equivalent to a cause outside the set; empty if there is none."""
+        """Return a member equivalent to a cause outside the set, or an empty text."""
         for one in self._levels.follows:
             if one.form is not None and name in (*one.form.not_worse, *one.form.names):
                 return next(other for other in (*one.form.names, *sorted(one.members)) if other != name)

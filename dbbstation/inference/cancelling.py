@@ -1,4 +1,4 @@
-"""Effects that cancel: each exceeds their sum."""
+"""Detect effects that cancel each other."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 MOST_CANCELS = 0.5
-"""Root mean square of all effects together, over the root of the sum of their mean squares, below which they cancel each other:
-three quarters of the squares are gone. Of effects that have nothing to do with each other it is one."""
+"""Effects cancel if the rms of their sum, over the root of the sum of their mean squares, is below this: three quarters
+of the squares vanish. For independent effects the ratio is one."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Cancelling:
 
 
 def cancelling(effects: Mapping[str, Floats], unit: str, scale: float = 1.0) -> Cancelling | None:
-    """Return effects above their sum if most squares cancel, else None."""
+    """Return the effects that exceed their sum if most squares cancel, else None."""
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}
     whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0
     if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):
@@ -36,10 +36,10 @@ def cancelling(effects: Mapping[str, Floats], unit: str, scale: float = 1.0) -> 
 
 
 def cancelling_of(settled: Settled, unit: str, names: Mapping[str, str] | None = None) -> Cancelling | None:
-    """Return cancelling effects of the best hypothesis and parameters of the base, or None.
+    """Return cancelling effects among best hypothesis and base parameters, or None.
 
     Args:
-        names: display names by member; equal ones are summed. None: own names.
+        names: display names by member; effects with equal names are summed. None for the members' names.
     """
     base = settled.channel.base
     shown = {name: name if names is None else names.get(name) or name for name in settled.best.names}

@@ -1,7 +1,7 @@
-"""A channel: measured minus simulated values, and all possible contributions to this difference.
+"""A channel: measured minus simulated values, with possible contributions.
 
-A client supplies residual rows in blocks, variables, base columns, and laws: physical causes as columns. The base is
-refitted with every hypothesis. `settle` compares sets of laws and of patterns without physics.
+A client supplies residual rows in blocks, variables, base columns and laws (physical causes as columns). Every
+hypothesis refits the base. `settle` compares sets of laws and of patterns without physics.
 
 residual = base + sum of laws + sum of patterns + noise
 
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 NAMED_ODDS = float(np.log(0.05 / 0.95))
-"""Log prior odds of a law, or a named cause: one object in twenty has any one of them so that it matters."""
+"""Log prior odds of a law or a named cause: each one matters in one object of twenty."""
 
 Discrepancy: TypeAlias = "Callable[[Floats, tuple[float, ...], Floats], Floats]"
-"""What a formula may be off by, from its effect, nonlinear parameters and amplitudes."""
+"""A function that returns possible formula errors from effect, nonlinear parameters and amplitudes."""
 
 LARGEST = 10.0
-"""Effect of a base column, in root mean squares of the residual, from which on its value is certainly of interest: what leaves a
-base parameter more uncertain than that does not see it."""
+"""Effect of a base column, over the residual's rms, that certainly matters; a base parameter with more uncertainty
+counts as undetermined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Base:
     Attributes:
         samples: effect of one unit, shape (n, k).
         prior: standard deviation about zero, infinite if unknown, shape (k,).
-        random: set-up effects averaged over, with finite prior, shape (k,).
+        random: set-up effects to marginalise, with finite prior, shape (k,).
     """
 
     names: tuple[str, ...]
@@ -57,37 +57,38 @@ class Base:
 
     @classmethod
     def flat(cls, names: Sequence[str], samples: Floats) -> Base:
-        """Return columns without prior knowledge."""
+        """Return a base of columns without priors."""
         count = samples.shape[1]
         return cls(tuple(names), samples, np.full(count, np.inf), np.zeros(count, dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A physical cause as columns.
+    """A physical cause, described by columns.
 
     Attributes:
-        columns: one unit of each amplitude at nonlinear parameters, all rows, shape (n, p).
+        columns: effects of unit amplitudes at given nonlinear parameters, all rows, shape (n, p).
         plausible: one standard deviation of amplitudes, shape (p,).
-        grids: start values of nonlinear parameters, rising.
+        grids: starting values of nonlinear parameters, ascending.
         positive: amplitudes that cannot be negative, shape (p,); may be empty.
         form_uncertainty: relative departure of real objects, one standard deviation.
-        follows: variable of that departure; None if exact or given by `discrepancy`.
-        discrepancy: columns of departure, shape (n, q), from effect, shape (n,), nonlinear parameters and amplitudes, shape (p,),
-            with `form_uncertainty` as standard deviation; default: the effect times smooth functions of `follows`.
-        at: columns about amplitudes, shape (p,), exact there; None if the effect is proportional.
-        choices: alternative forms: columns, log probability, label; `positive` then counts the columns of each.
-        zero_from: middle of the variable that the first amplitude acts on and from which the second, over the first, moves
-            the zero; None: no such zero.
-        reach: largest effect of each amplitude, one standard deviation, in the residual's unit; None: `plausible` holds
-            everywhere.
-        family: of patterns; None for a client's physics.
-        followed: names that are no variables, such as port signals.
-        driven: those that result from the simulation.
-        way: `direction` or `late` outside families; empty: by value.
-        acts_once: no other rows can show it.
-        confirm: a measurement that shows it by itself; empty if unknown.
-        possible: whether values of it and of the laws beside it, by name, can be.
+        follows: variable of this departure; None if exact or given by `discrepancy`.
+        discrepancy: function from effect, shape (n,), nonlinear parameters and amplitudes, shape (p,), to columns of
+            departure, shape (n, q), with standard deviation `form_uncertainty`. Default: the effect times smooth
+            functions of `follows`.
+        at: function to columns linearised about amplitudes, shape (p,); None if the effect is proportional.
+        choices: alternative forms: columns, log probability, label; `positive` then applies to each form's columns.
+        zero_from: reference value of the variable of the first amplitude; the second amplitude over the first shifts
+            the zero from it. None without such a zero.
+        reach: prior standard deviation of each amplitude's effect, in the residual's unit, as a limit; None for
+            `plausible` alone.
+        family: of a pattern; None for a client's physics.
+        followed: names followed instead of variables, such as port signals.
+        driven: names that result from the simulation.
+        way: `direction` or `late` for laws without family; empty for value.
+        acts_once: whether it is a single event that other rows cannot show.
+        confirm: a measurement that shows it alone; empty if unknown.
+        possible: function that tests its values and other laws' values, by name.
     """
 
     name: str
@@ -115,7 +116,7 @@ class Law:
     possible: Callable[[Mapping[str, float]], bool] = lambda _: True
 
     def plausible_of(self, samples: Floats) -> Floats:
-        """Return usual amplitudes, shape (p,), of columns, shape (n, p)."""
+        """Return prior standard deviations of amplitudes, shape (p,), for columns, shape (n, p)."""
         if self.reach is None:
             return self.plausible
         return np.asarray(self.reach / np.maximum(np.abs(samples).max(axis=0), 1e-300))
@@ -128,24 +129,25 @@ class Channel:
     Attributes:
         residual: measured less simulated, by block in time order, shape (n,).
         blocks: rows of each, covering all in order.
-        time: rising within blocks, shape (n,); None for unordered rows.
-        simulated: to test lateness; None: not tested.
+        time: ascending within blocks, shape (n,); None for unordered rows.
+        simulated: simulated values, to test delays; None for no test.
         kept: fitted rows, shape (n,); default all.
-        apart: rows between kept ones without held-back rows.
-        static: patterns that need no search; None: all kinds over all variables.
-        least_noise: always present in a row, in the residual's unit.
+        apart: spacing of kept rows, without held-back rows.
+        static: patterns that need no search; None for all kinds over all variables.
+        least_noise: least noise of a row, in the residual's unit.
         step: of measured values, in the residual's unit; zero if unknown.
-        surely: probability of the noise bound [interval of a variance by chi-square; JCGM 101:2008, sec. 6.4.9.4]; None: the
-            estimate.
-        grows: size of proportional noise beside a constant part, shape (n,); None: constant.
-        noise_follows: candidates for proportional noise by name, shape (n,) each; at most one holds.
+        surely: probability of the noise bound [interval of a variance by chi-square; JCGM 101:2008, sec. 6.4.9.4]; None
+            for the estimate.
+        grows: size of a proportional noise component, shape (n,); None for constant noise.
+        noise_follows: alternative sizes of this component by name, shape (n,) each; at most one applies.
         known_noise: additional standard deviation per row, in the residual's unit, shape (n,); or None.
-        levels: kind of each row from 0, with own noise each, shape (n,); None: one kind.
-        clock: for omitted rows or gradual steps; None: immediate.
-        direction: of travel, shape (n,); None: no search for direction-dependent effects in time.
-        interchangeable: least share of a fitted effect's squares by which a cause over another variable makes both
-            named. The remainder is then less than a third of the effect; 0.8 and 0.95 gave the same on ten tables.
-            Circles and sessions use the share of equivalent causes, since a tenth is thousands in log evidence there.
+        levels: kind of each row, from 0, with separate noise, shape (n,); None for one kind.
+        clock: for omitted rows or gradual steps; None for immediate steps.
+        direction: of travel, shape (n,); None to omit direction-dependent effects in time.
+        interchangeable: share of a fitted effect's squares that a cause over another variable must explain for both
+            variables to be named. The remainder is then less than a third of the effect; 0.8 and 0.95 gave equal
+            answers on ten tables. Circles and sessions use the share of equivalent causes, because a tenth means
+            thousands in log evidence there.
         rows_are: name of the rows in answers: `rows` or `tests`.
     """
 
@@ -183,7 +185,7 @@ class Channel:
         return replace(self, kept=self.kept & ~rows)
 
     def thinned(self, most: int) -> Channel:
-        """Return the channel with at most so many kept rows, evenly in each block."""
+        """Return the channel with at most `most` kept rows, evenly spaced in each block."""
         apart = int(np.ceil(self.kept.sum() / most))
         if apart <= 1:
             return self
@@ -199,7 +201,7 @@ class Channel:
 
     @cached_property
     def size(self) -> float:
-        """Return the rms beyond the base, a bound of effects, in the residual's unit."""
+        """Return the residual's rms after the base fit, an upper bound of effects."""
         left = self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x
         return max(
             float(np.sqrt(np.mean(left**2))),
@@ -218,11 +220,11 @@ class Channel:
 
     @cached_property
     def held(self) -> Floats:
-        """Return base directions invisible to the rows, held at zero, shape (h, f)."""
+        """Return base directions that the rows do not determine, held at zero, shape (h, f)."""
         return lost_directions([self._block(self.target)], self.known, self._about)
 
     def fitted(self, target: Floats, noise: float) -> Solution:
-        """Fit the base to kept rows of a target at a row's noise."""
+        """Fit the base to kept rows of a target with given noise per row."""
         return solve([self._block(target)], self.known, noise, self.held)
 
     def refitted(self) -> Floats:

@@ -1,9 +1,9 @@
-"""Each effect's gain in parts that took no part in its choice, by predictive density.
+"""Gain of each effect in held-out parts, by predictive density.
 
-Without each part the set is chosen anew from all causes; nonlinear parameters stay within half a grid step. The part is
-then predicted with the set and without each effect, refitted. The score is the log density [Good, Rational decisions,
-J. R. Stat. Soc. B 14 (1952) 107]: the part's contribution to the log evidence. How often a cause is chosen without some
-of the tests is asked of the same comparisons.
+For each part the set is selected from all causes without this part; nonlinear parameters stay within half a grid step.
+The set, refitted with and without each effect, then predicts the part. The score is the log density [Good, Rational
+decisions, J. R. Stat. Soc. B 14 (1952) 107], the part's contribution to the log evidence. The same comparisons give
+selection frequencies without some tests.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 Classes: TypeAlias = "tuple[Sequence[frozenset[str]], Callable[[str], frozenset[str]]]"
-"""Classes of variables, and what each cause follows."""
+"""Classes of variables, and a function from causes to followed variables."""
 
 LEAST_PARTS = 4
-"""Parts from which on what they say of each other is more than chance: a gain without the best of them, and a spread."""
+"""Fewest parts for a gain without the best part and for a scatter."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChosenAnew:
-    """Gains in parts held back in turn.
+    """Log density gains in held-out parts.
 
     Attributes:
-        brought: by kind, log density per part, with minus without; absent if not chosen.
-        whole: per part, of everything over the base.
-        of_classes: by class of variables, log density per part, with minus without.
+        brought: per part, the gain by each selected kind of effect.
+        whole: per part, the gain of all effects over the base.
+        of_classes: per part, the gain by each class of variables.
     """
 
     brought: tuple[dict[Kind, float], ...]
@@ -48,24 +48,24 @@ class ChosenAnew:
     of_classes: tuple[Mapping[frozenset[str], float], ...] = ()
 
     def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
-        """Return the joint gain of kinds per part; empty if never chosen."""
+        """Return the summed gain of several kinds in each part; zero for unselected kinds."""
         return DensityGains(tuple(sum(part.get(kind, 0.0) for kind in set(kinds)) for part in self.brought))
 
     @property
     def is_worse(self) -> bool:
-        """Return whether the choice predicts worse than the base."""
+        """Return whether the selection predicts worse than the base."""
         return sum(self.whole) < 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class KnownGains:
-    """Held-out gains of classes that were asked for beforehand.
+    """Held-out gains computed for a fixed list of classes.
 
     Attributes:
         rows: of each part, shape (n,).
-        gains: of each class, by its variables; of everything under none.
-        errors: rms error of each part with everything, or of all.
-        anew: what was chosen without each part; None where gains are all that is known.
+        gains: by the class's variables; the empty set for all effects.
+        errors: rms error with all effects, per part or overall.
+        anew: the selections without each part; None if unknown.
     """
 
     rows: Sequence[Flags]
@@ -74,15 +74,15 @@ class KnownGains:
     anew: ChosenAnew | None = None
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """Return the gain of everything over some variables; None: everything. A class that none follows gains nothing."""
+        """Return the gain of all effects of these variables, None for all effects; zero for an unknown class."""
         return self.gains.get(frozenset(wanted or ()), ClassGain(DensityGains(()), 0.0, 0.0))
 
     def but_for(self, _ignored: Collection[str]) -> KnownGains:
-        """Return the same: what happens in a test is a random effect of it, and no term of a simulator follows the time."""
+        """Return these gains: events in tests are random effects here, and simulator terms do not follow time."""
         return self
 
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
-        """Return the rms error of each part with everything, which is put in together."""
+        """Return the rms errors with all effects, because they enter together."""
         return list(self.errors)
 
 
@@ -99,18 +99,18 @@ def gains_of_tests(
     asked: Callable[[Cause], bool] = lambda _: True,
     **limits: Any,  # noqa: ANN401 - as of `search`
 ) -> KnownGains:
-    """Return each cause's gain in groups of tests, and each class's.
+    """Return the gains of causes and classes in groups of tests.
 
     Args:
         rows: of each group, shape (n,).
-        errors: rms errors of predicting groups without causes of these names, for each of several sets.
-        limits: of the searches without a group.
+        errors: function from several sets of names to rms errors of predicting groups without these causes.
+        limits: options of the searches without a group.
     """
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         return search(comparison, settled.causes, [settled.best.members], **limits).best.members
 
-    # Columns of earlier layouts are in no cause any more.
+    # Omit columns of earlier layouts, which no cause uses.
     used = columns_of(settled.causes)
     comparisons = settled.comparison, (settled.bank.without(out, used) for out in rows)
     follow = follow_of(settled)
@@ -127,7 +127,7 @@ def gains_of_tests(
 
 
 SHARE = 0.7
-"""Of the groups of tests that each draw keeps."""
+"""Share of the groups of tests in each draw."""
 
 
 def selection_frequency(
@@ -138,14 +138,14 @@ def selection_frequency(
     begin: Sequence[Member] = (),
     most_members: int | None = None,
 ) -> dict[str, float]:
-    """Return each cause's share of selections.
+    """Return how often each cause is selected.
 
     Each draw keeps seven tenths of the groups without replacement, because repeated groups look certain [Meinshausen
     and Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw halves]. Groups, such as tests, are kept together.
 
     Args:
-        groups: of each run.
-        without: from runs that are left out, shape (r,).
+        groups: number of each run's group.
+        without: function from omitted runs, shape (r,), to a comparison.
     """
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))
@@ -159,7 +159,7 @@ def selection_frequency(
 
 
 def columns_of(causes: Iterable[Cause]) -> Integers:
-    """Return all columns of causes, rising."""
+    """Return all columns of causes, ascending."""
     variants = (variant for cause in causes for variant in cause.variants)
     return np.unique(np.concatenate([part for one in variants for part in (one.columns, one.slack)]))
 
@@ -172,12 +172,12 @@ def chosen_anew(
     asked: Callable[[Cause], bool] = lambda _: True,
     classes: Classes = ((), lambda _: frozenset()),
 ) -> ChosenAnew:
-    """Choose anew without each part, and predict it.
+    """Select causes without each part, and predict this part.
 
     Args:
-        choose: most probable members, starting from all rows' choice.
-        kind_of: from a cause to its kind.
-        classes: effects of a class are left out together.
+        choose: function to the most probable members, starting from the selection of all rows.
+        kind_of: function from a cause to its kind.
+        classes: effects of a class are omitted together.
     """
     brought, whole, of_classes, follows = [], [], [], classes[1]
     for others in of_others:
@@ -197,7 +197,7 @@ def chosen_anew(
         )
         brought.append(found)
         whole.append(with_all)
-        del others  # its products fill as much memory as those of the next part will
+        del others  # free the products before the next part needs as much memory
     return ChosenAnew(tuple(brought), tuple(whole), tuple(of_classes))
 
 

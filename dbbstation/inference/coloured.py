@@ -1,7 +1,8 @@
-"""Noise with correlated neighbours: an autoregressive process and its whitening filter.
+"""Correlated noise: autoregressive processes and their whitening filters.
 
 Innovations give the exact likelihood [Brockwell and Davis, Time Series: Theory and Methods, 2nd ed., prop. 5.2.1].
-Low-passed, resonant and wandering noise are such processes. Effects are judged against noise at their own frequencies.
+Low-passed, resonant and wandering noise are such processes. Effects are thus compared with noise at their own
+frequencies.
 """
 
 from __future__ import annotations
@@ -23,50 +24,50 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 LONGEST = 60
-"""Rows that a prediction looks back over, at the most."""
+"""Largest order of a prediction."""
 
 ROWS_PER_ORDER = 5
-"""Rows per coefficient of a prediction, at the least: with fewer, the corrected criterion of Akaike no longer holds."""
+"""Least rows per coefficient of a prediction; Akaike's corrected criterion requires so many."""
 
 NOTHING = 1e-3
-"""Partial autocorrelation below which a row says nothing more about a later one."""
+"""Negligible partial autocorrelation."""
 
 STEADY = 0.999
-"""Partial autocorrelation at the most: what is alike over more than a thousand rows cannot be told from a trend."""
+"""Largest partial autocorrelation: noise correlated over more than a thousand rows cannot be distinguished from a trend."""
 
 LEAST_NEW = 1e-3
-"""Share of the standard deviation of a row that is new in it, at the least: a recording has digits, and rounds."""
+"""Least innovation over a row's standard deviation, because recordings are rounded."""
 
 DECAYS = np.concatenate([np.arange(0.1, 0.9, 0.1), 1.0 - np.geomspace(0.1, 0.005, 12)])
-"""Correlations of a first-order process from one row to the next that are tried: neighbours resemble each other over 200 rows at the
-most. What is alike over more is structure that a model should name."""
+"""Tried correlations of neighbouring rows in a first-order process, over at most 200 rows. Longer correlations are
+structure that a model should name."""
 
 FEWEST_INDEPENDENT = 20.0
-"""Effective number of independent samples of noise, at the least: the size of noise that has so many is known to 1 / sqrt(2 * 20), a sixth
-[standard deviation of chi-square]. What has fewer is too slow, or too much of one frequency, to be told from an effect. At 10 the size is
-known to a quarter only; at 40 noise that resembles itself over a fortieth of the rows is already an effect."""
+"""Least effective number of independent samples of noise, which determines its size to 1 / sqrt(2 * 20), a sixth
+[standard deviation of chi-square]. Slower or narrower noise cannot be distinguished from an effect. At 10 the size is
+known to a quarter only; at 40 noise correlated over a fortieth of the rows already counts as an effect."""
 
 SHARES = np.geomspace(0.01, 100.0, 33)
-"""Variances of a first-order process that are tried, over that of the white noise under it."""
+"""Tried variances of a first-order process, over the variance of white noise."""
 
 LOG_VARIANCE = np.pi**2 / 6.0
-"""Variance of the log of one power."""
+"""Variance of the logarithm of one power."""
 
 FEWEST = 6
-"""Frequencies in a band of a spectrum, at the least."""
+"""Fewest frequencies in a band of a spectrum."""
 
 WIDER = 1.2
 """Ratio of the widths of neighbouring bands."""
 
 SHORTEST = 64
-"""Rows of a stretch that a spectrum is taken of, at the least, where there is one."""
+"""Fewest rows of a stretch for a spectrum, if such a stretch exists."""
 
 SHORTEST_OF_ALL = 16
-"""The same where all stretches are shorter, as of many short runs: half of the longest one, and so many at the least. A low-pass of seven
-rows shows in seven frequencies; without a spectrum noise would be taken for white."""
+"""Fewest rows if all stretches are shorter, as in many short runs; at least half of the longest. A low-pass of seven
+rows shows in seven frequencies; without a spectrum noise would count as white."""
 
 LOG_MEAN = 0.5772156649
-"""By how much the mean of log power lies below the log of its mean, for noise [Euler's constant]."""
+"""Difference between log mean power and mean log power of noise [Euler's constant]."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Coloured:
 
     Attributes:
         partial: partial autocorrelations from lag 1; none if white.
-        told_by: fewer numbers that determine them.
+        told_by: number of free parameters, if smaller.
     """
 
     sigma: float
@@ -87,8 +88,8 @@ class Coloured:
         """Return white plus first-order noise, or oscillating noise.
 
         Args:
-            share: of the process in the variance, 0 to 1.
-            decay: correlation of neighbours, or of the envelope.
+            share: part of the process in the variance, 0 to 1.
+            decay: correlation of neighbours, or of the oscillation's envelope.
         """
         lags = np.arange(LONGEST + 1)
         correlation = np.where(lags == 0, 1.0, share * decay**lags * np.cos(turn_rad * lags))
@@ -101,7 +102,7 @@ class Coloured:
 
     @property
     def order(self) -> int:
-        """Return the rows that a prediction uses."""
+        """Return the number of rows that a prediction uses."""
         return len(self.partial)
 
     @property
@@ -111,12 +112,12 @@ class Coloured:
 
     @property
     def correlation_samples(self) -> float:
-        """Return rows per independent row for smooth effects; 1 if white."""
+        """Return the number of rows per independent row for smooth effects; 1 if white."""
         return (self.effective / self.sigma) ** 2
 
     @property
     def effective(self) -> float:
-        """Return the white noise of equal power at frequency zero."""
+        """Return the white noise with equal power at frequency zero."""
         return self.innovation / abs(float(self.filter.sum()))
 
     @property
@@ -125,7 +126,7 @@ class Coloured:
         return self.sigma * float(np.sqrt(self._predictors[1][-1]))
 
     def with_innovation(self, innovation: float) -> Coloured:
-        """Return the noise with another standard deviation of its innovations."""
+        """Return the noise with another innovation standard deviation."""
         return replace(self, sigma=innovation / float(np.sqrt(self._predictors[1][-1])))
 
     @cached_property
@@ -143,14 +144,14 @@ class Coloured:
         return np.concatenate([[1.0], -self._predictors[0][-1]])
 
     def log_power(self, frequency: Floats) -> Floats:
-        """Return the log spectrum [cycles per row], log variance for white noise."""
+        """Return the log spectrum over frequency [cycles per row]; for white noise the log variance."""
         taps = self.filter
         phase = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(taps))))
         gain = np.abs(phase @ taps) ** 2
         return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
 
     def independent_samples(self, stretches: Sequence[slice]) -> float:
-        """Return the independent samples of squared rows, over stretches.
+        """Return the effective number of independent squared rows in stretches.
 
         n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98 (1935)
         536; Priestley 1981, sec. 5.3.2].
@@ -167,7 +168,7 @@ class Coloured:
         return total
 
     def whitening(self, stretches: Sequence[slice]) -> csr_array | None:
-        """Return the matrix to white noise of size `innovation`; None if white."""
+        """Return the whitening matrix to noise of size `innovation`; None if white."""
         if self.is_white:
             return None
         coefficients, left = self._predictors
@@ -176,7 +177,8 @@ class Coloured:
         for stretch in stretches:
             count = stretch.stop - stretch.start
             for order in range(most + 1):
-                # The first rows have fewer before them; each order serves one row but the last, which serves the rest.
+                # The first rows have fewer predecessors: each lower order applies to one row, the full order to all
+                # others.
                 own = np.arange(order, count if order == most else min(order + 1, count))
                 if not len(own):
                     continue
@@ -191,7 +193,7 @@ class Coloured:
         return csr_array(flat, shape=(size, size))
 
     def unwhitened(self, white: Floats, stretches: Sequence[slice]) -> Floats:
-        """Return the rows, shape (n,), that whitening maps to these."""
+        """Return the rows, shape (n,), that whitening maps to the given ones."""
         if self.is_white:
             return white
         coefficients, left = self._predictors
@@ -219,7 +221,7 @@ def partial_autocorrelations(correlation: Floats) -> tuple[float, ...]:
     for order in range(1, len(correlation)):
         partial = float((correlation[order] - coefficients @ correlation[1:order][::-1]) / left)
         if not abs(partial) < 1.0:
-            break  # as exact as the digits of the correlation are
+            break  # as exact as the correlations
         partial = float(np.clip(partial, -STEADY, STEADY))
         if left * (1.0 - partial**2) < LEAST_NEW**2:
             break
@@ -237,7 +239,7 @@ class Bands:
 
     Attributes:
         frequency: mean [cycles per row], shape (b,).
-        log_power: bias-corrected mean log, shape (b,).
+        log_power: bias-corrected mean log power, shape (b,).
     """
 
     frequency: Floats
@@ -248,7 +250,7 @@ class Bands:
 def bands_of(rows: Floats, stretches: Sequence[slice]) -> Bands | None:
     """Return the rows' spectrum; None if stretches are too short.
 
-    Logs resist unexplained spectral lines.
+    Logarithms are robust against unexplained spectral lines.
     """
     frequency, power = [], []
     longest = max((stretch.stop - stretch.start for stretch in stretches), default=0)
@@ -274,7 +276,7 @@ def bands_of(rows: Floats, stretches: Sequence[slice]) -> Bands | None:
 
 
 def autoregressive(rows: Floats, stretches: Sequence[slice]) -> Coloured:
-    """Return autoregressive noise by forward and backward prediction.
+    """Fit autoregressive noise by forward and backward prediction.
 
     [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5], order by Akaike's
     criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
@@ -305,7 +307,7 @@ def autoregressive(rows: Floats, stretches: Sequence[slice]) -> Coloured:
 
 
 def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) -> Coloured:
-    """Return white plus first-order noise nearest to bands, or white if not worse.
+    """Fit white plus first-order noise to bands; return white noise if it is not worse.
 
     Autocovariance: a at lag 0, plus b phi^|k| cos(k t). Spectrum: a + b / 2 times the sum over w ± t of (1 - phi²) / |1 -
     phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. Two or three parameters cannot follow
@@ -313,7 +315,7 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
 
     Args:
         most: largest phi.
-        oscillates: also try phases t of the bands.
+        oscillates: whether to try also oscillations at the bands' frequencies t.
     """
     weight = bands.count / LOG_VARIANCE
     worth = float(np.log(bands.count.sum()))
@@ -341,7 +343,7 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
 
 
 def largest_decay(rows: int) -> float:
-    """Return the largest neighbour correlation with `FEWEST_INDEPENDENT` independent samples.
+    """Return the largest neighbour correlation that leaves `FEWEST_INDEPENDENT` independent samples.
 
     Their number is n (1 - phi²) / (1 + phi²); zero for too few rows.
     """
@@ -350,15 +352,15 @@ def largest_decay(rows: int) -> float:
 
 
 def akaike_cost(parameters: int, rows: int) -> float:
-    """Return fitted parameters' cost in log likelihood [Hurvich and Tsai, Biometrika 76 (1989) 297]."""
+    """Return the cost of fitted parameters in log likelihood [Hurvich and Tsai, Biometrika 76 (1989) 297]."""
     return parameters * rows / max(rows - parameters - 2.0, 1.0)
 
 
 def with_put_back(noise: Coloured, bands: Floats, taken: Floats, rows: int) -> Coloured:
-    """Return the noise with absorbed power restored, in an order that the rows support.
+    """Return the noise with absorbed power restored, with an order that the rows determine.
 
     Args:
-        bands: rising [cycles per row], shape (b,).
+        bands: ascending frequencies [cycles per row], shape (b,).
         taken: log of the remaining share, shape (b,).
     """
     frequency = np.linspace(0.0, 0.5, BOUNDS.frequencies + 1)

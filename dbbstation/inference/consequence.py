@@ -1,4 +1,4 @@
-"""Whether a column may result from the simulation, so that its departure is the difference itself."""
+"""Test whether a column may be a consequence of the difference instead of its cause."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 DETERMINED = 0.9
-"""Share of the squares of a column that the simulated value makes with its first two derivatives, from which on it is a column of the motion
-itself, as a torque is: of a column that only goes along with it, such as a temperature, they make less."""
+"""Share of a column's squares that the simulated value and its first two derivatives must explain for a column of the
+motion itself, such as a torque. For a merely correlated column, such as a temperature, the share is smaller."""
 
 CARRIES = 0.5
-"""Share of the column's other squares that the difference makes with its derivatives: more than all other variables together."""
+"""Share of the remaining squares that the difference and its derivatives must explain: more than all other variables together."""
 
 
 def may_result(variable: Variable, channel: Channel) -> bool:
-    """Return whether a column may be a consequence of the simulation as well as a cause of the difference.
+    """Return whether a column may be a consequence of the difference as well as its cause.
 
-    A measured torque follows the actual motion, and so contains the difference. A cause contains it too; these rows
-    alone cannot separate them.
+    A measured torque follows the actual motion and so contains the difference. A cause also contains it. These rows
+    cannot distinguish both.
     """
     if channel.simulated is None or channel.time is None:
         return False

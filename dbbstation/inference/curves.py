@@ -1,4 +1,4 @@
-"""Further curves: splines, stretches of rows, products."""
+"""Curves: splines, powers, and stretches of rows."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ CUBIC = 3
 class Spline(Form):
     """A smooth curve: cubic B-splines over a range, constant outside.
 
-    They sum to one [de Boor, A Practical Guide to Splines, rev. ed., ch. IX, eq. 36]; without the last (`falls`) the
-    curve falls to zero.
+    The splines sum to one [de Boor, A Practical Guide to Splines, rev. ed., ch. IX, eq. 36]. With `falls` the last is
+    omitted, so the curve falls to zero.
     """
 
     low: float
@@ -59,11 +59,11 @@ class Power(Form):
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """When rows were, and their response to a step.
+    """Times of rows, and the response of rows to a step.
 
     Attributes:
-        rows: time in row intervals, rising, shape (n,), omitted rows counted.
-        response: of a unit step by rows since it, from 0 to 1.
+        rows: time in row intervals, ascending, shape (n,); omitted rows count.
+        response: response to a unit step over rows since the step, from 0 to 1.
         reach: rows until the response is constant.
     """
 
@@ -73,13 +73,13 @@ class Clock:
 
     @classmethod
     def plain(cls, count: int) -> Clock:
-        """Return gapless rows with immediate response."""
+        """Return the clock of gapless rows with immediate response."""
         return cls(np.arange(count, dtype=np.float64), lambda since: (since >= 0.0).astype(np.float64), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Stretches(Form):
-    """One value per stretch of time, else zero; the variable is a clock's rows.
+    """One value per stretch of time, zero outside; the variable is a clock's rows.
 
     Attributes:
         last: infinite if endless.

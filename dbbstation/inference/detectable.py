@@ -1,4 +1,4 @@
-"""The smallest detectable effects over variables."""
+"""Compute the smallest detectable effects over variables."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 POWER = 0.9
-"""Share of the effects of a size that must be found."""
+"""Share of effects of the detectable size that must be found."""
 
 MARGIN = 1.25
-"""Factor on the size that is found so often: the noise and the odds of the whole search are known about so well. Of 20
-effects injected at the size with the margin the whole answer was "yes" to 17; their probability alone was sure of 9, 10 and 10 of ten at 1,
-1.25 and 1.5."""
+"""Safety factor of the detectable size, for the uncertainty of noise and search odds. The complete analysis found 17 of
+20 effects injected at the size with margin. Their probability alone was sure for 9, 10 and 10 of ten at factors 1, 1.25
+and 1.5."""
 
 ENTIRELY = 1e-9
-"""Share of the squares that the base must leave: what leaves less is concealed by it wholly."""
+"""Least share of squares outside the base; effects with less are concealed completely."""
 
 
 def detectable(settled: Settled) -> tuple[Detectable, ...]:
-    """Return detectable sizes over variables and user's causes, the least detectable first, before absorption by the base."""
+    """Return detectable sizes, before absorption by the base, over variables and for the user's causes; the least detectable first."""
     asked: dict[str, Cause] = {}
     for cause in settled.causes:
         family = _family(settled.bank, cause.name)
@@ -48,7 +48,7 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
 
 
 def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
-    """Return the same for laws with a confirming measurement that move something here at plausible size."""
+    """Return detectable sizes of laws that have a confirming measurement and, at plausible size, an effect here."""
     laws, found = settled.bank.laws, list[Detectable]()
     for cause in (c for c in settled.causes if c.name in laws and laws[c.name].confirm):
         variant = max(cause.variants, key=lambda one: len(one.columns))
@@ -63,7 +63,7 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
 
 
 NOTHING = 1e-3
-"""An effect whose rms, whitened, is below this share of the noise is left out: a million rows would show it by one standard deviation."""
+"""Least whitened rms of an effect, relative to the noise: with less, a million rows show it by one standard deviation."""
 
 
 def _family(bank: Bank, name: str) -> Family | None:
@@ -100,12 +100,13 @@ def _detectable(
 
 
 def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: float) -> float | None:
-    """Return the least rms at which `POWER` of random effects are surely found, or None.
+    """Return the least rms at which the share `POWER` of random effects is surely found, or None.
 
-    Amplitudes N(0, 1) at one size give z = L a + L^(1/2) e along the information L; averaged over `SCALES` as any cause.
+    Amplitudes a and noise e, both N(0, 1), give z = L a + L^(1/2) e for the information L. The evidence is averaged
+    over `SCALES`, as for any cause.
 
     Args:
-        products: information beside base and others, shape (p, p).
+        products: information given base and others, shape (p, p).
     """
     rng = np.random.default_rng(0)
     directions = rng.standard_normal((BOUNDS.detectable_draws, len(plausible)))
@@ -136,4 +137,4 @@ def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: f
 
 
 MOST_DOUBLED, HALVED = 30, 12
-"""Steps of the search for a size: a factor of a billion, and then to a few thousandths."""
+"""Steps of the search for a size: doublings over a factor of a billion, then halvings to a few thousandths."""

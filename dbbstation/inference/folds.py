@@ -1,4 +1,4 @@
-"""Held-out error of a complete selection, and each effect's gain."""
+"""Held-out error of the complete selection, and the gain of each effect."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 FOLDS = 10
-"""Parts that are held back in turn, at the most; as many where there are fewer than `ENOUGH_BLOCKS` blocks."""
+"""Largest number of held-out parts; with fewer than `ENOUGH_BLOCKS` blocks the exact number."""
 
 ENOUGH_BLOCKS = 5
-"""Blocks from which on there are no more parts than blocks, so that blocks of like size are held back whole."""
+"""Number of blocks from which parts are whole blocks, if these have similar sizes."""
 
 WIDEST_GAP = 0.5
-"""Gap beside a part at the most, as a share of its rows: where neighbours resemble each other for longer, four fifths of the rows are
-still left to choose from."""
+"""Largest excluded gap on each side of a part, over its rows: even for long correlations four fifths of the rows remain
+for the selection."""
 
 FOLDS_OF_AN_ERROR = 5
-"""Groups of tests that are left out in turn where only the error of the prediction is asked for, nothing being chosen anew."""
+"""Number of groups of tests for the prediction error alone, without a new selection."""
 
 Kind: TypeAlias = "tuple[str, ...]"
 """Family and variables of an effect, or the name of a law."""
@@ -44,19 +44,19 @@ def numbered(names: Sequence[str]) -> list[int]:
 
 
 def in_turn(names: Sequence[str], most: int) -> list[int]:
-    """Return each run's group by test, tests in turn; at most one group per test."""
+    """Return each run's group; tests are distributed cyclically, and each test is in one group."""
     tests = numbered(names)
     return [test % min(most, max(tests) + 1) for test in tests]
 
 
 @dataclass(frozen=True)
 class Fold:
-    """One held-back part.
+    """Results for one held-out part.
 
     Attributes:
         as_simulated: rms error of the reference, in the residual's unit.
-        before: base refitted by ordinary least squares.
-        gains: by kind, squared error without minus with; for a simulator, log density with minus without.
+        before: rms error of the base, refitted by ordinary least squares.
+        gains: gain of each kind, as decrease of squared error; for a simulator, increase of log density.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class HeldOutError:
-    """Errors of rows that took no part."""
+    """Prediction errors of held-out rows."""
 
     folds: tuple[Fold, ...]
 
@@ -85,20 +85,20 @@ class HeldOutError:
 
     @property
     def after(self) -> float:
-        """Return the choice's error over all parts."""
+        """Return the selection's error over all parts."""
         return self._all([fold.after for fold in self.folds])
 
     def corrected(self, after: Sequence[float]) -> HeldOutError:
-        """Return the same with other errors of the corrected parts."""
+        """Return the result with other errors after correction."""
         return replace(self, folds=tuple(replace(fold, after=one) for fold, one in zip(self.folds, after, strict=True)))
 
     @property
     def is_worse(self) -> bool:
-        """Return whether the choice predicts worse than the reference."""
+        """Return whether the selection predicts worse than the reference."""
         return is_worse(self.after, self.as_simulated)
 
     def gains_of(self, kinds: Collection[Kind]) -> Gains:
-        """Return the joint gain of kinds per part; empty if never chosen."""
+        """Return the summed gain of several kinds in each part; zero for unselected kinds."""
         parts = tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds)
         return Gains(parts, tuple(fold.rows for fold in self.folds))
 
@@ -115,14 +115,14 @@ def held_out_error(
     alike: float = 1.0,
     reference: Callable[[Flags], Floats] | None = None,
 ) -> HeldOutError:
-    """Hold back parts in turn [`part_numbers`].
+    """Predict each part [`part_numbers`] by a selection without it.
 
-    Rows that resemble a held-back stretch are excluded from the choice, not from the reference.
+    Rows correlated with the part are excluded from the selection, but not from the reference.
 
     Args:
-        choose_without: full selection without rows, shape (n,).
+        choose_without: function for the complete selection without rows, shape (n,).
         alike: correlation time of noise [rows].
-        reference: prediction over all rows, shape (n,), from allowed rows, shape (n,); None: their mean.
+        reference: function from allowed rows, shape (n,), to a prediction of all rows, shape (n,); None for their mean.
     """
     found = []
     parts = parts_of(channel)
@@ -159,7 +159,7 @@ def beside(channel: Channel, rows: Flags, alike: float) -> Flags:
 
 
 def parts_of(channel: Channel) -> list[tuple[str, Flags]]:
-    """Return named parts to hold back: rows, shape (n,)."""
+    """Return the parts with their names; rows have shape (n,)."""
     number = part_numbers([block.stop - block.start for block in channel.blocks])
     found = []
     for k in range(int(number.max()) + 1):
@@ -170,9 +170,9 @@ def parts_of(channel: Channel) -> list[tuple[str, Flags]]:
 
 
 def part_numbers(lengths: Sequence[int]) -> Integers:
-    """Return each row's part, parts of similar size and whole blocks, shape (n,).
+    """Return the number of each row's part, shape (n,); parts have similar size and whole blocks.
 
-    Long blocks are split evenly; short neighbours are joined to at most `FOLDS` parts of at least half an even share.
+    Long blocks are split evenly. Short neighbouring blocks are joined, to at most `FOLDS` parts of at least half an equal share.
     """
     share = sum(lengths) / (min(FOLDS, len(lengths)) if len(lengths) >= ENOUGH_BLOCKS else FOLDS)
     sizes: list[int] = []

@@ -1,4 +1,4 @@
-"""Followed variables: classes by probability over all sets, and held-out gains."""
+"""Decide which variables effects follow, with probabilities over all sets and held-out gains."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 LEAST_ADDED = 0.02
-"""Probability that a variable must add to a class to be named in it: less changes no figure that is printed with two digits."""
+"""Least probability that a variable adds to its class; less does not change figures of two digits."""
 
 WAYS = {
     **dict.fromkeys((Family.HYSTERESIS, Family.FRICTION, Family.SCALED), "direction"),
@@ -41,14 +41,14 @@ VALUE = "value"
 
 @dataclass(frozen=True, eq=False)
 class WithoutPart:
-    """Everything chosen anew without one part."""
+    """The selection without one part."""
 
     rows: Flags
     settled: Settled
 
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:
-    """Return a cause's variables; a user's physics has its own name."""
+    """Return the variables that a cause follows; for a user's law without variables, its name."""
     of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
     if of is None:
         return frozenset({name})
@@ -62,7 +62,7 @@ def followed_by(bank: Bank, name: str) -> frozenset[str]:
 
 
 def way_of(bank: Bank, name: str) -> str:
-    """Return a cause's way of following."""
+    """Return how a cause follows its variables: by value, direction or delay."""
     of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
     if law is not None and law.way:
         return law.way
@@ -70,7 +70,7 @@ def way_of(bank: Bank, name: str) -> str:
 
 
 def only_begun(settled: Settled) -> frozenset[str]:
-    """Return uncertain members whose memory is mostly initial transient: these follow time."""
+    """Return uncertain members with memory whose effect is mostly the initial transient; these follow time."""
     channel, bank, found, first = settled.channel, settled.bank, set(), 0
     members = settled.best.members
     remembering = {name for name, law in bank.laws.items() if law.family is Family.MEMORY}
@@ -82,7 +82,7 @@ def only_begun(settled: Settled) -> frozenset[str]:
         own = values[first : first + len(member.columns)]
         first += len(member.columns)
         count = len(member.variant.columns)
-        if member.cause.name not in remembering or count < 2:  # noqa: PLR2004 - its gain, then its state at each start
+        if member.cause.name not in remembering or count < 2:  # noqa: PLR2004 - its gain and its initial states
             continue
         samples = bank.samples(member.variant.columns)[channel.kept]
         samples = samples - axes @ (axes.T @ samples)
@@ -93,22 +93,22 @@ def only_begun(settled: Settled) -> frozenset[str]:
 
 
 def follow_of(settled: Settled) -> Callable[[str], frozenset[str]]:
-    """Return what each cause follows, by name."""
+    """Return a function from causes to followed variables."""
     begun = only_begun(settled)
     return lambda name: frozenset({TIME}) if name in begun else followed_by(settled.bank, name)
 
 
 def weighted(settled: Settled) -> list[tuple[Settled, float]]:
-    """Return outcomes of all initial noise models with their probabilities."""
+    """Return the outcomes from all initial noise models, with probabilities."""
     every = [settled, *settled.others]
     logs = np.array([one.log_probability for one in every])
     return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
 
 
 def probability_of_any(settled: Settled) -> float:
-    """Return the probability of any cause."""
+    """Return the probability that at least one cause is present."""
     none = (share * one.posterior.probability_of(lambda names: not names) for one, share in weighted(settled))
-    return max(0.0, 1.0 - float(sum(none)))  # the sum can round to more than one
+    return max(0.0, 1.0 - float(sum(none)))  # rounding can make the sum exceed one
 
 
 class VariableProbabilities:
@@ -125,12 +125,12 @@ class VariableProbabilities:
                     self._sets[key] = self._sets.get(key, 0.0) + share * float(np.exp(weight - total))
 
     def of(self, names: Iterable[str]) -> float:
-        """Return the probability that one of these is followed."""
+        """Return the probability that at least one of these variables is followed."""
         wanted = set(names)
         return min(1.0, sum(p for key, p in self._sets.items() if key & wanted))
 
     def class_of(self, name: str) -> tuple[str, ...]:
-        """Return a variable with its rivals."""
+        """Return a variable with rivals, added until the probability is sure."""
         chosen = [name]
         every = sorted(frozenset[str]().union(*self._sets))
         unsure = [other for other in every if self.of([other]) < SURE]
@@ -145,7 +145,7 @@ class VariableProbabilities:
 
 @dataclass(frozen=True)
 class VariableClass:
-    """Variables of the same members."""
+    """A class of variables that the same members follow."""
 
     each: tuple[tuple[str, ...], ...]
     others: tuple[str, ...]
@@ -158,7 +158,7 @@ class VariableClass:
 
 
 def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[VariableClass]:
-    """Return classes of the best set's variables, most probable first."""
+    """Return the classes of variables that the best set follows, most probable first."""
     follow = follow_of(settled)
     of = {member.cause.name: follow(member.cause.name) for member in settled.best.members}
     there = sorted(frozenset[str]().union(*of.values()), key=lambda v: (-probabilities.of([v]), v))
@@ -181,7 +181,7 @@ def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[V
 def interchangeable(
     settled: Settled, members: Collection[str], follow: Callable[[str], frozenset[str]]
 ) -> tuple[str, ...]:
-    """Return variables over which one immediate cause can replace members."""
+    """Return the variables of single causes without memory that can replace members."""
     best, bank = settled.best, settled.bank
     own = frozenset[str]().union(*(follow(name) for name in members))
     rivals = []
@@ -198,7 +198,7 @@ def interchangeable(
 
 
 def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause]) -> dict[str, float]:
-    """Return the share of the members' squares that each cause in its best form can make."""
+    """Return the share of the members' squares that each cause, in its best form, can explain."""
     if not causes:
         return {}
     columns, values, _ = estimated(settled, members)
@@ -216,7 +216,7 @@ def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause
 
 
 def estimated(settled: Settled, names: Collection[str]) -> tuple[Integers, Floats, Floats]:
-    """Return columns of some members, their values, shape (p,), and covariance."""
+    """Return some members' columns, their values, shape (p,), and covariance."""
     members = settled.best.members
     every = settled.comparison.estimates(members)
     inside = np.concatenate([np.full(len(m.columns), m.cause.name in names) for m in members])
@@ -225,7 +225,7 @@ def estimated(settled: Settled, names: Collection[str]) -> tuple[Integers, Float
 
 
 def share_made(products: Floats, values: Floats) -> float:
-    """Return the share of an effect's squares that the other columns make."""
+    """Return the share of an effect's squares that the other columns explain."""
     p = len(values)
     whole = float(values @ products[:p, :p] @ values)
     axes_of = np.linalg.pinv(products[p:, p:], rcond=1e-9, hermitian=True)
@@ -235,10 +235,10 @@ def share_made(products: Floats, values: Floats) -> float:
 
 @dataclass(frozen=True)
 class ClassGain:
-    """A class's held-out gains.
+    """Held-out gains of a class.
 
     Attributes:
-        gains: log density with minus without it.
+        gains: increase of log density by the class.
     """
 
     gains: DensityGains
@@ -247,20 +247,20 @@ class ClassGain:
 
     @property
     def predicts(self) -> bool:
-        """Return whether parts other than the best prefer it, with half of the rows and less error."""
+        """Return whether the class predicts: a sure gain without the best part, in half of the rows, with less error."""
         return self.gains.predicts and self.gains.share_with_gain >= MOST_PARTS and self.after < self.before
 
 
 MOST_PARTS = 0.5
-"""Share of the held-out rows that must be in parts with a gain: what happened in a few parts goes on in no others."""
+"""Least share of held-out rows in parts with a gain: events in a few parts do not predict others."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChosenWithoutParts:
-    """Parts of a table.
+    """Selections without each part of a table.
 
     Attributes:
-        ignored: effects of these variables alone take no part in predictions.
+        ignored: predictions omit effects that follow only these variables.
     """
 
     parts: Sequence[WithoutPart]
@@ -272,32 +272,32 @@ class ChosenWithoutParts:
         return [part.rows for part in self.parts]
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """Return the gain of everything over some variables; None: everything."""
+        """Return the gain of effects of these variables; None for all effects."""
         return gain_of(self.parts, wanted, self.ignored)
 
     def but_for(self, ignored: Collection[str]) -> ChosenWithoutParts:
-        """Return the same without effects of some variables alone, such as time."""
+        """Return the selections with other ignored variables, such as time."""
         return replace(self, ignored=frozenset(ignored))
 
     def errors_with(self, wanted: Collection[str]) -> list[float]:
-        """Return each part's rms error with effects of these variables alone; none given: with everything."""
-        # What goes on in time in parts may be the drift of a law that follows a variable.
+        """Return each part's rms error with only effects of these variables, or with all effects if none are given."""
+        # Effects in time may be the drift that belongs to a law over a variable.
         also = {TIME, RUN} if wanted and self.of({TIME, RUN}).predicts else set[str]()
         left = [left_with(part.settled, {*wanted, *also})[part.rows] for part in self.parts]
         return [float(np.sqrt(np.mean(np.square(rows)))) for rows in left]
 
 
 def left_with(one: Settled, wanted: Collection[str]) -> Floats:
-    """Return the residual after effects of these variables alone, refitted; none given: after everything."""
+    """Return the residual after refitting only effects of these variables, or all effects if none are given."""
     follow = follow_of(one)
     rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
     return left_without(one, rest)
 
 
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignored: Collection[str] = ()) -> ClassGain:
-    """Return the gain over some variables in unused parts; None: everything.
+    """Return the held-out gain of effects of these variables; None for all effects.
 
-    Both predictions leave out effects that follow ignored variables alone.
+    Both predictions omit effects that follow only ignored variables.
     """
     brought, before, after = [], 0.0, 0.0
     for part in parts:
@@ -315,10 +315,10 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
 
 
 def left_without(one: Settled, names: Collection[str], unseen: Collection[str] = ()) -> Floats:
-    """Return the residual without some members, others refitted, shape (n,).
+    """Return the residual after refitting all members but some, shape (n,).
 
     Args:
-        unseen: members that are fitted, and take no part in the prediction.
+        unseen: members that are fitted but not predicted.
     """
     rest = one.best.without(*names)
     effect = one.effect(members=rest)
@@ -327,9 +327,9 @@ def left_without(one: Settled, names: Collection[str], unseen: Collection[str] =
 
 
 def log_density(one: Settled, rows: Flags, left: Floats) -> float:
-    """Return a part's log residual density in the others' noise, up to a constant.
+    """Return the log density of a part's residual for the other parts' noise, up to a constant.
 
-    Row spacing is that of the noise measurement.
+    Rows have the spacing of the noise estimate.
     """
     spaced = np.zeros(len(rows), dtype=bool)
     spaced[np.flatnonzero(rows)[:: one.channel.apart]] = True
@@ -341,7 +341,7 @@ def log_density(one: Settled, rows: Flags, left: Floats) -> float:
 
 
 def way_probability(settled: Settled, wanted: Collection[str], way: str) -> float:
-    """Return the probability that a cause follows variables in a way."""
+    """Return the probability that a cause follows variables in the given way."""
 
     def inside(cause: Cause, one: Settled) -> bool:
         return bool(followed_by(one.bank, cause.name) & set(wanted)) and way_of(one.bank, cause.name) == way
@@ -350,4 +350,4 @@ def way_probability(settled: Settled, wanted: Collection[str], way: str) -> floa
         share * one.posterior.probability([cause.name for cause in one.causes if inside(cause, one)])
         for one, share in weighted(settled)
     )
-    return min(1.0, float(sum(each)))  # it can round to more
+    return min(1.0, float(sum(each)))  # rounding can make the sum exceed one

@@ -1,6 +1,6 @@
-"""Curves of unmodelled effects over a variable, as few amplitudes.
+"""Curves of unmodelled effects over variables, with few amplitudes.
 
-A form gives its columns and its printed places.
+A form computes its columns and chooses the points to print.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ SPLINES = 7
 
 POINTS_PER_WAVE = 8
 POINTS_PER_WIDTH = 3
-"""Of a bump or a step: from four widths before it to four behind it."""
+"""Points per width of a bump or step, from four widths before to four after."""
 
 WIDTHS = 4.0
 
 
 HARMONICS = (2, 3, 5, 8)
-"""Multiples of a pitch that are tried as one wave with it, up to which: what is periodic is seldom a sine, and its shape is not known."""
+"""Tried numbers of harmonics of a periodic effect: its shape is seldom a sine and is unknown."""
 
 
 class Form(ABC):
@@ -41,18 +41,18 @@ class Form(ABC):
         """Return each amplitude's curve at values, shape (..., p)."""
 
     def points(self, low: float, high: float) -> Floats:
-        """Return printed places between extremes, shape (q,); by default three, which a straight line needs."""
+        """Return the points to print within the range, shape (q,); by default three, enough for a straight line."""
         return np.linspace(low, high, 3)
 
     def text(self, unit: str) -> str:
-        """Return the form's distinction in the variable's unit; may be empty."""
+        """Return what distinguishes this form, in the variable's unit; may be empty."""
         del unit
         return ""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearSplines(Form):
-    """A curve straight between seven points; limits may be arrays by strut."""
+    """A piecewise linear curve with seven points; limits may be arrays by strut."""
 
     low: Floats
     high: Floats
@@ -72,10 +72,10 @@ class LinearSplines(Form):
 
 @dataclass(frozen=True, eq=False)
 class Walk(Form):
-    """A random walk, steps as large as the root of their length.
+    """A random walk with step variances proportional to their length.
 
     Args:
-        at: rising, shape (p + 1,).
+        at: ascending places, shape (p + 1,).
         unit: length of a unit step, in the variable's unit.
     """
 
@@ -122,12 +122,12 @@ class Wave(Form):
 
 
 _MOST_PERIODS = 100.0
-"""Periods that are printed point by point, at the most; of more, one stands for all."""
+"""Most periods printed point by point; of more, only one is printed."""
 
 
 @dataclass(frozen=True, eq=False)
 class WaveOfTurn(Form):
-    """A wave of the angle since the start [turns], with own phase by direction.
+    """A wave of the angle since the start [turns], with separate phases for both directions.
 
     The variable is positive counterclockwise.
     """
@@ -196,7 +196,7 @@ class Bump(Form):
 
 @dataclass(frozen=True, eq=False)
 class StepForm(Form):
-    """A step from minus to plus a half over a few widths."""
+    """A smooth step from minus to plus a half."""
 
     at: float
     width: float
@@ -218,7 +218,7 @@ def _across(at: float, width: float, low: float, high: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SignForm(Form):
-    """Plus one way, minus the other."""
+    """Plus one in one direction, minus one in the other."""
 
     def columns(self, values: Floats) -> Floats:
         return np.sign(values)[..., None]
@@ -277,11 +277,11 @@ class PlaneStep(Form):
         return np.array([np.cos(np.radians(self.across_deg)), np.sin(np.radians(self.across_deg))])
 
     def along(self, values: Floats) -> Floats:
-        """Return the distance across the line from the origin, shape (n,)."""
+        """Return the coordinate perpendicular to the line, shape (n,)."""
         return np.asarray(values @ self.across, dtype=np.float64)
 
     def columns(self, values: Floats) -> Floats:
-        """Return minus to plus a half; values of shape (n, 2)."""
+        """Return the step from minus to plus a half, at values of shape (n, 2)."""
         return StepForm(self.at, self.width).columns(self.along(values))
 
     def points(self, low: float, high: float) -> Floats:
@@ -293,7 +293,7 @@ class Spring(Form):
     """Constant plus proportional to a distance: a spring of unknown length.
 
     Args:
-        towards_deg: its far end, seen from Z.
+        towards_deg: direction to its far end, seen from Z.
         about: zero distance [mm].
     """
 
@@ -314,7 +314,7 @@ class Spring(Form):
 
 
 RINGS_FOR = 4.0
-"""Decay times after which a ringing is printed no further: 2 % of it are left."""
+"""Decay times over which a ringing is printed, until 2 % remain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,10 +345,10 @@ class Ringing(Form):
 
 @dataclass(frozen=True, eq=False)
 class BehindReversal(Form):
-    """The lag behind a reversal: any curve of the distance since then, signed by the new direction.
+    """The lag after a reversal: any curve of the distance since then, signed by the new direction.
 
-    It is piecewise linear, zero at the reversal and from `length` on. Each point is at half the way of the next: what turns
-    round bends most at its begin.
+    The curve is piecewise linear, zero at the reversal and beyond `length`. Each point is at half the distance of the
+    next, because the curve bends most at its beginning.
     """
 
     length: float

@@ -1,6 +1,6 @@
-"""Residuals of whole periods in harmonics: noise level and misfit.
+"""Noise level and misfit from harmonics of residuals over whole periods.
 
-Missing physics appears in low harmonics. The noise there is extrapolated from high harmonics: floor plus first-order
+Missing physics appears in low harmonics. Their noise is extrapolated from high harmonics by a floor plus a first-order
 process, S(k) = a + b / (1 + (k / c)²) [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12].
 """
 
@@ -26,17 +26,17 @@ LOW = 30
 """Highest harmonic that counts as smooth."""
 
 HIGH = 240
-"""Highest harmonic that noise is read from."""
+"""Highest harmonic for estimating noise."""
 
 SAMPLES_PER_HARMONIC = 3
-"""Samples per period of the highest harmonic that is looked at, at the least."""
+"""Least samples per period of the highest harmonic."""
 
 CORNERS = np.geomspace(10.0, 240.0, 17)
-"""Corners c of the noise's spectrum that are tried: neighbours resemble each other over 6 degrees of the period at
-the most. What is correlated over more is structure that a model should name."""
+"""Tried corners c of the noise spectrum: correlation over at most 6 degrees of the period. Longer correlations are
+structure that a model should name."""
 
 WORTH = 2.0
-"""Log likelihood that correlation must bring over white noise to be believed."""
+"""Least log likelihood gain of correlated over white noise."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Misfit:
     """The residual beyond noise.
 
     Attributes:
-        noise: white noise per sample of equal low-harmonic power.
-        rms: beyond noise in low harmonics, at least zero.
+        noise: white noise per sample with equal low-harmonic power.
+        rms: residual in low harmonics beyond noise, at least zero.
     """
 
     probability: float
@@ -56,11 +56,11 @@ class Misfit:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Noise power by harmonic with its certainty.
+    """Noise power by harmonic, with its degrees of freedom.
 
     Attributes:
-        power: of an orthonormal coefficient at 0, 1, ... LOW, shape (LOW + 1,).
-        freedom: of their mean as a mean square.
+        power: power of an orthonormal coefficient at 0, 1, ... LOW, shape (LOW + 1,).
+        freedom: of the mean power.
     """
 
     power: Floats
@@ -90,7 +90,7 @@ def basis(phase_rad: Floats, highest: int) -> Floats:
 
 
 def _waves(phase_rad: Floats, highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return factor waves whose products are harmonics a + AT_ONCE b, ten times faster than cosines."""
+    """Return waves whose products are harmonics a + AT_ONCE b, ten times faster than computing cosines."""
     first = np.exp(1j * phase_rad)
     return _powers(first, min(AT_ONCE, highest + 1)), _powers(np.exp(1j * AT_ONCE * phase_rad), highest // AT_ONCE + 1)
 
@@ -118,16 +118,16 @@ def _stretches(samples: int) -> Iterator[slice]:
 
 
 def amplitudes(values: Floats, phase_rad: Floats, highest: int) -> NDArray[np.complex128]:
-    """Return least-squares harmonics, shape (highest + 1,): values are the real part of sum a_k exp(i k phase).
+    """Return least-squares harmonics a_k, shape (highest + 1,), so that values are the real part of sum a_k exp(i k phase).
 
-    Normal equations need only sums and differences of harmonics. Incomplete periods are ill-conditioned and use the
-    basis.
+    Normal equations need only sums and differences of harmonics. They are ill-conditioned for incomplete periods, which
+    use the basis instead.
     """
     return amplitudes_of([values], phase_rad, highest)[0]
 
 
 def amplitudes_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> list[NDArray[np.complex128]]:
-    """Return harmonics of several values at equal phases, as `amplitudes`."""
+    """Return harmonics of several series at equal phases, as `amplitudes`."""
     moment, *further = _sums([np.ones(len(phase_rad)), *several], phase_rad, 2 * highest)
     order = np.arange(-highest, highest + 1)
     apart = order[None, :] - order[:, None]
@@ -143,7 +143,7 @@ def amplitudes_of(several: Sequence[Floats], phase_rad: Floats, highest: int) ->
 
 
 def smooth(residual: Floats, phase_rad: Floats, highest: int = LOW) -> Floats:
-    """Return the residual up to a harmonic by least squares, shape (n,)."""
+    """Return the residual without harmonics above `highest`, by least squares, shape (n,)."""
     return smooth_of([residual], phase_rad, highest)[0]
 
 

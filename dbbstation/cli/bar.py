@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class BarOptions:
     """The bar that is read, by the keys of its file."""
 
-    serial_number: Annotated[str, Option("Serial number of the bar.")]
+    serial_number: Annotated[str, Option("Serial number of the bar.", flag="--bar-serial-number")]
     temp_c: Annotated[float, Option("Temperature of the bar [degC].", least=-30.0, most=80.0)]
     temp_uncertainty_k: Annotated[
         float,
@@ -55,7 +55,7 @@ class CalibratorOptions:
     valid_until: Annotated[
         str | None, Option("Last day on which the certificate is valid  [default: five years].", metavar="YYYY-MM-DD")
     ] = None
-    certificate: Annotated[str, Option("Number and issuer of the certificate.")] = ""
+    certificate: Annotated[str, Option("Number and issuer of the certificate.", flag="--calibrator-certificate")] = ""
 
     @property
     def data(self) -> dict[str, object]:
@@ -92,7 +92,7 @@ def bar(
 
     \b
     Examples:
-      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --serial-number DBB-0042 --calibrator-serial ZB-17 \
+      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --bar-serial-number DBB-0042 --calibrator-serial ZB-17 \
         --calibrator-mm 150.0003 --calibrator-u-um 0.25 --certified 2026-03-01 --temp-c 20.3 --out bar.yaml
       dbbstation check bar.yaml
     """

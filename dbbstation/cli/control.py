@@ -27,7 +27,7 @@ class ModelOptions:
 
     model: Annotated[Path, o.MODEL]
     source_files: o.SourcePaths = ()
-    machine: Annotated[Path | None, Option("Machine file that the model must agree with.", kind="file")] = None
+    machine: Annotated[Path | None, replace(o.MACHINE, kind="file")] = None
 
     def written(self, task: Callable[..., _Result], out: Path, **given: Any) -> _Result:  # noqa: ANN401 - as the task has it
         """Return what a task writes, its notes told."""

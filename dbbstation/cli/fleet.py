@@ -41,7 +41,7 @@ def fleet(
     exclude: o.Exclude = (),
     false_alarms: Annotated[float, Option(o.FALSE_ALARMS, least=1e-6, most=0.5)] = 0.01,
     out: Annotated[Path, replace(o.OUT, kind="folder", metavar="FOLDER")] = Path("fleet"),
-    table: Annotated[Path | None, Option("Write the table here too, as a .csv or .parquet file.", kind="file")] = None,
+    table: Annotated[Path | None, Option(o.OUTPUTS["table"], kind="file")] = None,
     jobs: Annotated[
         int | None, Option("Number of processes on this computer  [default: one for each core].", least=1)
     ] = None,
@@ -66,7 +66,7 @@ def fleet(
     Examples:
       dbbstation fleet sessions --task calibrate
       dbbstation fleet hall-1 hall-2 --task diagnose --out diagnosed --json
-      dbbstation fleet sessions --task circles --table circles.parquet
+      dbbstation fleet sessions --task circles --table circles.parquet   (the table once more, as CSV or Parquet)
       dbbstation fleet /srv/ballbar --task calibrate --scheduler tcp://server:8786
     """
     from dbbstation.cli.output import print_result, say

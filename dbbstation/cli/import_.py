@@ -44,7 +44,7 @@ def import_(
     out: Annotated[Path, replace(o.OUT, kind="folder", metavar="SESSION")],
     plan: Annotated[Path | None, o.PLAN] = None,
     machine: Annotated[Path | None, o.MACHINE] = None,
-    run: Annotated[
+    runs: Annotated[
         tuple[str, ...],
         Option(
             "Run in a file that does not name it, such as old1.csv=a-ccw or old1.csv=a-ccw-2. Several runs of a file follow in their order.",
@@ -87,7 +87,7 @@ def import_(
     Examples:
       dbbstation import old/*.csv --out imported --plan table2.yaml --machine machine.yaml --mapping old-program.yaml \
         --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --yes
-      dbbstation import a.csv --out imported --plan table2.yaml --machine machine.yaml --run a.csv=a-ccw \
+      dbbstation import a.csv --out imported --plan table2.yaml --machine machine.yaml --runs a.csv=a-ccw \
         --columns Winkel=angle:deg --columns Abweichung=deviation:µm --zero-mm 150 --angle-grows ccw --angle-zero-deg 0 \
         --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --dry-run
     """
@@ -105,7 +105,7 @@ def import_(
     elif remembered is not None:
         refuse_existing(remembered, force=False)
     asker = Asker()
-    told = _Told(run, started, frozenset(trust), not_known)
+    told = _Told(runs, started, frozenset(trust), not_known)
     found = _read(asker, files, of_mapping, (plan, machine), told, noted)
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
     with staged(*writes, dry=dry_run) as put:
@@ -248,10 +248,10 @@ def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path,
         matching = [path for path in files if name in {str(path), path.name}]
         runs = [run for one in said.split(",") if (run := run_name(one.strip(), list(plan.tests))) is not None]
         if len(matching) != 1:
-            raise click.UsageError(f"--run {text}: {name or 'it'} names {len(matching)} of the files that are given")
+            raise click.UsageError(f"--runs {text}: {name or 'it'} names {len(matching)} of the files that are given")
         if len(runs) != len(said.split(",")):
             raise click.UsageError(
-                f"--run {text}: {said} is no run of the plan, whose tests are {', '.join(plan.tests)}"
+                f"--runs {text}: {said} is no run of the plan, whose tests are {', '.join(plan.tests)}"
             )
         found[matching[0]] = [*found.get(matching[0], []), *runs]
     return found
@@ -264,7 +264,7 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         return RunName()
     while True:
         answer = asker.text(
-            f"which run is {Path(table.table.file).name}, such as {next(iter(plan.tests))}-ccw", "--run"
+            f"which run is {Path(table.table.file).name}, such as {next(iter(plan.tests))}-ccw", "--runs"
         )
         found = run_name(answer, list(plan.tests))
         if found is not None:

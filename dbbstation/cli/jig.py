@@ -32,8 +32,8 @@ class SheetOptions(AsWritten):
     columns: Annotated[
         tuple[str, ...],
         Option(
-            "Meaning of a column, such as x=Ist_X: ball, bore, holder, x, y, z, u or ux, uy, uz; axis, value, unit if each row has one coordinate  [default: by their names].",
-            metavar="WHAT=NAME",
+            o.COLUMNS,
+            metavar="NAME=MEANING",
             whole=True,
         ),
     ] = ()
@@ -50,7 +50,7 @@ class SheetOptions(AsWritten):
 
         return read_sheet(
             self.sheet,
-            _pairs(self.columns, "--columns", _WHAT),
+            _meanings(self.columns),
             _micro(self.unit),
             coverage,
             u_unit=_micro(u_unit),
@@ -66,8 +66,8 @@ def jig() -> None:
 
     \b
     Examples:
-      dbbstation jig sheet cmm.csv --before plate.yaml --u-um 0.8 --out plate-2026.yaml
-      dbbstation jig holders mountings.csv --before plate.yaml --out plate-2026.yaml
+      dbbstation jig sheet cmm.csv --jig plate.yaml --u-um 0.8 --out plate-2026.yaml
+      dbbstation jig holders mountings.csv --jig plate.yaml --out plate-2026.yaml
     """
 
 
@@ -75,7 +75,7 @@ def jig() -> None:
 def sheet(
     given: SheetOptions,
     *,
-    before: Annotated[Path, Option("Jig file that the new one is made from.")],
+    jig: Annotated[Path, Option("Jig file that the new one is made from.")],
     u_unit: Annotated[
         _Unit | None,
         Option(
@@ -103,13 +103,14 @@ def sheet(
 ) -> Answer:
     r"""Write a jig file with the balls of a CMM sheet: a table, or a DMIS file with measured features (.dmo, .dmi, .dmis, .out).
 
-    Coordinates are in the jig's frame. Plate and holders come from --before. A jig file has one uncertainty per ball:
+    Columns are found by their names, or named by --columns as ball, bore, holder, x, y, z, u or ux, uy, uz. A sheet with
+    one coordinate a row has axis, value and unit. Coordinates are in the jig's frame. Plate and holders come from --jig. A jig file has one uncertainty per ball:
     the root mean square of its three axes. Each ball is shown with its change since the former jig file.
 
     \b
     Examples:
-      dbbstation jig sheet cmm.csv --before plate.yaml --columns x=X --columns "u=U (k=2)" --coverage 2 --out new.yaml
-      dbbstation jig sheet plate.dmo --before plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
+      dbbstation jig sheet cmm.csv --jig plate.yaml --columns X=x --columns "U (k=2)=u" --coverage 2 --out new.yaml
+      dbbstation jig sheet plate.dmo --jig plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """
     from dbbstation.cli.output import print_table
     from dbbstation.cli.provenance import provenance
@@ -119,12 +120,12 @@ def sheet(
     from dbbstation.results.jig import MeasuredBall, SheetResult
 
     refuse_existing_table(out, force=force)
-    old = read_jig(before)
+    old = read_jig(jig)
     new = jig_of_sheet(
         old,
         given.read(coverage, u_unit),
         str(given.sheet),
-        names=_pairs(names, "--names"),
+        names=dict(_pairs(names, "--names", "LABEL=BALL")),
         uncertainty_um=u_um,
         cmm_temp_c=cmm_temp_c,
     )
@@ -169,7 +170,7 @@ def holders(
             most=100.0,
         ),
     ] = 0.0,
-    before: Annotated[Path | None, Option("Jig file that the new one is made from.")] = None,
+    jig: Annotated[Path | None, Option("Jig file that the new one is made from.")] = None,
     out: Annotated[Path | None, replace(o.OUT, metavar="JIG.yaml")] = None,
     force: o.Force = False,
 ) -> Answer:
@@ -182,16 +183,16 @@ def holders(
     \b
     Examples:
       dbbstation jig holders mountings.csv
-      dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --before plate.yaml --out plate-2026.yaml
+      dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --jig plate.yaml --out plate-2026.yaml
     """
     from dbbstation.errors import InputError
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.plan.repeatability import repeatability
     from dbbstation.results.jig import HoldersResult
 
-    if (before is None) != (out is None):
+    if (jig is None) != (out is None):
         raise click.UsageError(
-            "give --before and --out together: the new file is the old one with the result in its holders"
+            "give --jig and --out together: the new file is the old one with the result in its holders"
         )
     if out is not None:
         refuse_existing_table(out, force=force)
@@ -202,8 +203,8 @@ def holders(
             found[name] = repeatability(places, cmm_repeatability_um)
     except ValueError as error:
         raise InputError.of(given.sheet, str(error), "put each ball up at least twice, ten times is usual") from error
-    if before is not None and out is not None:
-        _write_holders(found, before, out, given.sheet, force=force)
+    if jig is not None and out is not None:
+        _write_holders(found, jig, out, given.sheet, force=force)
 
     def words() -> None:
         _print_holders(found)
@@ -213,17 +214,17 @@ def holders(
     return Answer(HoldersResult(found, None if out is None else str(out)), words)
 
 
-def _write_holders(found: Mapping[str, HolderResult], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
+def _write_holders(found: Mapping[str, HolderResult], jig: Path, out: Path, sheet: Path, *, force: bool) -> None:
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import InputError
     from dbbstation.files.formats.jig import HolderSchema, checked_jig, jig_text, read_jig
     from dbbstation.files.provenance import write_table
 
-    old = read_jig(before)
+    old = read_jig(jig)
     unknown = [name for name in found if name not in old.holders]
     if unknown:
         what = f"the jig has no holder {', '.join(unknown)}"
-        raise InputError.of(before, what, f"its holders: {', '.join(old.holders)}")
+        raise InputError.of(jig, what, f"its holders: {', '.join(old.holders)}")
     scatter = {name: float(f"{one.together.s_um:.4g}") for name, one in found.items()}
     holders = {name: HolderSchema.model_construct(repeatability_um=s_um) for name, s_um in scatter.items()}
     new = checked_jig(jig_text(old.model_copy(update={"holders": {**old.holders, **holders}})), str(sheet))
@@ -254,16 +255,18 @@ def _micro(unit: str | None) -> str | None:
 _WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz", "axis", "value", "unit")
 
 
-def _pairs(texts: Sequence[str], option: str, known: Sequence[str] = ()) -> dict[str, str]:
-    found = {}
-    for text in texts:
-        first, has, second = text.partition("=")
-        if not (has and first and second) or (known and first not in known):
-            raise click.UsageError(
-                f"{option} {text}: "
-                + (f"write WHAT=NAME, WHAT is one of {', '.join(known)}" if known else "write LABEL=BALL")
-            )
-        found[first] = second
+def _meanings(texts: Sequence[str]) -> dict[str, str]:
+    found = {what: name for name, what in _pairs(texts, "--columns", "NAME=MEANING")}
+    if unknown := [what for what in found if what not in _WHAT]:
+        raise click.UsageError(f"--columns: {', '.join(unknown)} is no meaning; meanings are {', '.join(_WHAT)}")
+    return found
+
+
+def _pairs(texts: Sequence[str], option: str, form: str) -> list[tuple[str, str]]:
+    found = [(text.rpartition("=")[0], text.rpartition("=")[2]) for text in texts]
+    for text, (first, second) in zip(texts, found, strict=True):
+        if not (first and second):
+            raise click.UsageError(f"{option} {text}: write {form}")
     return found
 
 
@@ -288,7 +291,7 @@ def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str
         name = row.holder or holder
         if not name:
             what = "nothing says which holder this row is of"
-            raise InputError.of(sheet, what, "say it with --columns holder=NAME, or --holder for all", line=row.line)
+            raise InputError.of(sheet, what, "say it with --columns NAME=holder, or --holder for all", line=row.line)
         centre = tuple(1e3 * value for value in row.centre_mm if np.isfinite(value))
         groups.setdefault((name, row.name or row.bore), []).append(centre)
     found: dict[str, list[Any]] = {}

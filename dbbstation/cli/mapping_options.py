@@ -68,7 +68,7 @@ class MappingOptions(AsWritten):
     columns: Annotated[
         tuple[str, ...],
         Option(
-            "Meaning of a column, such as Winkel=angle:deg, Abw=deviation:µm, T1=bar_temp_c:degC or Nr=ignored.",
+            o.COLUMNS,
             metavar="NAME=MEANING:UNIT",
             whole=True,
         ),

@@ -64,7 +64,7 @@ def measure(
     The screen shows what to do, the live reading, the live circle and the first figures. Without options it begins with
     the existing sessions and the choices for a new one. The command waits for Enter, then for the machine, and detects
     start and end of a circle in the readings. Every sample is on the disk within a second. Quitting or Ctrl-C loses no
-    data; the same command continues the session.
+    data; the same command continues the session. --model judges circles by a model, not by the nominal geometry.
 
     \b
     Examples:

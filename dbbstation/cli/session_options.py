@@ -129,11 +129,7 @@ class RecordingOptions(SessionOptions):
     ] = None
     model: Annotated[
         Path | None,
-        Option(
-            "Judge circles by this calibrated model of the machine, not by its nominal geometry.",
-            kind="file",
-            metavar="MODEL.yaml",
-        ),
+        o.MODEL,
     ] = None
     source_files: o.SourcePaths = ()
     # The values of `Order` and `Gate`; a test holds them together, so that no command waits for what those import.

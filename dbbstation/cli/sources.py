@@ -20,17 +20,13 @@ WIDTH = 110
 def sources(
     name: Annotated[str | None, Option("cause.", kind="argument-text")] = None,
     *,
-    machine: Annotated[
-        Path | None,
-        Option(
-            "Machine file or session folder: also print the cause's parameters on this machine, with their usual sizes."
-        ),
-    ] = None,
+    machine: Annotated[Path | None, o.MACHINE] = None,
     source_files: o.SourcePaths = (),
 ) -> Answer:
     r"""List the known causes of error, or describe the cause NAME.
 
     Each has a description, its symptoms in recordings, a way to confirm and to cure it, its equation with source, its needs, and how exactly real machines follow its formula.
+    With --machine (a machine file or a session folder) its parameters on this machine follow, with their usual sizes.
 
     \b
     Examples:

@@ -49,7 +49,7 @@ FEWEST_SAMPLES = 8
 NC_PROGRAM = "an NC program", "dbbstation compensate PROGRAM --model MODEL.yaml --out FILE"
 OTHERS = {
     **dict.fromkeys((".ngc", ".nc", ".tap", ".cnc", ".gcode", ".gc", ".eia", ".mpf"), NC_PROGRAM),
-    ".dmo": ("a CMM sheet", "dbbstation jig sheet SHEET --before OLD.yaml --out NEW.yaml"),
+    ".dmo": ("a CMM sheet", "dbbstation jig sheet SHEET --jig OLD.yaml --out NEW.yaml"),
     ".parquet": ("a table", "dbbstation mismatch TABLE --measured COLUMN --simulated COLUMN"),
 }
 """Files that other commands read: kind and command, by suffix."""

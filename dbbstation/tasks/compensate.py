@@ -109,9 +109,7 @@ def compensate(
     ] = False,
     time_s: o.TimeS = None,
     largest_correction_mm: o.LargestCorrectionMm = LARGEST_CORRECTION_MM,
-    machine: Annotated[
-        File | None, Option("Machine file. The command refuses a machine whose control already corrects.", kind="file")
-    ] = None,
+    machine: Annotated[File | None, replace(o.MACHINE, kind="file")] = None,
     force: o.Force = False,
     known: Mapping[str, ErrorSource] | None = None,
     provenance: Callable[[], Provenance] | None = None,
@@ -126,7 +124,8 @@ def compensate(
     the angles too. The result is right for these values only. Its first lines stop LinuxCNC if other values are active.
 
     The program must be complete (with M2, M30 or percent signs), uncompensated, and made for the model's machine.
-    Travel, feeds and the size of corrections are checked before anything is written.
+    Travel, feeds and the size of corrections are checked before anything is written. With --machine, a machine whose
+    control already corrects is refused.
 
     \b
     Examples:

@@ -57,6 +57,7 @@ ClearanceMm = Annotated[
     float, Option("Height of rapid moves above the first point [mm].", setting="program.clearance_mm", least=0.0)
 ]
 BarStaysOn = Annotated[bool, Option("Start and end with the bar on its balls: no rapids, no stops.")]
+COLUMNS = "Meaning of a column, such as Winkel=angle:deg or Ist_X=x  [default: by the names]."
 CHORD_UM = Option("Greatest distance between a move and the commanded path [µm].", least=0.001, most=1000.0)
 TimeS = Annotated[
     float | None,

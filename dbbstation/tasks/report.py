@@ -43,7 +43,7 @@ def report(
     settings: Settings,
     before: Annotated[File | None, Option("Earlier session for comparison.")] = None,
     model: o.Model | None = None,
-    job: Annotated[str, Option("Job or reason of the measurement; replaces the session's job.")] = "",
+    job: Annotated[str, Option("Job or order number of the measurement.")] = "",
     place: Annotated[
         str, Option("Place of the measurement, which a certificate needs  [with --certificate a terminal asks for it].")
     ] = "",

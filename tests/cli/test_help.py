@@ -90,6 +90,15 @@ def test_each_option_says_what_it_is_for(command):
     assert bare == []
 
 
+def test_one_flag_has_one_text():
+    texts = {}
+    for line in (line for line in LINES if not line.startswith("study")):
+        for option in found(line.split())[0].params:
+            if isinstance(option, click.Option):
+                texts.setdefault(option.opts[0], {}).setdefault(option.help, []).append(line)
+    assert {flag: told for flag, told in texts.items() if len(told) > 1} == {}
+
+
 def test_results_have_a_json_form(command):
     if command.name not in {"simulate", "demo"}:  # these write recordings, tell a story
         assert "--json" in {option for parameter in command.params for option in parameter.opts}

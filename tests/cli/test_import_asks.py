@@ -76,12 +76,12 @@ def test_a_zone_that_nobody_says_is_said_to_be_the_computers(run, tmp_path):
 
 def test_runs_that_turn_round_in_one_file_are_asked_about_and_parted(run, tmp_path):
     file = table(tmp_path / "old.csv", FROM + BACK + FROM)
-    refused = taken(run, file, tmp_path / "s", "--run", "old.csv=a")
+    refused = taken(run, file, tmp_path / "s", "--runs", "old.csv=a")
     assert refused.code == FAILED
     assert "old.csv:362" in refused.err
     assert "--split direction" in refused.err
     done = taken(
-        run, file, tmp_path / "s", "--run", "old.csv=a", "--split", "direction", "--mapping", tmp_path / "m.yaml"
+        run, file, tmp_path / "s", "--runs", "old.csv=a", "--split", "direction", "--mapping", tmp_path / "m.yaml"
     )
     assert done.code == DONE, done.err
     runs, session = runs_of(tmp_path / "s")
@@ -110,10 +110,10 @@ def test_runs_with_pauses_between_them_are_named_in_order(run, tmp_path):
         "--split",
         "gaps",
     ]
-    wrong = run("import", file, *words, "--run", "old.csv=a-ccw,a-cw,b-ccw")
+    wrong = run("import", file, *words, "--runs", "old.csv=a-ccw,a-cw,b-ccw")
     assert wrong.code == FAILED
     assert "the file has 2 runs, and 3 are named" in wrong.err
-    done = run("import", file, *words, "--run", "old.csv=a-ccw,a-cw", "--started", "2026-11-20T07:04Z")
+    done = run("import", file, *words, "--runs", "old.csv=a-ccw,a-cw", "--started", "2026-11-20T07:04Z")
     assert done.code == DONE, done.err
     runs, _ = runs_of(tmp_path / "s")
     assert list(runs) == ["a-ccw-1", "a-cw-1"]

@@ -42,7 +42,7 @@ def table(path, rows, head="angle_deg,deviation_um", *, end="\n", encoding="utf-
 
 def imported(run, file, out, *more):
     words = ["--out", out, *WHERE, *UNKNOWN, *ANGLE, "--zero-mm", "150"]
-    return run("import", file, *words, "--run", f"{file.name}=a-ccw", "--yes", *more)
+    return run("import", file, *words, "--runs", f"{file.name}=a-ccw", "--yes", *more)
 
 
 def test_german_tables_are_a_session_with_the_circular_deviation_of_their_ellipse(run, tmp_path):
@@ -138,7 +138,7 @@ def test_a_mapping_is_kept_for_the_next_time_and_decides_then(run, tmp_path):
     assert imported(run, file, tmp_path / "s", "--mapping", mapping).code == DONE
     assert run("check", mapping).code == DONE
     again = run(
-        "import", file, "--out", tmp_path / "t", *WHERE, *UNKNOWN, "--mapping", mapping, "--run", "old.csv=a", "--yes"
+        "import", file, "--out", tmp_path / "t", *WHERE, *UNKNOWN, "--mapping", mapping, "--runs", "old.csv=a", "--yes"
     )
     assert again.code == DONE, again.err
     one, other = ((tmp_path / name / "runs" / "a-ccw-1.csv").read_bytes() for name in ("s", "t"))
@@ -180,7 +180,7 @@ def test_options_say_how_numbers_are_written_before_the_shop_and_not_beside_a_ma
     rows = [f"{a:.1f};{d:.4f}".replace(".", ",") for a, d in zip(ANGLES, ellipse(), strict=True)]
     file, shop = table(tmp_path / "old.csv", rows, "angle_deg;deviation_um"), settings(tmp_path, ".", ",")
     known = ["--settings", shop]
-    words = ["--out", tmp_path / "s", *WHERE, *UNKNOWN, *ANGLE, "--zero-mm", "150", "--run", "old.csv=a-ccw", "--yes"]
+    words = ["--out", tmp_path / "s", *WHERE, *UNKNOWN, *ANGLE, "--zero-mm", "150", "--runs", "old.csv=a-ccw", "--yes"]
     refused = run(*known, "import", file, *words)
     assert (refused.code, "--decimal and --separator say otherwise" in refused.err) == (FAILED, True)
     assert run(*known, "import", file, *words, "--decimal", ",").code == DONE
@@ -253,8 +253,8 @@ def test_other_faults_of_words_are_answered(run, tmp_path):
     rows = _rows(lambda a, d: zip(a, d, strict=True))
     file = table(tmp_path / "old.csv", rows)
     words = ["import", file, "--out", tmp_path / "s", *WHERE, *UNKNOWN, *ANGLE, "--yes"]
-    assert "no run of the plan" in run(*words, "--zero-mm", "150", "--run", "old.csv=zz-ccw").err
-    assert "names 0 of the files" in run(*words, "--zero-mm", "150", "--run", "new.csv=a").err
+    assert "no run of the plan" in run(*words, "--zero-mm", "150", "--runs", "old.csv=zz-ccw").err
+    assert "names 0 of the files" in run(*words, "--zero-mm", "150", "--runs", "new.csv=a").err
     assert "nothing says which test" in run(*words, "--zero-mm", "150").err
     assert "--columns angel=angle:deg: the columns are" in run(*words, "--columns", "angel=angle:deg").err
     assert "write NAME=MEANING" in run(*words, "--columns", "angle_deg=angle:mm").err

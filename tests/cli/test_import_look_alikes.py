@@ -146,7 +146,7 @@ def test_runs_with_a_head_of_their_own_are_parted_and_raw_data_need_no_edit(run,
     second = "Run 2 CW\nDate: 20.11.2026 08:10\nAngle (deg),Deviation (um)\n" + back
     file = tmp_path / "old.csv"
     file.write_text("Ballbar export\nDate: 20.11.2026 08:04\n" + TITLED + "\n" + second, encoding="utf-8")
-    done = taken(run, file, tmp_path / "s", "--run", "old.csv=a-ccw,a-cw", "--split", "gaps", "--zone", "+01:00")
+    done = taken(run, file, tmp_path / "s", "--runs", "old.csv=a-ccw,a-cw", "--split", "gaps", "--zone", "+01:00")
     assert done.code == DONE, done.err
     found = run("circles", tmp_path / "s", "--json").data["runs"]
     assert [one["direction"] for one in found] == ["ccw", "cw"]
@@ -157,7 +157,7 @@ def test_a_table_parted_by_spaces_is_read_with_its_mapping_again(run, tmp_path):
     file = tmp_path / "old.csv"
     file.write_bytes(UNDERSTOOD["columns of fixed width"])
     assert imported(run, file, tmp_path / "s", "--mapping", tmp_path / "m.yaml").code == DONE
-    words = ["--out", tmp_path / "t", *WHERE, *UNKNOWN, "--run", "old.csv=a-ccw", "--yes"]
+    words = ["--out", tmp_path / "t", *WHERE, *UNKNOWN, "--runs", "old.csv=a-ccw", "--yes"]
     again = run("import", file, *words, "--mapping", tmp_path / "m.yaml")
     assert again.code == DONE, again.err
 

@@ -17,7 +17,7 @@ CMM = FIXTURES / "cmm"
 
 
 def sheet(run, path, out, *more):
-    return run("jig", "sheet", path, "--before", PLATE, "--out", out, *more)
+    return run("jig", "sheet", path, "--jig", PLATE, "--out", out, *more)
 
 
 @pytest.mark.parametrize("unit", [("mm", 1.0), ("µm", 1e-3), ("inch", 25.4), ("m", 1e3)])
@@ -30,7 +30,7 @@ def test_a_sheet_of_a_jigs_own_balls_gives_that_jig(run, tmp_path, unit):
     ]
     table = tmp_path / "cmm.csv"
     table.write_text("Bore,Holder,X,Y,Z,U\n" + "\n".join(lines) + "\n", encoding="utf-8")
-    words = ["--unit", name, "--columns", "u=U", "--coverage", "2", "--cmm-temp-c", "20.1"]
+    words = ["--unit", name, "--columns", "U=u", "--coverage", "2", "--cmm-temp-c", "20.1"]
     done = sheet(run, table, tmp_path / "new.yaml", *words)
     assert done.code == DONE, done.err
     new = read_jig(tmp_path / "new.yaml")
@@ -45,7 +45,7 @@ def test_a_sheet_of_a_jigs_own_balls_gives_that_jig(run, tmp_path, unit):
 
 
 def test_a_table_with_units_and_decimal_commas_and_dmis_are_the_same_sheet(run, tmp_path):
-    table = sheet(run, CMM / "plate.csv", tmp_path / "a.yaml", "--columns", "u=U (k=2)", "--coverage", "2", "--json")
+    table = sheet(run, CMM / "plate.csv", tmp_path / "a.yaml", "--columns", "U (k=2)=u", "--coverage", "2", "--json")
     dmis = sheet(run, CMM / "plate.dmo", tmp_path / "b.yaml", "--u-um", "0.8", "--json")
     assert (table.code, dmis.code) == (DONE, DONE), table.err + dmis.err
     assert table.data["balls"] == dmis.data["balls"]
@@ -62,7 +62,7 @@ def test_a_table_with_units_and_decimal_commas_and_dmis_are_the_same_sheet(run, 
 def test_uncertainties_of_three_axes_become_their_root_mean_square(run, tmp_path):
     table = tmp_path / "cmm.csv"
     table.write_text("ball,x,y,z,a,b,c\n9-short,0,0,0,1e-3,2e-3,2e-3\n4-short,-100,-100,0,3e-3,0,0\n", encoding="utf-8")
-    words = [word for one in ("ux=a", "uy=b", "uz=c") for word in ("--columns", one)]
+    words = [word for one in ("a=ux", "b=uy", "c=uz") for word in ("--columns", one)]
     assert sheet(run, table, tmp_path / "new.yaml", *words, "--coverage", "1").code == DONE
     balls = read_jig(tmp_path / "new.yaml").balls
     assert [ball.uncertainty_um for ball in balls.values()] == pytest.approx([3.0**0.5, 3.0**0.5])
@@ -126,7 +126,7 @@ def test_dmis_points_in_inch_with_other_names(run, tmp_path):
 
 def test_ten_mountings_in_three_bores_go_into_the_jig(run, tmp_path):
     """Made with the scatter of [CAL III-B], 0.58 and 1.85 µm per axis: the truth lies in both intervals of this draw."""
-    done = run("jig", "holders", CMM / "mountings.csv", "--before", PLATE, "--out", tmp_path / "new.yaml", "--json")
+    done = run("jig", "holders", CMM / "mountings.csv", "--jig", PLATE, "--out", tmp_path / "new.yaml", "--json")
     assert done.code == DONE, done.err
     for name, truth in (("short", 0.58), ("long", 1.85)):
         found = done.data["holders"][name]
@@ -147,18 +147,17 @@ def test_bad_words_and_tables_of_mountings_are_answered(run, tmp_path):
     table.write_text("bore,x,y,z\n9,0,0,0\n4,1,1,1\n", encoding="utf-8")
     assert "which holder" in run("jig", "holders", table).err
     assert "each place has one mounting only" in run("jig", "holders", table, "--holder", "short").err
-    assert run("jig", "holders", table, "--holder", "short", "--before", PLATE).code == USAGE
-    assert run("jig", "holders", table, "--columns", "colour=x").code == USAGE
+    assert run("jig", "holders", table, "--holder", "short", "--jig", PLATE).code == USAGE
+    assert run("jig", "holders", table, "--columns", "x=colour").code == USAGE
     table.write_text("bore,x,y,z\n9,0,0,0\n9,1e-3,0,0\n", encoding="utf-8")
-    other = run("jig", "holders", table, "--holder", "oak", "--before", PLATE, "--out", tmp_path / "n.yaml")
+    other = run("jig", "holders", table, "--holder", "oak", "--jig", PLATE, "--out", tmp_path / "n.yaml")
     assert other.code == FAILED
     assert "the jig has no holder oak" in other.err
     (tmp_path / "n.yaml").write_text("mine", encoding="utf-8")
     assert (
-        "--force"
-        in run("jig", "holders", table, "--holder", "short", "--before", PLATE, "--out", tmp_path / "n.yaml").err
+        "--force" in run("jig", "holders", table, "--holder", "short", "--jig", PLATE, "--out", tmp_path / "n.yaml").err
     )
-    assert run("jig", "sheet", CMM / "plate.dmo", "--before", PLATE, "--out", tmp_path / "n.yaml").code == FAILED
+    assert run("jig", "sheet", CMM / "plate.dmo", "--jig", PLATE, "--out", tmp_path / "n.yaml").code == FAILED
 
 
 def long_sheet(tmp_path, text, name="plate_chr.txt"):
@@ -218,7 +217,7 @@ def test_uncertainties_have_a_unit_of_their_own(run, tmp_path, head, more):
     table = tmp_path / "cmm.csv"
     table.write_text(f"{head}\n9-short,0,0,0,1.6\n4-short,-100,-100,0,1.6\n", encoding="utf-8")
     column = head.splitlines()[0].split(",")[-1]
-    words = ["--columns", f"u={column}", "--coverage", "2"]
+    words = ["--columns", f"{column}=u", "--coverage", "2"]
     done = sheet(run, table, tmp_path / "new.yaml", *words, *more)
     assert done.code == DONE, done.err
     assert [one.uncertainty_um for one in read_jig(tmp_path / "new.yaml").balls.values()] == pytest.approx([0.8, 0.8])
@@ -227,7 +226,7 @@ def test_uncertainties_have_a_unit_of_their_own(run, tmp_path, head, more):
 def test_a_unit_of_uncertainties_that_nobody_says_is_refused_where_no_cmm_has_it(run, tmp_path):
     table = tmp_path / "cmm.csv"
     table.write_text("ball,x,y,z,U\n9-short,0,0,0,1.6\n4-short,-100,-100,0,1.6\n", encoding="utf-8")
-    done = sheet(run, table, tmp_path / "new.yaml", "--columns", "u=U", "--coverage", "2")
+    done = sheet(run, table, tmp_path / "new.yaml", "--columns", "U=u", "--coverage", "2")
     assert done.code == FAILED
     assert "cmm.csv:2" in done.err
     assert "--u-unit" in done.err

@@ -258,7 +258,7 @@ def test_a_long_name_is_not_echoed(tmp_path):
         ("plan.yaml", 10_000_001, ["check"]),
         ("drive.csv", 200_000_001, ["identify"]),
         ("table.csv", 200_000_001, ["mismatch", "--measured", "a", "--simulated", "b"]),
-        ("sheet.dmo", 20_000_001, ["jig", "sheet", "--before", "j.yaml", "--u-um", "1", "--out", "o.yaml"]),
+        ("sheet.dmo", 20_000_001, ["jig", "sheet", "--jig", "j.yaml", "--u-um", "1", "--out", "o.yaml"]),
         ("own.py", 1_000_001, ["sources", "--source-files"]),
         ("run.csv", 2_000_000_001, ["check"]),
     ],

@@ -37,7 +37,7 @@ BAR = Bar("DBB-0042", 150.0003, 0.0003, NOW, 20.0, 10.0, 10.0, 150.0023, 0.3, "Z
 PLATE = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
 UNDER_SPINDLE = read_plan(shipped_folder("protocols") / "plans" / "conventional.yaml")
 CALIBRATOR = ["--calibrator-serial", "ZB-17", "--calibrator-mm", "150.0003", "--calibrator-u-um", "0.25"]
-CALIBRATOR += ["--certified", "2026-03-01", "--temp-c", "20.3", "--serial-number", "DBB-0042"]
+CALIBRATOR += ["--certified", "2026-03-01", "--temp-c", "20.3", "--bar-serial-number", "DBB-0042"]
 
 
 def test_the_bar_is_read_from_an_instrument_and_kept(tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[Table
     ball_name, unit_name = _named(table, columns, "ball", _BALL, but=axis_name), _named(table, columns, "unit", _UNIT)
     if axis_name is None or value_name is None or ball_name is None:
         what = "no column says which ball a row is"
-        raise InputError.of(table.file, what, "name the column with --columns ball=NAME", line=table.header)
+        raise InputError.of(table.file, what, "name the column with --columns NAME=ball", line=table.header)
     faults: list[Problem] = []
     names = {"axis": axis_name, "value": value_name, "ball": ball_name, "unit": unit_name, "u": columns.get("u")}
     balls = _gathered(table, names, unit, faults)

@@ -92,13 +92,13 @@ def read_sheet(
     faults = [
         missing_column(name, table.names, str(path), table.header) for name in found.values() if name not in table.names
     ]
-    remedy = f"say which with --columns {missing[0] if missing else 'x'}=NAME; columns here: {', '.join(table.names)}"
+    remedy = f"say which with --columns NAME={missing[0] if missing else 'x'}; columns here: {', '.join(table.names)}"
     faults += [Problem(str(path), table.header, 0, f"no column is taken for {key}", remedy) for key in missing]
     if "ball" not in found and not ({"bore"} if of_one_holder else {"bore", "holder"}) <= set(found):
         what = "no column says which ball a row is"
         faults.append(
             Problem(
-                str(path), table.header, 0, what, "name the column with --columns ball=NAME, or with bore and holder"
+                str(path), table.header, 0, what, "name the column with --columns NAME=ball, or with bore and holder"
             )
         )
     of_u = [key for key in ("u", "ux", "uy", "uz") if key in found]
@@ -158,11 +158,11 @@ def jig_of_sheet(
                     one.line,
                     0,
                     what,
-                    "give --u-um, the standard uncertainty of a coordinate, or name the column of them: --columns u=NAME",
+                    "give --u-um, the standard uncertainty of a coordinate, or name the column of them: --columns NAME=u",
                 )
             )
         elif not all(map(math.isfinite, one.centre_mm)):
-            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "name the column: --columns z=NAME"))
+            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "name the column: --columns NAME=z"))
         else:
             x, y, z = (float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
             balls[name] = BallSchema.model_construct(

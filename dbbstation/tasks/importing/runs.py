@@ -166,7 +166,7 @@ class Reader:
             again = ", ".join(map(str, table.repeated))
             what = f"the names of the columns come again in line {again}: more than one run"
             self._fault(
-                table.table.file, table.repeated[0], what, "say --split gaps, and --run FILE=a-ccw,a-cw in their order"
+                table.table.file, table.repeated[0], what, "say --split gaps, and --runs FILE=a-ccw,a-cw in their order"
             )
             return []
         if self.mapping.split == "gaps":
@@ -206,7 +206,7 @@ class Reader:
         angle = values.pop(ANGLE, None)
         if name.test not in self.plan.tests:
             what = f"the plan has no test {name.test}" if name.test else "nothing says which test of the plan this is"
-            self._fault(file, line, what, f"its tests: {', '.join(self.plan.tests)}; say --run FILE=TEST-DIRECTION")
+            self._fault(file, line, what, f"its tests: {', '.join(self.plan.tests)}; say --runs FILE=TEST-DIRECTION")
             return None
         direction = name.direction
         if direction is None and angle is not None and self.mapping.angle and self.mapping.angle.grows != "travel":
@@ -220,7 +220,7 @@ class Reader:
                 if direction is None
                 else f"the plan has no {name.test} {direction}"
             )
-            self._fault(file, line, what, f"say --run FILE={name.test}-ccw or -cw")
+            self._fault(file, line, what, f"say --runs FILE={name.test}-ccw or -cw")
             return None
         circle = planned.run(direction)
         try:

@@ -1,4 +1,4 @@
-"""What `measure` was asked for."""
+"""The options of `measure`."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Asked:
             raise click.UsageError(f"missing {', '.join(missing)}; --virtual on a terminal needs none of them")
 
     def job(self) -> tuple[Job, Protocol]:
-        """Return what is measured, for a machine in real time, and the instrument's protocol; `require` comes first.
+        """Return the job for a machine in real time, and the instrument's protocol. Call `require` first.
 
         Raises:
             StationError: every fault of the files and of the instrument's name.
@@ -91,7 +91,7 @@ class Asked:
         return job, protocol
 
     def read_by(self, protocol: Protocol) -> ReadBy:
-        """Return what a session notes of the instrument."""
+        """Return the session's note on the instrument."""
         from dbbstation.files.formats.session import ReadBy
 
         return ReadBy(protocol.name, self.line.profile or "", self.line.port, is_virtual(self.line.port))

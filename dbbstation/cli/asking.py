@@ -1,4 +1,4 @@
-"""Ask for missing options on a terminal; in a pipe, refuse once with all their names."""
+"""Ask for missing options on a terminal; in a pipe, name all of them in one error."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Asker:
         self._missing: list[str] = []
 
     def text(self, question: str, option: str, choices: Sequence[str] = (), default: str | None = None) -> str:
-        """Return an answer; empty if none is possible, which `check` refuses.
+        """Return an answer; without a terminal return an empty text, which `check` refuses.
 
         Args:
             option: equivalent on the command line.
@@ -41,11 +41,11 @@ class Asker:
         )
 
     def give(self, option: str, why: str) -> None:
-        """Require an option that no answer can replace; `check` refuses, on a terminal too."""
+        """Note that an option is required which no answer can replace; `check` then refuses, even on a terminal."""
         self._missing.append(f"{option} ({why})")
 
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
-        """Return a number; None if none is possible or known."""
+        """Return a number; None if it is unknown or cannot be asked."""
         if not self.terminal:
             self.text(question, option)
             return None

@@ -1,4 +1,4 @@
-"""`dbbstation bar`: read the bar on its calibrator, and keep what it read."""
+"""`dbbstation bar`: measure the bar on its calibrator, and keep its length."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class BarOptions:
-    """The bar that is read, by the keys of its file."""
+    """Facts of the bar, by the keys of its file."""
 
     serial_number: Annotated[str, Option("Serial number of the bar.", flag="--bar-serial-number")]
     temp_c: Annotated[float, Option("Temperature of the bar [degC].", least=-30.0, most=80.0)]
@@ -42,7 +42,7 @@ class BarOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class CalibratorOptions:
-    """The calibrator."""
+    """Facts of the calibrator."""
 
     calibrator_serial: Annotated[str, Option("Serial number of the calibrator.")]
     calibrator_mm: Annotated[
@@ -59,7 +59,7 @@ class CalibratorOptions:
 
     @property
     def data(self) -> dict[str, object]:
-        """Return it by the keys of the bar's file."""
+        """Return the calibrator's facts by the keys of the bar's file."""
         return {
             "serial_number": self.calibrator_serial,
             "length_mm": self.calibrator_mm,

@@ -22,7 +22,7 @@ MA_PER_A = 1e3
 
 
 def print_currents(currents: CurrentsFigures | None) -> None:
-    """Print drives, centre of gravity by channel and notes of motor currents."""
+    """Print drives, centre of gravity and notes of motor currents."""
     if currents is None:
         return
     echo()
@@ -62,14 +62,14 @@ def _with_uncertainty(number: Value | None) -> tuple[str, str]:
 
 
 IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
-"""Sources with a row for each motor in place of one for each parameter."""
+"""Sources with one row per motor instead of one per parameter."""
 
 IN_MM = frozenset({"cog-shift"})
-"""Sources whose lengths are no deviations of the tool."""
+"""Sources whose lengths are not errors of the tool."""
 
 
 def show(result: CalibrationResult) -> None:
-    """Print the parameters, and what the fit leaves."""
+    """Print the parameters and the residual of the fit."""
     from dbbstation.cli.figures import print_runs
 
     print_runs(result.runs)

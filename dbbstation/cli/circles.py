@@ -24,7 +24,7 @@ def show(
     findings: bool,
     budget: Annotated[bool, Option("Print the uncertainty budget of every figure, term by term.")] = False,
 ) -> None:
-    """Print the figures, and what else was asked for."""
+    """Print the figures and other requested results."""
     _print(result, several=len(sessions) > 1)
     if budget:
         _print_budgets(result)

@@ -1,4 +1,4 @@
-"""`dbbstation control`: the correction inside a control."""
+"""`dbbstation control`: correct a machine inside its control."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ModelOptions:
     machine: Annotated[Path | None, replace(o.MACHINE, kind="file")] = None
 
     def written(self, task: Callable[..., _Result], out: Path, **given: Any) -> _Result:  # noqa: ANN401 - as the task has it
-        """Return what a task writes, its notes told."""
+        """Return the result of a task, and print its notes."""
         from datetime import UTC, datetime
 
         from dbbstation.files.own_sources import every_source

@@ -1,4 +1,4 @@
-"""Commands made of tasks: options from the signature; then run, write and print."""
+"""Make commands from tasks: the signature gives the options; the command runs the task, writes and prints."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 class Finite(click.FloatRange):
     """A finite number, with a range as of `click.FloatRange`.
 
-    `nan` is in every range, and `inf` in open ones.
+    Without this check, click accepts `nan` in every range, and `inf` in open ones.
     """
 
     def __init__(self, *limits: Any, **more: Any) -> None:  # noqa: ANN401 - as click has it
@@ -97,7 +97,7 @@ class CommandOutput:
 
 
 def figure(said: str = "") -> CommandOutput:
-    """Return `--figure FILE`: what the result draws."""
+    """Return the option `--figure FILE` for the result's figure."""
     return CommandOutput("figure", write=_draw, said=said, check=known_format)
 
 
@@ -115,7 +115,7 @@ def command(
     remarks: Callable[[Any], Iterable[str]] = lambda _result: (),
     more: Callable[[], Mapping[str, object]] = dict,
 ) -> click.Command:
-    """Make a command of a task.
+    """Make a command from a task.
 
     Args:
         show: prints the result; its parameters with an `Option` are options too, others are the task's.
@@ -158,13 +158,13 @@ def command(
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command answers: data for `--json`, else lines, or a function that prints."""
+    """The answer of a command: data for `--json`, and lines or a function that prints."""
 
     data: Any
     words: Sequence[str] | Callable[[], None]
 
     def tell(self, *, as_json: bool) -> None:
-        """Print it."""
+        """Print the answer."""
         from dbbstation.cli.output import echo, print_json, print_result
 
         if as_json:
@@ -179,9 +179,9 @@ class Answer:
 def made(
     name: str = "", group: click.Group | None = None, kind: type[click.Command] = click.Command
 ) -> Callable[[Callable[..., Any]], click.Command]:
-    """Make a command of a function; its options are parameters with an `Option`, and fields of a dataclass with such.
+    """Make a command from a function. Its options are parameters with an `Option`, and such fields of a dataclass.
 
-    One that returns an `Answer` has `--json`, too.
+    A command that returns an `Answer` also has `--json`.
 
     Args:
         name: empty: the function's.
@@ -228,7 +228,7 @@ def _checked(one: TaskParameter) -> click.Parameter:
 
 
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
-    """Run a task beside its progress bar; an `ArgumentError` becomes a usage error with the option's name."""
+    """Run a task with its progress bar; an `ArgumentError` becomes a usage error that names the option."""
     from dbbstation.cli.output import say
     from dbbstation.cli.provenance import provenance
 

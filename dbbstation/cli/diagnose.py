@@ -1,4 +1,4 @@
-"""`dbbstation diagnose`: which physics a calibration leaves out."""
+"""`dbbstation diagnose`: find the physics that a calibration leaves out."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 
 MOST_CAUSES = 4
-"""Causes whose circles are listed beside the measured ones; the JSON has all."""
+"""Greatest number of causes whose circles are listed; the JSON has all."""
 
 
 def print_effects(effects: Sequence[CauseEffect]) -> None:
-    """Print causes and cures by contribution, and G measured and without each."""
+    """Print causes and cures by contribution, and G as measured and without each cause."""
     if not effects:
         echo("\nno cause contributes to these circles")
         return
@@ -85,7 +85,7 @@ EFFECTS = "Rank causes by their contribution to the circles, with cures and the 
 
 
 def show(result: DiagnosisResult, *, effects: Annotated[bool, Option(EFFECTS)] = False) -> None:
-    """Print what was found, and with `effects` what each cause contributes."""
+    """Print the findings, and with `effects` the contribution of each cause."""
     _print(result)
     if effects:
         print_effects(result.effects)
@@ -102,7 +102,7 @@ def _write(result: DiagnosisResult, path: Path, *, force: bool) -> None:
 
 
 UNPREDICTABLE_UM = 1000.0
-"""A prediction that is off by more says that nothing was predicted [µm]."""
+"""Error above which a prediction is printed as impossible [µm]."""
 
 
 def _print(result: DiagnosisFigures) -> None:
@@ -158,7 +158,7 @@ def _print_workspace(elsewhere: WorkspaceError) -> None:
 
 
 MOST_POINTS = 12
-"""Points of a curve that are printed, at the most; a wave has many more, and its size and period are printed."""
+"""Greatest number of printed points of a curve; a wave has more, so its size and period are printed."""
 
 
 def _print_curve(curve: Curve) -> None:

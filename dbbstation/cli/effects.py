@@ -16,23 +16,23 @@ if TYPE_CHECKING:
     from dbbstation.inference.verdict import Gains
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")
-"""Verdicts of effects that the recording shows for sure."""
+"""Verdicts of effects that the recording proves."""
 
 LIKELY = 0.5
-"""Probability from which on an effect that is not certain is printed; all of them are in the JSON."""
+"""Least probability of an uncertain effect that is printed; the JSON has all."""
 
 MOST_NAMES = 6
-"""Names that are printed in a row."""
+"""Greatest number of names that are printed in a row."""
 
 
 def first_names(names: Sequence[str]) -> str:
-    """Return the first names and the count of others."""
+    """Return a list of names as text: the first ones, and the count of the others."""
     shown = ", ".join(names[:MOST_NAMES])
     return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
 
 
 def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
-    """Return the count of held-out parts with gain; empty if other parts cannot show it."""
+    """Return the count of held-out parts with gain as text; empty if other parts cannot confirm it."""
     return gains.counted if gains is not None and acts == "always" else ""
 
 

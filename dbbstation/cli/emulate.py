@@ -1,4 +1,4 @@
-"""`dbbstation instrument emulate`: a virtual machine with a bar, on a line of its own."""
+"""`dbbstation instrument emulate`: run a virtual machine with a bar on a separate line."""
 
 from __future__ import annotations
 

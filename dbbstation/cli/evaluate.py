@@ -1,4 +1,4 @@
-"""`dbbstation evaluate`: circle by circle, what a model leaves of recordings."""
+"""`dbbstation evaluate`: the residual of recordings under a model, circle by circle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def show(result: EvaluationResult) -> None:
-    """Print what the model leaves, and tolerances."""
+    """Print the residual of the model, and the tolerances."""
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.tolerances import print_tolerances
 

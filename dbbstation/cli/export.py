@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def show(result: ExportResult) -> None:
-    """Print what was written."""
+    """Print the written file."""
     echo_line(f"{result.rows} rows of {result.runs} runs written to {result.table}")
 
 

@@ -20,7 +20,7 @@ def format_of(path: Path) -> Stamped:
 
 
 def known_format(path: Path) -> Path:
-    """Return a path whose extension is a format, before any work.
+    """Return a path after checking its extension, before any work.
 
     Raises:
         ValueError: the name ends otherwise.

@@ -16,8 +16,8 @@ G_LOW_PASSED = (
     "G: greatest minus least deviation from the least-squares circle [ISO 230-4], readings low-passed at 30 undulations "
     "per revolution"
 )
-"""What a table means by circular deviation G. Of a good circle the first is mostly noise, about six times its standard
-deviation; only the second can be held against a prediction, which has no noise."""
+"""Two definitions of circular deviation G in tables. In a good circle the first is mostly noise, about six times its
+standard deviation. Only the second is comparable with a prediction, which has no noise."""
 
 
 def print_runs(runs: Sequence[EvaluatedRun], *, low_passed: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""`dbbstation fleet`: the same task on many sessions, and which machines are unlike their sisters."""
+"""`dbbstation fleet`: run one task on many sessions, and compare the machines."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ONLY_OF = {
     "law_over_time": ("calibrate",),
     "findings": ("circles",),
 }
-"""Tasks that take an option; the others have none such."""
+"""Tasks that have an option; other tasks refuse it."""
 
 
 @made()

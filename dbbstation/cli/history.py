@@ -1,4 +1,4 @@
-"""`dbbstation history`: a folder of sessions as trends, and what changed beyond uncertainty."""
+"""`dbbstation history`: trends of a folder of sessions, and changes beyond uncertainty."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.results.history import HistoryResult, MachineHistoryResult, QuantityHistory
 
 MOST_NOTES = 12
-"""Notes that the terminal shows; `--json` and `--page` have all."""
+"""Greatest number of notes on the terminal; `--json` and `--page` have all."""
 
 
 def show(found: HistoryResult) -> None:

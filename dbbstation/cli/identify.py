@@ -1,4 +1,4 @@
-"""`dbbstation identify`: mass and friction of one strut drive, and what a model of these leaves out."""
+"""`dbbstation identify`: mass and friction of a strut drive, and physics beyond them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def show(result: DriveResult) -> None:
-    """Print what was identified."""
+    """Print the identified physics."""
     _print_if_worse(result.held_out_rms_n)
     echo("\n".join((*result.sentences(), "")))
     if result.mismatch:

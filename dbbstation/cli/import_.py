@@ -1,4 +1,4 @@
-"""`dbbstation import`: recordings made elsewhere, as a session."""
+"""`dbbstation import`: import other programs' recordings as a session."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.tasks.importing.runs import ImportedRun, Reader
 
 CONDITIONS = ("temperature", "operator", "job", "bar")
-"""What a session notes and no table says."""
+"""Conditions that a session notes and tables lack."""
 
 
 @made("import")

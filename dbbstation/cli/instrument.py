@@ -1,4 +1,4 @@
-"""`dbbstation instrument`: what concerns length instruments."""
+"""`dbbstation instrument`: commands for length instruments."""
 
 from __future__ import annotations
 

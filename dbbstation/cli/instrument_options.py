@@ -1,4 +1,4 @@
-"""Options of real instruments: which, where, line rate."""
+"""Options of real instruments: name, port, baud rate."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ Spy = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class ProtocolOptions:
-    """An instrument; the name is required unless set by the shop."""
+    """Options of an instrument; the name is required unless the shop's settings have it."""
 
     instrument: Annotated[str, replace(INSTRUMENT, required=True)] = ""
     profile: Annotated[str | None, PROFILE] = None
     zero_mm: Annotated[float | None, ZERO_MM] = None
 
     def protocol(self, *, bar_length_mm: float | None = None) -> Protocol:
-        """Return its protocol.
+        """Return the instrument's protocol.
 
         Args:
             bar_length_mm: zero of a relative one, if no other is given.
@@ -71,7 +71,7 @@ class ProtocolOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class LineOptions(ProtocolOptions):
-    """An instrument on a line; the port is required unless set by the shop."""
+    """Options of an instrument on a line; the port is required unless the shop's settings have it."""
 
     port: Annotated[str, replace(PORT, required=True)] = ""
     baud: Baud = None
@@ -79,7 +79,7 @@ class LineOptions(ProtocolOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class OpenLine(LineOptions):
-    """The same where nothing is required."""
+    """The same options, none required."""
 
     instrument: Annotated[str, INSTRUMENT] = ""
     port: Annotated[str, PORT] = ""

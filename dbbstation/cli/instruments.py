@@ -53,12 +53,12 @@ def instruments(
 
 
 EXAMPLE_MM = 150.00031
-"""Length of the example frame [mm]; the greatest length if a display is shorter."""
+"""Length in the example frame [mm]; a display with a smaller range shows its greatest length."""
 
 NO_CHECKSUM = (
     "none: damage shows only by parity, by how numbers are written, and where the feed does not allow a length"
 )
-"""What stands in for a checksum."""
+"""Text about lines without a checksum."""
 
 
 def _details(protocol: Protocol, profiles: list[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""`dbbstation jig`: the jig file from what a coordinate measuring machine found."""
+"""`dbbstation jig`: make the jig file from measurements of a CMM."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _Unit = Literal["mm", "µm", "um", "m", "inch", "mil", "µinch"]
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions(AsWritten):
-    """A sheet and how it is written."""
+    """Options of a sheet and its format."""
 
     sheet: Annotated[Path, Option("sheet of the CMM.", kind="argument", metavar="SHEET")]
     columns: Annotated[
@@ -44,7 +44,7 @@ class SheetOptions(AsWritten):
     def read(
         self, coverage: float | None, u_unit: str | None = None, *, of_one_holder: bool = False
     ) -> Sequence[Measured]:
-        """Return the rows; arguments as of `read_sheet`."""
+        """Return the rows; arguments as for `read_sheet`."""
         from dbbstation.files.formats.number_language import number_language
         from dbbstation.files.recordings.cmm_sheet import read_sheet
 

@@ -1,4 +1,4 @@
-"""Groups that import only the called command, so that `--help` stays quick."""
+"""Command groups that import only the called command, so that `--help` is fast."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Utf8(StringParamType):
 
 
 def in_utf8(command: click.Command) -> click.Command:
-    """Let a command, or every command of a group, refuse texts that are no UTF-8."""
+    """Let a command, or every command of a group, refuse texts that are not UTF-8."""
     for inner in command.commands.values() if isinstance(command, click.Group) else ():
         in_utf8(inner)
     for parameter in command.params:
@@ -46,7 +46,7 @@ def in_utf8(command: click.Command) -> click.Command:
 
 
 def made_ready(command: click.Command) -> click.Command:
-    """Let a command keep the log, refuse texts that are no UTF-8, and show its examples unwrapped."""
+    """Let a command keep the log, refuse texts that are not UTF-8, and show its examples unwrapped."""
     # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
     command.help = (command.help or "").replace(r"\b", "\b")
     return attended(in_utf8(command))

@@ -1,6 +1,6 @@
 """The log of commands for service: request, versions, inputs, messages, end.
 
-One file in the user's log folder, rotated at a size. Events of a measurement are in the session's own log.
+The log is one file in the user's log folder, rotated by size. Events of a measurement are in the session's own log.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ VARIABLE = "DBBSTATION_LOG"
 """Environment variable that names another file; `off` for none."""
 
 LARGEST_BYTES, KEPT = 1_000_000, 3
-"""A log is turned over at this size, and so many older ones are kept: some thousand commands, 4 MB in all."""
+"""Size at which the log is rotated [bytes], and number of older files: some thousand commands, 4 MB in all."""
 
 _VERSIONS = ("numpy", "scipy", "numba", "matplotlib", "pydantic", "pyserial", "textual")
-"""Packages whose version decides what a fault means."""
+"""Packages whose versions matter for a fault."""
 
 
 class _Printable(logging.Formatter):
@@ -53,7 +53,7 @@ _FORM = _Printable("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%
 
 
 def attended(command: click.Command) -> click.Command:
-    """Let a command, or every command of a group, keep the log once."""
+    """Let a command, or every command of a group, write the log once."""
     for inner in command.commands.values() if isinstance(command, click.Group) else ():
         attended(inner)
     callback = command.callback

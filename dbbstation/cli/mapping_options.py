@@ -1,4 +1,4 @@
-"""Options on the meaning of foreign columns, and their mapping."""
+"""Options for the meaning of foreign columns, and their mapping."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def shops_numbers() -> NumberLanguage | None:
     """Return the number format of the shop's settings, with a note; None if not set.
 
-    For commands in which a file decides first.
+    This is for commands in which a file overrides the settings.
     """
     from dbbstation.files.formats.number_language import number_language
 
@@ -44,7 +44,7 @@ def shops_numbers() -> NumberLanguage | None:
 
 @dataclass(frozen=True, kw_only=True)
 class AsWritten:
-    """How tables are written; None if not given."""
+    """Options for the format of tables; None if not given."""
 
     decimal: Annotated[Literal[".", ","] | None, Option(o.DECIMAL)] = None
     separator: Annotated[
@@ -59,7 +59,7 @@ class AsWritten:
 
 @dataclass(frozen=True, kw_only=True)
 class MappingOptions(AsWritten):
-    """What columns mean; None or empty if not given."""
+    """Options for the meaning of columns; None or empty if not given."""
 
     mapping: Annotated[
         Path | None,
@@ -114,15 +114,15 @@ class MappingOptions(AsWritten):
 
     @property
     def said(self) -> list[str]:
-        """Return given options that a mapping states too."""
+        """Return the given options that a mapping also states."""
         given = [one.name for one in fields(self) if getattr(self, one.name) not in (None, ())]
         return [f"--{name.replace('_', '-')}" for name in given if name != "mapping"]
 
 
 def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, ForeignTable]:
-    """Read all files by the mapping's number format, else by options, else by settings.
+    """Read all files with the number format of the mapping, else of options, else of settings.
 
-    Otherwise, and for this program's own tables, it is detected.
+    Otherwise, and for this program's own tables, the format is detected.
 
     Raises:
         InputError: every fault of every file.

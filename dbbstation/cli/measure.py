@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from dbbstation.system.signals import Signals
 
 _WAITING_SCALE = 100.0
-"""About so much faster than real time passes the time of a machine that waits."""
+"""Approximate speed of a waiting machine's time relative to real time."""
 
 _AUTO_PATIENCE_S = 60.0
-"""A virtual machine comes as soon as it has computed the run, or not at all [s of real time]."""
+"""Longest wait for a virtual machine [s of real time]; it starts as soon as it has computed the run."""
 
 
 @made()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _OF_MACHINE, _OF_SET_UP = "centre", "set-up"
-"""Under the spindle the centre of a circle shows how the balls were put up, and nothing of the machine."""
+"""Titles of a circle's centre. For balls under the spindle it shows the set-up of the balls, not the machine."""
 
 _ON_ENTER: dict[State, Command] = {
     State.ANNOUNCED: Start(),
@@ -53,7 +53,7 @@ _ASKED_OF_WRONG = "Enter: repeat   a WHY: accept all the same   x: reject   q: q
 
 
 class Talk:
-    """Shows a person the events; an observer."""
+    """Prints the events for the operator; an observer."""
 
     def __init__(self, *, asking: bool) -> None:
         self._asking = asking
@@ -82,7 +82,7 @@ class Talk:
             echo(f"  {of_wrong if doubtful else _ASKED[event.state]}", err=True)
 
     def end(self) -> None:
-        """Remove the bar after any end."""
+        """Remove the progress bar after any end."""
         self._bar.end()
 
 
@@ -105,7 +105,7 @@ class Summary:
         self._fault = ""
 
     def __call__(self, event: events.Event) -> None:
-        """Take figures of runs and faults."""
+        """Collect figures of runs, and faults."""
         if isinstance(event, events.RunCompleted):
             self._completed[event.run.label] = event
         elif isinstance(event, events.Fault):
@@ -166,7 +166,7 @@ class Keyboard:
         self._thread.start()
 
     def __call__(self, event: events.Event) -> None:
-        """Take the station's state."""
+        """Note the station's state."""
         if isinstance(event, events.StateChanged):
             self._state = event.state
         elif isinstance(event, events.RunCompleted):

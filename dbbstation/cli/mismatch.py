@@ -1,4 +1,4 @@
-"""`dbbstation mismatch`: any simulation against any recording, given as a table or a simulator."""
+"""`dbbstation mismatch`: compare any simulation with any recording, given as a table or a simulator."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def show(result: MismatchResult | SimulatorResult) -> None:
-    """Print what was found."""
+    """Print the findings."""
     from dbbstation.cli.mismatch_simulator import show_simulator
     from dbbstation.results.simulator import SimulatorResult
 
@@ -178,10 +178,10 @@ def _print_findings(there: Sequence[CauseFinding], unit: str) -> None:
 
 
 MOST_TOLD = 12
-"""Effects from which on only those that are certain are printed in full."""
+"""Number of effects above which only certain effects are printed in full."""
 
 MOST_VALUES = 6
-"""Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""
+"""Greatest number of printed values of an effect; the JSON has the values of curves."""
 
 
 def _print_parameters(result: MismatchResult) -> None:

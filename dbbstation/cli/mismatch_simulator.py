@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def show_simulator(result: SimulatorResult) -> None:
-    """Print what was found with a simulator."""
+    """Print the findings on a simulator."""
     unit, held_out = result.unit, result.held_out_rms
     _print_whether(result)
     findings = result.findings

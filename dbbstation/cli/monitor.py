@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 NO_PARITY = "note: this port does not tell of characters with a wrong parity; connect the instrument directly where lines are noisy"
-"""Said of network ports, and on Windows."""
+"""Note for network ports, and on Windows."""
 
 
 @made()

@@ -65,7 +65,7 @@ def on_screen(asked: Asked, *, virtual: bool) -> int:
 
 
 def _with_virtual(asked: Asked) -> Asked:
-    """Return what is measured on a virtual machine, which brings its own line."""
+    """Return the job on a virtual machine, which brings its own line."""
     line = replace(
         asked.line,
         instrument=asked.line.instrument or _DEMO_INSTRUMENT,

@@ -18,16 +18,16 @@ COVERAGE_FACTOR = 2.0
 """k of the expanded uncertainty U = k u that people read: about 95 % of a normal distribution [GUM 6.3.3]."""
 
 EXPANDED = f"U (k = {COVERAGE_FACTOR:g})"
-"""Its name in headings."""
+"""Name of the expanded uncertainty in headings."""
 
 _LONGEST_CELL = 300
-"""Characters of a cell that are printed: a path has some more than a hundred."""
+"""Greatest number of printed characters of a cell; a path has little more than a hundred."""
 
 _LOG = logging.getLogger(__name__)
 
 
 def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
-    """Print text, the one way to a terminal."""
+    """Print text; all output to a terminal uses this function."""
     # While a bar is drawn Rich stands in for standard error and puts lines above the bar; Click would look through it.
     above = sys.stderr if err and hasattr(sys.stderr, "rich_proxied_file") else None
     click.echo(printable(str(text)), above, err=err, nl=nl)
@@ -58,7 +58,7 @@ def json_text(data: Mapping[str, object], indent: int | None = None) -> str:
 
 
 def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print rows under titles, numbers right, texts left."""
+    """Print rows under titles, numbers aligned right, texts left."""
     texts = [[_text(cell) for cell in row] for row in rows]
     numeric = [all(_is_number(row[k]) for row in texts if row[k]) for k in range(len(titles))]
     widths = [max(len(title), *(len(row[k]) for row in texts), 0) for k, title in enumerate(titles)]
@@ -68,7 +68,7 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell the user a note and log it, on one line even if names contain line ends."""
+    """Print a note and log it, on one line even if names contain line ends."""
     log_said(text)
     echo(on_one_line(text), err=True)
 

@@ -1,4 +1,4 @@
-"""`dbbstation instrument ports`: what is connected."""
+"""`dbbstation instrument ports`: list connected serial ports."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def show(result: PredictionResult) -> None:
-    """Print how far the poses are off, and how well that is known."""
+    """Print the errors of the poses, with their uncertainties."""
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, say
 
     say(f"{result.poses} poses written to {result.file}")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def show(result: ProgramsResult, out: Path) -> None:
-    """Print what was written."""
+    """Print the written programs."""
     from dbbstation.cli.output import say
 
     print_programs(result)

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar with counts and remaining time on a terminal, nothing in a pipe.
+"""Show the progress of long work: a bar with counts and remaining time on a terminal; in a pipe nothing is shown.
 
 Lines printed meanwhile appear above the bar. Stages go into the log.
 """
@@ -25,31 +25,31 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _WIDTH = 24
-"""Characters of a bar that has a text beside it."""
+"""Width of a bar beside a text [characters]."""
 
 _SHORT_S = 0.5
-"""Work that is over sooner shows no bar: it would only flicker [s]."""
+"""Time before a bar appears [s], so that short work does not flicker."""
 
 _INTERRUPT = len("^C ")
-"""Room that a terminal needs at the end of the line to show Ctrl-C."""
+"""Free characters at the end of the line, where a terminal shows Ctrl-C."""
 
 _TRUSTED = 3.0, 0.02
-"""Time [s] and share of the work after which what is left is stated: a guess from less is no help."""
+"""Time [s] and share of the work after which the remaining time is stated; earlier estimates are too uncertain."""
 
 _MINUTE_S = 60.0
 
 _DUMB = {"dumb", "unknown"}
-"""Terminals whose lines cannot be drawn anew: they show a bar once, when its work is done."""
+"""Terminals that cannot redraw a line: they show a bar once, when its work is done."""
 
 COUNTED, SHARE, ENDLESS = "{task.completed:.0f} of {task.total:.0f}{task.fields[unit]}", "{task.percentage:3.0f}%", ""
-"""Forms of a bar: how many of how many; per cent; work whose end is unknown, which shows the time since it began."""
+"""Forms of a bar: done and total; per cent; elapsed time if the end is unknown."""
 
 
 class Tell(Protocol):
     """Receives the progress of work."""
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Take a stage, and its completed part if countable."""
+        """Receive the name of a stage and, if countable, its completed part."""
 
 
 class ProgressBar:
@@ -69,7 +69,7 @@ class ProgressBar:
         self._started_s = now_s()
 
     def show(self, done: float = 0.0, of: float | None = None, text: str = "", *, at_once: bool = True) -> None:
-        """Show how much of how much is done."""
+        """Show the completed part of the work."""
         left = time_left(done / of, now_s() - self._started_s) if of else ""
         beside = left + on_one_line(text)
         if self._drawn is not None:
@@ -113,14 +113,14 @@ def _rich(form: str, *, passing: bool) -> Progress:
 
 
 class Compiling:
-    """Reports once that loops are compiled, with a bar."""
+    """Reports once, with a bar, that loops are being compiled."""
 
     def __init__(self) -> None:
         self._bar = ProgressBar("compiling", ENDLESS, passing=True)
         self._said = False
 
     def __call__(self, begun: bool) -> None:  # noqa: FBT001 - as the compiler tells it
-        """Show that a loop begins or ends compiling."""
+        """Show that the compilation of a loop begins or ends."""
         if not begun:
             self._bar.end()
             return
@@ -133,7 +133,7 @@ class Compiling:
 
 @contextmanager
 def progress_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a bar; yield a callback for how much of `total` is done."""
+    """Show a bar; yield a callback for the completed part of `total`."""
     with count_bar(label) as tell:
         yield lambda done: tell(done, total)
 
@@ -239,7 +239,7 @@ def _reached_within(text: str, stages: Mapping[str, int], share: float) -> float
 
 
 def _reached(text: str, stages: Mapping[str, int], before: float) -> float:
-    """Return the progress at a stage's begin [%]; a repeated one advances a quarter of the way."""
+    """Return the progress at a stage's begin [%]. A repeated stage advances by a quarter of the remaining way."""
     stage = _stage_of(text, stages)
     if stage is None:
         return before

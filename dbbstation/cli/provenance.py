@@ -38,11 +38,11 @@ _NO_CONTENT = frozenset(
         "anew",
     }
 )
-"""Parameters that say where and in which form results go, or how fast: their content is the same without them. Left out, so
-that the same inputs give the same bytes under every name."""
+"""Parameters that affect only the place, form or speed of results, not their content. They are left out of the
+provenance, so that the same inputs give the same bytes under every name."""
 
 _GIVEN = frozenset({ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP, ParameterSource.ENVIRONMENT})
-"""Where a value came from that the program does not have by itself; the shop's settings are click's default map."""
+"""Origins of values that are no defaults of the program; the shop's settings are click's default map."""
 
 
 def provenance() -> Provenance:

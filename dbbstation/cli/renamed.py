@@ -1,4 +1,4 @@
-"""Former names of commands and flags, which are answered with their new names."""
+"""Former names of commands and flags; a message gives the new names."""
 
 RENAMED = {
     "drive": "`identify`",
@@ -37,4 +37,4 @@ RENAMED_FLAGS = {
     "sheet --name": "--names",
     "simulate --plan": "PLAN without a flag",
 }
-"""By command and flag; names that only gained an `s` are suggested anyway."""
+"""New names by command and flag; names that only gained an `s` are suggested anyway."""

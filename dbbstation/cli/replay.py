@@ -1,4 +1,4 @@
-"""`dbbstation instrument replay`: a byte log through the decoder."""
+"""`dbbstation instrument replay`: decode a byte log."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def show(result: ReportResult) -> None:
-    """Print the verdict, its reasons, and what to do."""
+    """Print the verdict, its reasons and advice."""
     verdict = result.verdict
     echo(result.certificate.title)
     echo(verdict.headline)

@@ -40,7 +40,7 @@ def sampled_circles(plan: Plan, protocol: Protocol, baud: int | None = None) -> 
 
 
 def sampling_notes(plan: Plan, protocol: Protocol, baud: int | None = None) -> Iterator[str]:
-    """Yield sentences on the plan and on circles that are too fast."""
+    """Yield sentences on the plan and on circles that are too fast for the instrument."""
     from dbbstation.plan.sampling import SMALLEST_POINTS, UNDULATIONS
 
     circles = sampled_circles(plan, protocol, baud)

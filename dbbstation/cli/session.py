@@ -1,4 +1,4 @@
-"""`dbbstation session`: what can be done to a session afterwards."""
+"""`dbbstation session`: list and change a recorded session."""
 
 from __future__ import annotations
 
@@ -316,7 +316,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
 
 
 def _reason_for(run: str, unusable: str) -> str:
-    """Ask why an unusable run is accepted; empty for a usable one."""
+    """Ask for the reason to accept an unusable run; empty for a usable run."""
     from dbbstation.cli.asking import Asker
 
     if not unusable:

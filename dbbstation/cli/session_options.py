@@ -1,4 +1,4 @@
-"""Options on what a session notes beside its runs."""
+"""Options for facts that a session notes in addition to its runs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SessionOptions:
-    """Stated facts of machine, shop and bar."""
+    """Options for facts of machine, shop and bar."""
 
     operator: Annotated[str, Option("Name of the operator.")] = ""
     job: Annotated[str, Option("Job or order number of the measurement.")] = ""
@@ -48,7 +48,7 @@ class SessionOptions:
     bar_waiver: Annotated[str, Option("Reason for measuring without a fresh calibration of the bar.")] = ""
 
     def details(self, stroke_mm: float | None = None) -> SessionDetails:
-        """Return what a session notes.
+        """Return the facts that a session notes.
 
         Raises:
             click.UsageError: a blank name, length without uncertainty, something of the bar without either, or a file and options of the bar.
@@ -79,7 +79,7 @@ class SessionOptions:
 
     @property
     def of_bar(self) -> list[str]:
-        """Return given options of the bar beside its file, without settings."""
+        """Return the options of the bar that were given in addition to its file, without settings."""
         given = {
             "bar_serial_number": self.bar_serial_number,
             "bar_length_mm": self.bar_length_mm,
@@ -89,7 +89,7 @@ class SessionOptions:
         return [name for name, value in given.items() if value not in {"", None} and not from_settings(name)]
 
     def stated_length_mm(self) -> float | None:
-        """Return the length by file or `--bar-length-mm` [mm], or None.
+        """Return the bar's length from its file or `--bar-length-mm` [mm], or None.
 
         Raises:
             InputError: faults of the bar's file.
@@ -115,7 +115,7 @@ class SessionOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingOptions(SessionOptions):
-    """The same, with what is done while runs are recorded."""
+    """The same options, and those for recording runs."""
 
     spy: Spy = None
     largest_loss_percent: Annotated[
@@ -157,7 +157,7 @@ class RecordingOptions(SessionOptions):
     ] = None
 
     def in_force(self, plan: InlinePlan) -> InlinePlan:
-        """Return the plan in this order, with the limit of lost samples.
+        """Return the plan with the chosen order and limit of lost samples.
 
         The command line overrides the plan, which overrides the shop's settings.
         """

@@ -1,4 +1,4 @@
-"""An index of computed results in the user's cache folder; all of them can be computed again.
+"""An index of computed results in the user's cache folder, never the only copy.
 
 SQLite runs without a write-ahead log and never on a network share.
 """

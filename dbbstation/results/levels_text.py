@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.levels import DifferenceFound, Followed, LawForm, Levels
 
 LIKELY = 0.5
-"""Least probability of a law that the text mentions."""
+"""Least probability at which the text mentions a property."""
 
 MOST_LISTED = 4
 """Greatest number of variables or laws that are listed by name."""

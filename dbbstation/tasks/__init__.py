@@ -1,1 +1,1 @@
-"""One file a task: paths or objects in, a typed result out, for commands, station and scripts."""
+"""One file per task: a task reads paths or objects and returns a typed result, for commands, station and scripts."""

@@ -1,4 +1,4 @@
-"""Calibrate: from recorded sessions to a model of the machine."""
+"""Calibrate: fit a model of the machine to recorded sessions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 STAGES = {"fit": 0, "figures": 36, "observability": 53}
-"""Stages of a calibration once runs are read, and the share of its time that has passed by then [%]; fits are one or several."""
+"""Stages of a calibration after reading, and the share of its time that has passed at each begin [%]; there are one or
+several fits."""
 
 
 @task("calibrate", label="calibration", stages=STAGES)
@@ -77,7 +78,7 @@ def calibrate(
     Raises:
         ArgumentError: a value that it does not take.
         InputError: faults of files and traces.
-        ModelError: an unknown source, or one that belongs to no machine or does not show in circles.
+        ModelError: an unknown source, or one that belongs to no machine or has no effect on circles.
         CalibrationError: too few tests, or the fit does not converge.
         StoppedError: `stop` returned True.
     """

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the named tests in that order, or all, without the excluded.
+    """Return the named tests in their order, or all tests, without the excluded ones.
 
     Raises:
         StationError: an unknown name, or none is left.

@@ -1,4 +1,4 @@
-"""From a plan to one NC program for each test and direction."""
+"""Write one NC program for each test and direction of a plan."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
 
 
 MANY = 3
-"""Accepted runs of one circle in one direction that are said."""
+"""Number of accepted runs of one circle and direction from which on a note states them."""
 
 
 def _judged(
@@ -149,7 +149,7 @@ def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUp
 
 
 def _form_um(bar: Bar, ball: Ball) -> float | None:
-    """Return the standard uncertainty by the form of both balls, rectangular [GUM 4.3.7]; None unless both are stated."""
+    """Return the standard uncertainty by the form of both balls, assumed rectangular [GUM 4.3.7]; None unless both are stated."""
     if bar.ball_form_um is None or ball.form_um is None:
         return None
     return float(np.hypot(bar.ball_form_um, ball.form_um) / np.sqrt(3.0))

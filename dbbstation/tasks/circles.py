@@ -1,4 +1,4 @@
-"""From session folders to the figures of their circles."""
+"""Compute the figures of the circles of sessions."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "held-out tests": 80}
-"""Stages of a comparison once both sessions are read, and the share of its time that has passed by then [%]."""
+"""Stages of a comparison after reading, and the share of its time that has passed at each begin [%]."""
 
 
 @task("compare", label="comparison", stages=STAGES)

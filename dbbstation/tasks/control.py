@@ -1,4 +1,4 @@
-"""The correction inside a control: a LinuxCNC kinematics of a model, or parameters for its own."""
+"""Correct a machine inside its control: by a LinuxCNC kinematics from a model, or by parameters for LinuxCNC's own."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ SIZE_MM = 200.0
 """Default volume: the size of parts on a machine of this kind."""
 
 MACHINE_SUFFIX = ".machine.yaml"
-"""End of the machine file that says what the control corrects."""
+"""Ending of the machine file that states the control's corrections."""
 
 
 @in_a_book
@@ -62,12 +62,13 @@ def kinematics(
     """Write a LinuxCNC kinematics component that corrects a model's errors.
 
     Args:
-        out: a `.comp` file; its stem is the component's name. The machine file beside it says what the control corrects.
+        out: a `.comp` file; its stem is the component's name. The machine file beside it states the control's
+            corrections.
         date: of today, ISO 8601.
         known: error sources by name.
         machine: file of the machine that it is for; None: not compared.
-        left_out: sources that the control shall not correct.
-        thermometers: columns without unit that the control has.
+        left_out: sources to leave uncorrected.
+        thermometers: the control's thermometers, as column names without unit.
 
     Raises:
         InputError: faults of files.
@@ -141,7 +142,7 @@ def parameters(
         machine: file of the machine that it is for; None: not compared.
         volume_mm: least and greatest X, Y and Z; None: 200 mm about the middle of the travel.
         tilt_deg: greatest A and B.
-        ini: INI file in use, looked through for corrections of joints.
+        ini: INI file in use, which is searched for corrections of joints.
 
     Raises:
         InputError: faults of files.

@@ -1,4 +1,4 @@
-"""State of a control that a program does not contain, as people write it: offsets, tool lengths, angles."""
+"""Parse the state of a control that a program does not contain: offsets, tool lengths, angles."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ if TYPE_CHECKING:
 
 
 def numbers_of(text: str, counts: set[int]) -> list[float]:
-    """Return the numbers of `X,Y,Z`, of which there must be one of these counts.
+    """Return the numbers of a text such as `X,Y,Z`; their count must be among `counts`.
 
     Raises:
-        ValueError: there are others.
+        ValueError: the text has another count or is no list of numbers.
     """
     try:
         numbers = [float(number) for number in text.split(",")]
@@ -25,7 +25,7 @@ def numbers_of(text: str, counts: set[int]) -> list[float]:
 
 
 def named_numbers(texts: Iterable[str], counts: set[int]) -> dict[str, list[float]]:
-    """Return the numbers of each `NAME=1,2,3`; errors as of `numbers_of`."""
+    """Return the numbers of each `NAME=1,2,3`; errors as for `numbers_of`."""
     pairs = [text.partition("=") for text in texts]
     for text in (name for name, equals, _ in pairs if not equals):
         raise ValueError(f"{text!r} lacks its name: write {'1=52.1' if counts == {1} else 'G54=20,-35,-1000'}")
@@ -33,7 +33,7 @@ def named_numbers(texts: Iterable[str], counts: set[int]) -> dict[str, list[floa
 
 
 def lengths_by_tool(texts: Iterable[str]) -> dict[int, float]:
-    """Return lengths by number of the tool [mm] of each `TOOL=MM`; errors as of `numbers_of`."""
+    """Return lengths [mm] by tool number from each `TOOL=MM`; errors as for `numbers_of`."""
     found = {}
     for name, (length,) in named_numbers(texts, {1}).items():
         number = name.lstrip("TH")

@@ -1,4 +1,4 @@
-"""What a task takes, stated once in its signature: command line, checks, documentation and messages are made of it.
+"""A task's signature declares its parameters once. Command line, checks, documentation and messages are made from it.
 
 A parameter without an `Option` is for Python only. This module loads fast, since help texts need it.
 """
@@ -31,10 +31,10 @@ else:
     Names, File, Files = tuple[str, ...], Path, tuple[Path, ...]
 
 _OF_ALL = {"progress": "called with each stage.", "stop": "asked at each stage.", "say": "called with notes."}
-"""Parameters of every task that are for Python only."""
+"""Parameters of every task for Python only."""
 
 EXAMPLES = "\\b\nExamples:"
-"""Begins the examples of a command in the docstring of its task."""
+"""First line of a command's examples in the docstring of its task."""
 
 _NAMES, _FILES = tuple[str, ...], tuple[Path, ...]
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
@@ -89,12 +89,12 @@ class TaskParameter:
 
     @property
     def many(self) -> bool:
-        """Return whether it takes several values."""
+        """Return whether the parameter has several values."""
         return get_origin(self.type) is tuple
 
     @property
     def flag(self) -> str:
-        """Return its name on the command line."""
+        """Return the parameter's name on the command line."""
         if self.option.kind.startswith("argument"):
             return self.option.metavar or self.name
         return self.option.flag or f"--{'no-' if self.default is True else ''}{self.name.replace('_', '-')}"
@@ -104,7 +104,7 @@ class TaskParameter:
         return value is not None and not (isinstance(value, str | int | float | tuple) and value in (self.default, ()))
 
     def checked(self, value: Any) -> Any:  # noqa: ANN401 - of any parameter
-        """Return a value as the task takes it.
+        """Return a checked value for the task.
 
         Raises:
             ArgumentError: the task does not take it.
@@ -119,7 +119,7 @@ class TaskParameter:
 
     @property
     def in_words(self) -> str:
-        """Return its type as signatures show it."""
+        """Return the parameter's type as text for signatures."""
         kind = "Any" if self.option.parse else _SIGNED.get(self.type, getattr(self.type, "__name__", "Any"))
         if get_origin(self.type) is Literal:
             kind = f"Literal[{', '.join(map(repr, get_args(self.type)))}]"
@@ -198,7 +198,7 @@ def _one_of(value: str, known: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class Declared:
-    """A task as declared.
+    """A declared task.
 
     Attributes:
         stages: of its work and the passed share of time as each begins [%]; a function of the arguments; None: counted.
@@ -212,7 +212,7 @@ class Declared:
     signature: inspect.Signature
 
     def checked(self, args: tuple[Any, ...], named: Mapping[str, Any]) -> inspect.BoundArguments:
-        """Return arguments as the task takes them.
+        """Return checked arguments for the task.
 
         Raises:
             ArgumentError: a value that it does not take, or that does not go with another.
@@ -277,7 +277,7 @@ def options_of(function: Callable[..., Any]) -> dict[str, TaskParameter]:
 
 
 def annotations_of(function: Callable[..., Any]) -> dict[str, tuple[Any, inspect.Parameter]]:
-    """Return annotation and parameter by name, of a function or a dataclass; without types for checkers only."""
+    """Return annotation and parameter by name, of a function or a dataclass; types for type checkers are left out."""
     own, found = inspect.unwrap(function), {}
     homes = {
         name: kind for kind in reversed(getattr(own, "__mro__", ())) for name in vars(kind).get("__annotations__", ())

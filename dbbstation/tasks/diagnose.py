@@ -1,4 +1,4 @@
-"""Diagnose: from recorded sessions to physics beyond a kinematic calibration."""
+"""Diagnose: find physics beyond a kinematic calibration in recorded sessions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ STAGES = {
     "next test": 80,
     "effects of causes": 95,
 }
-"""Stages of a diagnosis once runs are read, and the share of its time that has passed by then [%]; joint fits are none or several."""
+"""Stages of a diagnosis after reading, and the share of its time that has passed at each begin [%]; there may be
+several joint fits."""
 
 
 @task("diagnose", label="diagnosis", stages=STAGES)
@@ -120,7 +121,7 @@ def diagnose(
 
 
 def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
-    """Return the fit with an effect that the machine owns and other tests confirm, or None."""
+    """Return the fit with an effect of the machine that other tests confirm, or None."""
     from dbbstation.diagnosis.unexplained_model import KEPT_AS, keep_unexplained
 
     curve = found.unexplained.curve

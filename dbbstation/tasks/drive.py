@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out part": 40, "held-back stretch": 98}
-"""Stages of an identification, and the share of its time that has passed by then [%]."""
+"""Stages of an identification, and the share of its time that has passed at each begin [%]."""
 
 
 @task("identify", label="identification", stages=STAGES)

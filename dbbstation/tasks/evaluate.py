@@ -1,4 +1,4 @@
-"""Evaluate: what a model leaves of recordings, circle by circle."""
+"""Evaluate: compute the residual of recordings under a model, circle by circle."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 STAGES = {"predicting runs": 0}
-"""Stages of an evaluation once runs are read, and the share of its time that has passed by then [%]."""
+"""Stages of an evaluation after reading, and the share of its time that has passed at each begin [%]."""
 
 
 @task("evaluate", label="evaluation", stages=STAGES)

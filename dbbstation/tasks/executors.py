@@ -22,23 +22,23 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 REACHED_S = 10.0
-"""How long a scheduler may take to answer, and its first worker to be there [s]."""
+"""Longest wait for the answer of a scheduler, and for its first worker [s]."""
 
 
 class SchedulerError(StationError):
-    """A scheduler is missing, has no workers, or workers with another program."""
+    """A scheduler is missing, or its workers are missing or have another program."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """A piece of work that ended its process, even when run alone."""
+    """A piece of work ended its process, even when it ran alone."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class WorkPool(Generic[Item, Result]):
-    """Where work is done.
+    """The processes that do the work.
 
     Attributes:
         scheduler: such as `tcp://server:8786`; empty for this computer.
@@ -62,7 +62,7 @@ class WorkPool(Generic[Item, Result]):
                 yield pool
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[tuple[int, Result | Ended]]:
-        """Yield the place and result of items, each once, as they are done.
+        """Yield the index and result of each item once, in order of completion.
 
         Raises:
             SchedulerError: as `executor`; or the scheduler disappeared.
@@ -134,7 +134,7 @@ def _of_dask(address: str) -> Iterator[Executor]:
 
 
 def _within(limit_s: float, act: Callable[[], Any]) -> Any:  # noqa: ANN401 - what it returns
-    """Return a function's result within a time limit, because Dask's own does not cover a connected but silent server."""
+    """Return a function's result within a time limit; Dask's own limit does not cover a connected, but silent server."""
     work = Background(act)
     work.wait(limit_s)
     if not work.done:
@@ -161,7 +161,7 @@ def _check_workers(client: Any, address: str) -> None:  # noqa: ANN401 - distrib
 
 
 def refuse_other_program(identity: dict[str, str], whose: str) -> None:
-    """Refuse another program, whose numbers may differ.
+    """Refuse workers with another program, because their numbers may differ.
 
     Raises:
         SchedulerError: it differs.

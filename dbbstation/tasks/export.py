@@ -1,4 +1,4 @@
-"""Sessions as a tidy table, a row per sample, in the memory of one run."""
+"""Write sessions as a tidy table, one row per sample, with the memory of one run."""
 
 from __future__ import annotations
 

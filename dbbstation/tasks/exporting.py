@@ -33,7 +33,7 @@ OF_RUN = ("session", "test", "direction", "repeat", "mounting", "state", "starte
 """Columns that are the same in all rows of a run."""
 
 ANGLE, DEVIATION = "angle_deg", "deviation_um"
-"""Columns that are computed: the angle of samples on the turn, from 0 up to 360; length less the bar's of the plan."""
+"""Computed columns: the angle of samples on the turn, from 0 to 360, and length minus the plan's bar length."""
 
 MEANINGS = {
     "session": "name of the session's folder",
@@ -48,14 +48,14 @@ MEANINGS = {
     columns.STATUS: "what the instrument said of the sample; others than ok or empty are not used",
     **{name: f"{column.meaning} [{column.unit}]" for name, column in columns.COLUMNS.items()},
 }
-"""What every column of the table is."""
+"""Meaning of every column of the table."""
 
 _WHOLE = frozenset({"repeat", "mounting"})
 
 
 @dataclass(frozen=True, eq=False)
 class Exporting:
-    """What is exported."""
+    """The runs and columns of an export."""
 
     runs: tuple[tuple[SessionFolder, RunEntry], ...]
     names: tuple[str, ...]
@@ -66,7 +66,7 @@ class Exporting:
 
 
 def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
-    """Return these runs with every column that any has.
+    """Return these runs with the columns of all of them.
 
     Raises:
         InputError: no run, or a file is no run.
@@ -92,7 +92,7 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
 
 
 def angles_deg(recording: Recording, circle: Circle) -> Floats:
-    """Return each sample's commanded angle on the full turn, 0 to 360, NaN for others, shape (n,) [deg].
+    """Return each sample's commanded angle on the full turn, from 0 to 360, shape (n,) [deg]; NaN outside the turn.
 
     Raises:
         TraceError: neither angles nor edges of a circle.
@@ -107,7 +107,7 @@ def angles_deg(recording: Recording, circle: Circle) -> Floats:
 def blocks(
     what: Exporting, progress: Callable[[int, int], None], say: Callable[[str], None]
 ) -> Iterator[dict[str, Floats | list[str]]]:
-    """Yield the columns of each run: numbers with NaN for gaps, texts as lists.
+    """Yield the columns of each run: arrays of numbers with NaN for gaps, and lists of texts.
 
     Raises:
         InputError: a run cannot be read.
@@ -194,7 +194,7 @@ def write_parquet(
     *,
     force: bool,
 ) -> int:
-    """Write the table as Parquet, a row group per run, with provenance and meanings; return the number of rows.
+    """Write the table as Parquet with one row group per run, provenance and meanings; return the number of rows.
 
     Raises:
         InputError: a run cannot be read.

@@ -1,4 +1,4 @@
-"""Do one task on many sessions, each once, on this computer or by a Dask scheduler."""
+"""Run one task once on each of many sessions, on this computer or by a Dask scheduler."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 WORKING = "sessions"
-"""Stage in which sessions are worked on."""
+"""Name of the stage that works on sessions."""
 
 DEFAULT_FOLDER = "fleet"
 
 AS_USUAL = FleetOptions()
-"""What a task does of a session where nothing else is asked for."""
+"""Default options of every task."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class _Named:
 
     Attributes:
         inputs: SHA-256 of files that decide its result.
-        apart: whether it counts as an own machine without a serial number.
+        apart: whether it counts as a separate machine if it has no serial number.
     """
 
     name: str
@@ -66,7 +66,7 @@ class _Named:
 
     @property
     def machine(self) -> str:
-        """Return the serial number, or the name in the machine's file, with the session if it counts apart."""
+        """Return the serial number, else the name in the machine's file; add the session if it counts as a separate machine."""
         if self.session is None or self.session.serial_number:
             return "" if self.session is None else self.session.serial_number
         return f"{self.session.machine.name} ({self.name})" if self.apart else self.session.machine.name
@@ -100,7 +100,7 @@ def fleet(
     stop: Callable[[], bool] = never,
     say: Callable[[str], None] = silent,
 ) -> FleetResult:
-    """Do one task on every session of some folders and compare the machines.
+    """Run one task on every session of some folders and compare the machines.
 
     Args:
         folders: of sessions, at most four levels deep, or sessions.

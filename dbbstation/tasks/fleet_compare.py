@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from dbbstation.results.fleet import FleetFound, FleetValue
 
 MOST_NAMED = 5
-"""Machines that a note names."""
+"""Greatest number of machines that a note names."""
 
 CLAIMED = frozenset({"identified", "happened"})
-"""Verdicts that say that a cause is there."""
+"""Verdicts that claim a cause."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sister:
-    """One machine, by its last session."""
+    """One machine, represented by its last session."""
 
     name: str
     session: str
@@ -97,7 +97,8 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
 
 
 _LARGEST_LOG = 300.0
-"""Logarithms above it have no number; of three machines, none is far enough off to be seen."""
+"""Largest logarithm that is converted to a number. With three machines no difference is detectable, and the logarithm
+is larger."""
 
 
 def _geometries(sisters: Sequence[Sister]) -> tuple[list[int], list[str]]:

@@ -1,4 +1,4 @@
-"""A fleet's values as one tidy table, CSV or Parquet."""
+"""Write a fleet's values as one tidy table, CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _YES_OR_NO = frozenset({"unlike"})
 
 
 def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *, force: bool = False) -> None:
-    """Write every value of a fleet, one row for each.
+    """Write every value of a fleet in one row.
 
     Raises:
         OutputError: another extension; the file exists without `force`; pyarrow is missing.

@@ -1,4 +1,4 @@
-"""The work on one session of a fleet, in any process."""
+"""Work on one session of a fleet, in any process."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Worked:
 
 
 def worked(piece: FleetPiece) -> Worked:
-    """Do a task on one session and return its result or failure.
+    """Run a task on one session and return its result or failure.
 
     Raises:
         SchedulerError: this process runs another program.
@@ -197,7 +197,7 @@ def _reported(piece: FleetPiece) -> Done:
 
 
 TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, "report": _reported}
-"""What can be done of every session, by name."""
+"""Tasks for every session, by name."""
 
 
 def _provenance(piece: FleetPiece) -> Provenance:
@@ -222,14 +222,14 @@ def _numbers(model: IdentifiedModel) -> list[tuple[str, str, str, float, float |
 
 
 LOGARITHMIC = frozenset({"G"})
-"""Figures of circles that are positive sizes."""
+"""Figures of circles that are positive, so that ratios are compared."""
 
 COMPARED = ("G", "X", "Y", "R")
-"""Figures of circles that machines are compared by; the distance of the centre is in X and Y."""
+"""Figures of circles for the comparison of machines; X and Y already contain the distance of the centre."""
 
 
 def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
-    """Return means over repeats; u keeps their common part."""
+    """Return means of figures over repeats; u keeps the part that repeats share."""
     grouped: dict[tuple[str, str, str, str], list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
         for figure in run.figures:

@@ -1,4 +1,4 @@
-"""Read the sessions of a folder through an index, for their histories."""
+"""Read the histories of a folder's sessions through an index."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 READING = "reading sessions"
-"""The stage that is counted."""
+"""Name of the counted stage."""
 
 
 def histories_in(
@@ -127,7 +127,7 @@ class _File:
 
 @dataclass(frozen=True)
 class _Unreadable:
-    """Why a file cannot be read."""
+    """The reason why a file cannot be read."""
 
     reason: str
 
@@ -212,7 +212,8 @@ def _contents(path: Path, others: Sequence[Path]) -> list[tuple[str, str]]:
 
 
 RUNS_WORTH_PROCESSES = 300
-"""Recordings from which on other cores help: ten seconds of work; a process needs two until it has begun."""
+"""Least number of recordings for which further processes save time: ten seconds of work, since a process needs two to
+start."""
 
 
 def _processes_for(sessions: Sequence[Path]) -> int:
@@ -259,7 +260,7 @@ def _first_of(error: StationError) -> str:
 
 
 MOST_NAMED = 3
-"""Sessions that are named where many have the same remark."""
+"""Greatest number of sessions that are named if many have the same remark."""
 
 
 def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def known_sources(
     *, source_files: Sequence[str | PathLike[str]] = (), machine: str | PathLike[str] | None = None
 ) -> tuple[SourceDescription, ...]:
-    """Return the known causes: those of package, installed packages and Python files.
+    """Return the known causes from the package, installed packages and Python files.
 
     Args:
         source_files: own error sources; they are executed.

@@ -1,4 +1,4 @@
-"""Recorded sessions as observations: files, traces and NC programs together."""
+"""Load recorded sessions as observations: files, traces and NC programs."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def load(
 
 
 def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequence[str], telling: Telling) -> Recorded:
-    """Return sessions, read if they are paths, with the chosen tests.
+    """Return sessions with the chosen tests; paths are read.
 
     Args:
         tests: names; empty for all.
@@ -207,7 +207,7 @@ def _under(machine: Machine | None, observation: Observation) -> Observation:
 
 
 def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
-    """Return a note on balls under the spindle, whose centres do not show the machine's place [CAL III-A]."""
+    """Return a note on balls under the spindle, whose centres contain no position errors of the machine [CAL III-A]."""
     tests = dict.fromkeys(run.test for run in runs if not session.plan.tests[run.test].ball.place_known)
     if not tests:
         return []
@@ -220,7 +220,7 @@ def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str
 
 
 def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[SessionFolder]) -> list[Observation]:
-    """Give a ball of one CMM sheet the same name in all sessions, so that it has one error."""
+    """Give a ball of one CMM sheet the same name in all sessions, so that it has a single error."""
     names: dict[tuple[object, ...], str] = {}
     of = {session.name: session for session in sessions}
     shared = []
@@ -272,7 +272,7 @@ def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
 
 
 def _readings(recording: Recording) -> bytes:
-    """Return a digest of what was read, equal for copies with other comments: counted twice, they halve the variance wrongly."""
+    """Return a digest of the readings, equal for copies with other comments. A copy that counts twice would wrongly halve the variance."""
     return hashlib.sha256(recording.t_s.tobytes() + recording.length_mm.tobytes()).digest()
 
 

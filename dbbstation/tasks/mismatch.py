@@ -1,4 +1,4 @@
-"""Mismatch: where measured and simulated values of a table differ, and what the simulation lacks."""
+"""Mismatch: find where measured and simulated values of a table differ, and what the simulation lacks."""
 
 from __future__ import annotations
 
@@ -34,18 +34,19 @@ else:
 
 STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
 STAGES_WHOLE = {"look": 0, "sets of causes": 50}
-"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
+"""Stages of a comparison with and without the held-out test, and the share of its time that has passed at each begin
+[%]."""
 
 SIMULATOR_STAGES = {"refit": 0, "look": 5, "sets of causes": 10, "held-out part": 40}
 SIMULATOR_STAGES_WHOLE = {"refit": 0, "look": 5, "sets of causes": 20}
 """The same with a simulator."""
 
 CORRECTED, LEFT = "corrected", "left"
-"""Columns that are added to the table."""
+"""Names of the added columns."""
 
 
 def stages(given: Mapping[str, Any]) -> Mapping[str, int]:
-    """Return the stages of what is asked for."""
+    """Return the stages of the requested comparison."""
     whole = not given.get("held_out", True)
     if given.get("simulator") is None:
         return STAGES_WHOLE if whole else STAGES
@@ -177,7 +178,7 @@ def mismatch(
         ArgumentError: a value that it does not take, or neither columns nor a simulator.
         InputError: every fault of every file; too few rows.
         StationError: the simulator is not allowed to run.
-        CalibrationError: rounding hides what so large a difference follows.
+        CalibrationError: the values are rounded too much for so large a difference.
         StoppedError: `stop` returned True.
     """
     from dbbstation.diagnosis.table.applied import applied

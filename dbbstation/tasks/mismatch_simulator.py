@@ -1,4 +1,4 @@
-"""Mismatch with a simulator in the loop."""
+"""Find a mismatch with a simulator in the loop."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _drawn(answer: SimulatorComparison, wanted: object) -> Any:  # noqa: ANN401 
 
 
 def _corrected(answer: SimulatorComparison) -> str:
-    """Return a table of run, time, and each output's measured, simulated, refitted and corrected values."""
+    """Return a table with run, time, and the measured, simulated, refitted and corrected values of each output."""
     work, model = answer.work, answer.model
     names, columns = ["run", "t_s"], [[], []]  # type: ignore[var-annotated]  # texts and numbers
     for k, run in enumerate(model.runs):

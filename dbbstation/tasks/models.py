@@ -1,4 +1,4 @@
-"""Models for tasks: loaded, as file, or within a result."""
+"""Models for tasks: loaded, in a file, or in a result."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class HasModel(Protocol):
 
 
 Model = str | PathLike[str] | IdentifiedModel | HasModel
-"""A file, a model, or a result that has one."""
+"""A file, a model, or a result with a model."""
 
 
 def model_of(model: Model, known: Mapping[str, ErrorSource] | None = None) -> IdentifiedModel:
@@ -60,7 +60,7 @@ def read_model(path: str | PathLike[str], *, source_files: Sequence[str | PathLi
 def write_model(
     path: str | PathLike[str], model: Model, *, provenance: Provenance | None = None, force: bool = False
 ) -> None:
-    """Write a model, whole or not at all.
+    """Write a model, completely or not at all.
 
     Args:
         path: of the file.

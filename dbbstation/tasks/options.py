@@ -1,4 +1,4 @@
-"""Options of several tasks, each declared once; loads fast."""
+"""Options of several tasks, each declared once; the module loads fast."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ OUTPUTS = {
     "figure": FIGURE,
     "page": "Write the page here, as HTML.",
 }
-"""Of what a command writes: what it is stands in its metavar."""
+"""Help texts of a command's outputs; the metavar names the kind of output."""
 MACHINE = Option("Nominal machine, as its controller believes it.", metavar="MACHINE.yaml")
 Machine = Annotated[File, replace(MACHINE, kind="file")]
 PLAN = Option("Test plan.", metavar="PLAN.yaml")

@@ -1,4 +1,4 @@
-"""What the station draws of a session and of its folder."""
+"""Draw figures of a session and of its folder for the station."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ else:
     Poses = Any
 
 STAGES = {"reading": 0, "travel": 40, "predicting": 60}
-"""Stages of a prediction, and the share of its time that has passed by then [%]."""
+"""Stages of a prediction, and the share of its time that has passed at each begin [%]."""
 
 AXES = 6
 

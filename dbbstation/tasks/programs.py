@@ -38,11 +38,11 @@ class ProgramText:
 
 
 Program = ProgramText
-"""As scripts call it."""
+"""Name for scripts."""
 
 
 NOT_CORRECTED = "cause unknown, not corrected"
-"""How a program's header names errors of the model that it leaves as they are."""
+"""Title of the model's uncorrected errors in a program's header."""
 
 
 def inverse_of(
@@ -78,7 +78,7 @@ def inverse_of(
 
 
 def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Provenance) -> dict[str, str]:
-    """Return a program's origin for its header: files by role, program, command, other inputs.
+    """Return a program's origin for its header: files by role, this program, its command, and other inputs.
 
     Raises:
         InputError: a file cannot be read.
@@ -102,7 +102,7 @@ def sha256_of(path: Path) -> str:
 
 
 def program_text(path: Path | ProgramText) -> str:
-    """Return the text of a program: UTF-8, UTF-16 with its mark, else Windows' letters, which only comments have.
+    """Return the text of a program, from UTF-8, UTF-16 with a byte order mark, or else Windows' code page, which matters in comments only.
 
     Raises:
         InputError: it cannot be read.
@@ -127,7 +127,7 @@ def setup_of(
     *,
     block_delete: str | None = None,
 ) -> ControlSetup:
-    """Return the offsets and tool lengths of a control, declared ones before those of its files.
+    """Return the offsets and tool lengths of a control; declared ones override those of its files.
 
     Args:
         offsets: X, Y, Z, and A, B, C if not zero, of `G54` to `G59.3`, `G92`, `G28` and `G30` [mm, deg].

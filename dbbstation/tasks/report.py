@@ -1,4 +1,4 @@
-"""Report measured circles against the shop's tolerances, as one HTML file."""
+"""Report measured circles and the shop's tolerances in one HTML file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STAGES = {
     "writing": 90,
     "printing": 95,
 }
-"""Stages of a report, and the share of its time that has passed by then [%]."""
+"""Stages of a report, and the share of its time that has passed at each begin [%]."""
 
 USUAL_COVERAGE = 2.0
 

@@ -1,4 +1,4 @@
-"""A model beside measured circles: what it leaves, and what its causes contribute."""
+"""Compute a model's residual and its causes' contributions for a report of circles."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ _PICTURES = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpeg"}
 """Kinds of pictures by their first bytes."""
 
 LARGEST_LOGO_BYTES = 1_000_000
-"""A report is sent by mail: its picture has at most one megabyte."""
+"""Largest picture of a report, which is sent by mail [bytes]."""
 
 
 def logo_of(settings: Settings) -> str:
-    """Return the shop's picture as an address that holds it; empty without one.
+    """Return the shop's picture as a data address; empty without one.
 
     Raises:
         InputError: it cannot be read, or is no PNG or JPEG picture.
@@ -60,7 +60,7 @@ def logo_of(settings: Settings) -> str:
 def read_runs(
     sessions: Sequence[SessionFolder], chosen: tuple[Sequence[str], Sequence[str]], telling: Telling
 ) -> Recorded | StationError:
-    """Return recorded runs, or why they cannot be had."""
+    """Return recorded runs, or the reason why they cannot be loaded."""
     tests, exclude = chosen
     try:
         found = load_sessions(sessions, exclude, telling.counted(READING), tests)

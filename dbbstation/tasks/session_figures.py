@@ -1,4 +1,4 @@
-"""A history's facts of one session folder or model file."""
+"""Read the figures of a history from one session folder or model file."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def session_figures(folder: Path) -> SessionFigures:
 
 
 def run_figures(circles: Sequence[MeasuredCircle]) -> tuple[RunFigures, ...]:
-    """Return the comparable figures of circles, without runs that show none."""
+    """Return the comparable figures of circles, without runs that show no circle."""
     shown = [one for one in circles if one.analysis is not None]
     return tuple(map(_figures, shown, tolerated_circles(shown)))
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 BEGUN = datetime(2000, 1, 1, tzinfo=UTC)
-"""A date that nobody takes for a measurement's."""
+"""Start of simulated sessions, a date that no measurement has."""
 
 SIMULATING = "simulating runs"
-"""The stage that is counted."""
+"""Name of the counted stage."""
 
 
 @task("simulate", label="runs")

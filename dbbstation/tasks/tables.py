@@ -28,24 +28,25 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.table_csv import Columns
 
 FEWEST_ROWS = 30
-"""Rows that a comparison needs at the least: with fewer, a curve of seven functions beside noise says nothing."""
+"""Least number of rows of a comparison: fewer do not determine a curve of seven functions in noise."""
 
 DERIVATIVE = "d_"
-"""How columns begin that hold the derivative of the simulated value by a parameter."""
+"""First characters of columns with the derivative of the simulated value by a parameter."""
 
 ROWS = "rows"
-"""What to say for the time where rows stand in the order in which they were measured and no column says when."""
+"""Value of the option for the time if rows are in the order of measurement and no column has the time."""
 
 SAME = 1e-10
-"""Share of a column's variance that a straight line in measured and simulated value leaves, from which on it is one of these."""
+"""Residual share of a column's variance, after a straight line in measured and simulated value, below which it is one
+of these values."""
 
 MOST_RESETS = 30
-"""Rows that a run has on average, at the least, where a clock that starts again is taken for the beginning of a new run."""
+"""Least average number of rows per run, if each restart of the clock begins a run."""
 
 
 @dataclass(frozen=True, eq=False)
 class TableOptions:
-    """What is asked of the files.
+    """Options for reading the files.
 
     Attributes:
         variables: meaning by name of columns that the difference may follow; None: all suitable ones.
@@ -67,7 +68,7 @@ class TableOptions:
 
 @dataclass(frozen=True, eq=False)
 class Tabulated:
-    """Files read."""
+    """The content of the files as a table."""
 
     table: Table
     names: tuple[str, ...]
@@ -131,7 +132,7 @@ def stated_uncertainties(given: str | Mapping[str, float]) -> dict[str, float]:
 
 
 def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabulated:
-    """Read tables, or take columns as `given_table` does, and put them together.
+    """Read tables, or convert columns as `given_table` does, and join them.
 
     Raises:
         InputError: every fault with its line; different units of measured and simulated values; too few rows.
@@ -167,7 +168,7 @@ def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabula
 
 
 def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table) -> Tabulated:
-    """Read other rows of the columns of a table; they need no measured values.
+    """Read other rows with the columns of a table; they need no measured values.
 
     Raises:
         InputError: a column that is not there, or no row with all values.
@@ -207,12 +208,12 @@ def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table
 
 
 LARGEST_SIZE = 1e60
-"""Greatest number that is compared, and its inverse the least beside 0: no quantity in any unit is beyond, and their fourth
-powers still have room in a double."""
+"""Greatest number that is compared; its inverse is the least beside 0. Real quantities are within this range, and their
+fourth powers fit into a double."""
 
 LARGEST_RATIO = 1e6
-"""How many times greater measured values may be than simulated ones, or the other way round: nanometres against
-millimetres. A difference of which the smaller is the millionth part has no digits of it left."""
+"""Greatest ratio of measured to simulated values, or of simulated to measured ones: nanometres to millimetres. With a
+greater ratio, the difference has no digits of the smaller value."""
 
 
 def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
@@ -247,7 +248,7 @@ def _greatest(files: Sequence[TableFile], name: str) -> float:
 def load_sources(
     files: Sequence[Path], columns: Container[str], where: str = "the table"
 ) -> tuple[list[TableSource], dict[str, str]]:
-    """Return own physics for which there are columns, and why others lack them, by name.
+    """Return own physics whose columns exist, and by name the missing columns of the others.
 
     Raises:
         InputError: faults of the files.
@@ -355,7 +356,7 @@ class _Reader:
         return [name for name in others if name not in siblings and self._is_numeric(name, values[name])]
 
     def _is_another_pair(self, name: str) -> bool:
-        """Return whether a column belongs to another measured and simulated pair, by its distinguishing word."""
+        """Return whether a column's name shows that it belongs to another pair of measured and simulated values."""
         measured, simulated = (set(_words(one)) for one in (self._asked.measured, self._asked.simulated))
         marks = (measured - simulated, simulated - measured)
         words = _words(name)
@@ -367,7 +368,7 @@ class _Reader:
         return False
 
     def _refuse_constant(self, measured: Floats, simulated: Floats) -> None:
-        """Refuse values that differ by one number: what rounding adds to it is no noise."""
+        """Refuse values that differ by a constant only: its rounding is no noise."""
         apart = measured - simulated
         rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
         if float(np.ptp(apart)) > rounding:
@@ -398,7 +399,7 @@ class _Reader:
     def order(
         self, values: Mapping[str, Floats], used: Sequence[str], clock: str | None
     ) -> tuple[Integers, tuple[slice, ...], tuple[str, ...]]:
-        """Return complete rows, by block in time order, with the blocks and their names."""
+        """Return the complete rows in time order within each block, the blocks, and their names."""
         good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
         if not good.all():
             self.notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
@@ -465,7 +466,7 @@ class _Reader:
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, Floats]) -> bool:
-        """Return whether a column derives from the measured value, and not from the simulated one alone, as a speed of friction."""
+        """Return whether a column is computed from the measured value, and not from the simulated value alone, such as a speed for friction."""
         asked = self._asked
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.simulated], kept[asked.measured]])
         alone, beside = (float(np.sum(np.square(left_by(columns, variable.values)))) for columns in (both[:, :2], both))
@@ -486,7 +487,7 @@ def _is_a_line(one: Floats, other: Floats) -> bool:
 
 
 ROUNDED = 1e-9
-"""Share of a column's size by which it may depart from a line in another that it is."""
+"""Largest relative departure of a column from a line in another column that counts as equal."""
 
 
 def _by_clock(rows: Integers, clock: Floats) -> list[Integers]:

@@ -1,4 +1,4 @@
-"""Progress and stopping of tasks."""
+"""Report the progress of tasks, and stop them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Progress(Protocol):
     """Receives the progress of work."""
 
     def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Take a stage, and its completed part if countable."""
+        """Receive the name of a stage and, if countable, its completed part."""
 
 
 def silent(text: str, done: int = 0, of: int = 0) -> None:
@@ -31,7 +31,7 @@ def never() -> bool:
 
 
 class Telling:
-    """Passes on stages and notes, and stops at the next stage if asked."""
+    """Reports stages and notes, and stops at the next stage on request."""
 
     def __init__(
         self, progress: Progress = silent, stop: Callable[[], bool] = never, say: Callable[[str], None] = silent
@@ -42,7 +42,7 @@ class Telling:
         self._say = say
 
     def stage(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Tell a stage.
+        """Report a stage.
 
         Raises:
             StoppedError: the work is to stop.
@@ -52,11 +52,11 @@ class Telling:
         self._progress(text, done, of)
 
     def counted(self, text: str) -> Callable[[int, int], None]:
-        """Return a callback for the pieces done in a stage."""
+        """Return a callback for the completed pieces of a stage."""
         return lambda done, of: self.stage(text, done, of)
 
     def note(self, *texts: str) -> None:
-        """Tell what was noticed."""
+        """Report a note."""
         for text in texts:
             self.notes.append(text)
             self._say(text)

@@ -220,7 +220,7 @@ def _parted(log: EventLog, handle: int) -> int:
 
 
 def set_back(log: EventLog) -> list[str]:
-    """Return the line of an event that is dated before its predecessor."""
+    """Return a sentence for each event that is dated before its predecessor."""
     dated = [(number, event, event.at) for number, event in enumerate(log.events, start=1) if event.at is not None]
     told = []
     for (_, _, before), (number, event, at) in pairwise(dated):

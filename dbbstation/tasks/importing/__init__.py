@@ -1,1 +1,1 @@
-"""Recordings made elsewhere as a session: columns, runs, computed values."""
+"""Import other programs' recordings as a session: columns, runs, computed values."""

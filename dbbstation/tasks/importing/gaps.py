@@ -1,4 +1,4 @@
-"""Cells without a reading: empty, or words for an out-of-range gauge. They are gaps, not faults."""
+"""Recognise cells without a reading, which are gaps and not faults: empty cells, or words for an out-of-range gauge."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ OUT_OF_RANGE = frozenset(
         "fault",
     }
 )
-"""Words of displays for a reading that is none, in small letters, signs and stars around them left out."""
+"""Words of displays for a missing reading, in small letters, without surrounding signs and stars."""
 
 _OF_A_SAMPLE = (LENGTH, DEVIATION, ANGLE, TIME)
-"""Meanings without which a row is no sample."""
+"""Meanings that every sample needs."""
 
 
 def says_no_reading(cell: str) -> bool:
@@ -88,7 +88,7 @@ def samples_of(
 def held_over_gaps(
     table: ForeignTable, rows: Integers, name: str, faults: list[Problem]
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Return a slow column, such as a temperature; a gap repeats the reading before, a first gap the one after."""
+    """Return a slow column, such as a temperature. A gap gets the previous reading; a gap at the begin gets the next one."""
     numbers = table.table.values[name][rows]
     bad = ~np.isfinite(numbers)
     if not bad.any():

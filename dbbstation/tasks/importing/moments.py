@@ -1,4 +1,4 @@
-"""When a run was recorded, by a column, lines above the table, or the file's name."""
+"""Find the time of a recording from a column, from lines above the table, or from the file's name."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ DATE_KEYS = (
     "measured",
     "begin",
 )
-"""Lines above a table that say when it was taken, in small letters; the first that is there counts."""
+"""Keys of lines above a table with its date, in small letters; the first one found counts."""
 
 TIME_KEYS = ("time", "uhrzeit", "zeit", "start time", "startzeit", "test time")
-"""Lines that say the time of day where the date stands by itself."""
+"""Keys of lines with the time of day, if the date has none."""
 
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _GERMAN = {"mär": 3, "mrz": 3, "mai": 5, "okt": 10, "dez": 12}
@@ -49,7 +49,7 @@ _IN_A_NAME = re.compile(
 
 
 class UnclearMomentError(ValueError):
-    """A date that is none, or ambiguous."""
+    """A date that is invalid or ambiguous."""
 
     def __init__(self, what: str, key: str = "") -> None:
         self.what, self.key = what, key
@@ -58,7 +58,7 @@ class UnclearMomentError(ValueError):
 
 @dataclass(frozen=True)
 class Moment:
-    """When something was taken.
+    """The time of a recording.
 
     Attributes:
         assumed: assumptions beyond the text, in words; may be empty.

@@ -1,4 +1,4 @@
-"""The run of a recording by words of the user or the file's name."""
+"""Find the run of a recording from words of the user or the file's name."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ WORDS = {
     **dict.fromkeys(("ccw", "anticlockwise", "counterclockwise", "counter-clockwise", "+"), Direction.CCW),
     **dict.fromkeys(("cw", "clockwise", "-"), Direction.CW),
 }
-"""Directions as people write them."""
+"""Words for directions."""
 
 
 @dataclass(frozen=True)
 class RunName:
-    """A run as far as it is named.
+    """The known parts of a run's name.
 
     Attributes:
         test: empty if not named.

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Ball
 
 LEAST_RANGE_MM = 2e-4
-"""Readings of a whole turn that differ by less are none of a bar: bars resolve 0.1 µm, and their noise alone spans more [mm]."""
+"""Least range of a bar's readings over a turn [mm]: bars resolve 0.1 µm, and their noise alone spans more."""
 
 LIKE_A_UNIT = 0.1
-"""Share by which a ratio may differ from that of two units and still be taken for it."""
+"""Largest relative difference between a ratio of numbers and the ratio of two units that it indicates."""
 
 MOST_TURNS = 2.0
-"""Turns that the angles of one run span at the most, its overshoot included."""
+"""Greatest number of turns in the angles of one run, with overshoot."""
 
 CHANCE = 1e-3
-"""Probability by chance below which centres lie nearer to zero than balls can be put up."""
+"""Probability below which centres are nearer to their commanded places than balls can be put up."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Implausible:
 def unlike_a_bar(
     numbers: Floats, means: str, unit: str, zero_mm: float, circle: Circle, feed_in_mm: float | None = None
 ) -> Implausible | None:
-    """Return why a turn's readings contradict their unit while another fits, or None.
+    """Return why a turn's readings contradict their unit, if another unit fits, else None.
 
     Args:
         means: `length` or `deviation`.
@@ -77,7 +77,7 @@ def unlike_a_bar(
 
 
 def unlike_a_turn(theta_deg: Floats, unit: str) -> Implausible | None:
-    """Return why angles contradict their unit while another gives a turn, or None."""
+    """Return why angles contradict their unit, if another unit gives a turn, else None."""
     span = float(np.ptp(theta_deg)) / UNITS[ANGLE][unit]
     turns = [
         f"{ANGLE}:{one}"
@@ -90,7 +90,7 @@ def unlike_a_turn(theta_deg: Floats, unit: str) -> Implausible | None:
 
 
 def unlike_the_feed(t_s: Floats, theta_deg: Floats, unit: str, circle: Circle) -> Implausible | None:
-    """Return why times contradict their unit while another gives the plan's feed, or None."""
+    """Return why times contradict their unit, if another unit gives the plan's feed, else None."""
     turned = float(np.sum(np.abs(np.diff(np.unwrap(theta_deg, period=FULL_TURN_DEG)))))
     took = float(t_s[-1] - t_s[0]) if len(t_s) > 1 else 0.0
     if took <= 0.0 or turned <= 0.0:
@@ -117,7 +117,7 @@ def check_units(
     values: Mapping[str, Floats],
     circle: Circle,
 ) -> None:
-    """Refuse numbers that contradict their unit while another fits.
+    """Refuse numbers that contradict their unit if another unit fits.
 
     Raises:
         UnusableTravelError: with the fitting units.
@@ -165,10 +165,10 @@ def centre_mm(length_mm: Floats, theta_deg: Floats) -> Floats:
 
 
 def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[Floats]]]) -> float | None:
-    """Return the probability that raw circles are as near to their commanded centres by chance; None if unknown.
+    """Return the probability that raw circles are by chance so near to their commanded centres; None if unknown.
 
-    Each axis of a centre scatters at least by CMM and holder (sigma). A distance up to r has a probability of at most 1
-    - exp(-r² / (2 sigma²)). Fisher's method combines independent balls.
+    Each axis of a centre scatters at least by CMM and holder (sigma). So a distance up to r has a probability of at
+    most 1 - exp(-r² / (2 sigma²)). Fisher's method combines independent balls.
 
     Args:
         centres: of each ball with known place, its runs' centres, shape (2,) each [mm].

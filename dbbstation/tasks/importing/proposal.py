@@ -1,4 +1,4 @@
-"""Propose meanings of a foreign table's columns by their names, for a person to confirm."""
+"""Propose meanings of a foreign table's columns from their names, for the user to confirm."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ _WORDS = {
     },
     DIRECTION: {"richtung", "dir", "sens", "direzione", "dirección", "direção"},
 }
-"""Words of columns by what they mean, in the languages of shops that were thought of; a radius deviation is a deviation."""
+"""Words in names of columns by meaning, in several languages; a radius deviation is a deviation."""
 
 _NO_READINGS = {
     "nominal",
@@ -128,7 +128,7 @@ _NO_READINGS = {
     "目標",
     "設定",
 }
-"""Words of columns that hold what was wanted, not what was read."""
+"""Words in names of columns with nominal values, which are no readings."""
 
 _UNIT_WORDS = {
     **dict.fromkeys(("µm", "um", "micron", "microns", "micrometer", "mikrometer"), "µm"),
@@ -153,7 +153,7 @@ _OWN |= {
 }
 
 EXPORTED = frozenset({"test", "direction", "repeat", columns.TIME, columns.THETA, columns.LENGTH})
-"""Columns that tell a table of `dbbstation export`."""
+"""Columns that identify a table of `dbbstation export`."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class Proposed:
 
     @property
     def complete(self) -> bool:
-        """Return whether a needed unit is known."""
+        """Return whether the unit is known or not needed."""
         return self.means not in UNITS or bool(self.unit)
 
 

@@ -1,4 +1,4 @@
-"""From foreign tables to the runs of a plan: runs, units, angles, times."""
+"""Convert foreign tables to runs of a plan, with units, angles and times."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ImportedRun:
-    """A run as it will be written."""
+    """A run that is ready to be written."""
 
     file: str
     run: FinishedRun
@@ -73,7 +73,7 @@ class ImportedRun:
 
 @dataclass
 class Reader:
-    """Turns tables into runs and gathers every fault.
+    """Converts tables to runs and collects every fault.
 
     Args:
         trusted: doubtful properties to accept: `unit`.
@@ -119,7 +119,7 @@ class Reader:
         return found
 
     def check(self) -> None:
-        """Refuse the faults so far.
+        """Raise an error if there are faults so far.
 
         Raises:
             InputError: the faults so far.
@@ -293,7 +293,7 @@ class Reader:
         return RunName(test, direction or in_column.direction, repeat)
 
     def asked_span_deg(self, table: ForeignTable) -> float | None:
-        """Return the span of a file's angles if no circle of the plan has it, else None [deg]."""
+        """Return the range of a file's angles [deg] if no circle of the plan has it, else None."""
         name = self.mapping.column(ANGLE)
         if (
             name is None
@@ -389,7 +389,7 @@ _SAY_IT = "add it to the mapping, as `ignored` where it does not matter"
 
 
 def chance_of_runs(runs: Sequence[ImportedRun], plan: Plan) -> float | None:
-    """Return the probability that runs are as near to their commanded centres by chance; None if unknown."""
+    """Return the probability that runs are by chance so near to their commanded centres; None if unknown."""
     centres: dict[tuple[str, int | None], list[Floats]] = {}
     for one in runs:
         columns_of = one.run.columns

@@ -1,4 +1,4 @@
-"""Write imported runs as a sealed session, after a trial beside it."""
+"""Write imported runs as a sealed session, after a trial in a temporary folder."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from dbbstation.tasks.importing.runs import ImportedRun
 
 IMPORTED = "imported"
-"""Folder in the session with the files as they came, the mapping, and what the import was."""
+"""Folder in the session with the original files, the mapping, and the import's statements."""
 
 
 def originals(
     tables: Mapping[Path, bytes], mapping: MappingFile, provenance: Provenance, statements: Sequence[str]
 ) -> dict[str, str | bytes]:
-    """Return the files of its import that a session keeps, content by relative path."""
+    """Return the files of the import that the session keeps, as content by relative path."""
     names: dict[str, bytes] = {}
     for path, data in tables.items():
         name, k = path.name, 2
@@ -60,7 +60,7 @@ def staged(
     *,
     dry: bool,
 ) -> Iterator[Callable[[], None]]:
-    """Write a session beside its place, read it and cut every accepted run; yield a function that moves it there, or else it is removed.
+    """Write a session into a temporary folder, read it and cut every accepted run. Yield a function that moves it to its place; otherwise it is removed.
 
     Args:
         dry: never move it; use the system's temporary folder.

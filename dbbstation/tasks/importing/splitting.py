@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
 
 SMALLEST_RUN_DEG = 90.0
-"""Angles that turn back by less are no new run: an axis that settles, an overshoot, a reading that jitters [deg]."""
+"""Smallest reversal of the angles that begins a new run [deg]; smaller ones come from settling axes, overshoot or
+noise."""
 
 
 def longest_pause_s(circles: Sequence[Circle]) -> float:

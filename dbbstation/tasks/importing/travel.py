@@ -1,4 +1,4 @@
-"""Times and angles of a run in the machine's frame; missing ones follow from the plan's feed."""
+"""Compute times and angles of a run in the machine's frame; missing ones follow from the plan's feed."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.mapping import AngleSchema
 
 LONGEST_START_S = 3600.0
-"""Times that begin later, or before 0, are those of a clock: they are counted from the first sample [s]."""
+"""Times that begin later or below 0 are clock times [s]; they are then counted from the first sample."""
 
 UNLIKE_FEED = 0.05
-"""Share that the feed of times and angles may differ from the plan's before it is told: ramps and dwells of a control are less than a
-hundredth of a turn's time on the recordings at hand."""
+"""Largest relative difference between the recorded feed and the plan's that is not reported. In known recordings, ramps
+and dwells of a control are less than a hundredth of a turn's time."""
 
 LEAST_TURN = 0.99
-"""Share of a turn that times must cover at the plan's feed; less says that the feed is another one."""
+"""Least share of a turn that the times must cover at the plan's feed; less means that the feed differs."""
 
 
 UNLIKE_SPAN_DEG = 2.0
-"""How far a span may be off: controls cut a degree of the first or last move [deg]."""
+"""Largest difference of a range of angles [deg]: controls may cut a degree of the first or last move."""
 
 
 class UnusableTravelError(Exception):
@@ -39,7 +39,7 @@ class UnusableTravelError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class TravelledPath:
-    """When and where a run's samples were taken.
+    """Times and angles of a run's samples.
 
     Attributes:
         theta_deg: from +X towards +Y, shape (n,); None: find the circle in the trace.
@@ -58,7 +58,7 @@ def rises(angle_deg: Floats) -> bool:
 
 
 def machine_angles(angle_deg: Floats, said: AngleSchema, circle: Circle) -> Floats:
-    """Return angles from +X towards +Y, shape (n,) [deg].
+    """Return machine angles from +X towards +Y, shape (n,) [deg].
 
     Args:
         said: its zero and sense.
@@ -78,7 +78,7 @@ def machine_angles(angle_deg: Floats, said: AngleSchema, circle: Circle) -> Floa
 
 
 def unplanned_span_deg(theta_deg: Floats, circle: Circle) -> float | None:
-    """Return the angles' span if it is neither a turn nor the plan's path with overshoot, else None [deg]."""
+    """Return the range of the angles [deg] if it is neither a turn nor the plan's path with overshoot, else None."""
     travelled = _unwrapped(theta_deg)
     spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
     span = float(np.ptp(travelled))
@@ -91,7 +91,7 @@ def unplanned_span_deg(theta_deg: Floats, circle: Circle) -> float | None:
 
 
 def check_span(theta_deg: Floats, stated_deg: float | None, circle: Circle) -> tuple[str, ...]:
-    """Return notes on a confirmed span that is not the plan's.
+    """Return notes on a confirmed range that differs from the plan's.
 
     Args:
         stated_deg: confirmed; None if not.

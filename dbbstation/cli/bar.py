@@ -32,7 +32,7 @@ class BarOptions:
     temp_c: Annotated[float, Option("Temperature of the bar [degC].", least=-30.0, most=80.0)]
     temp_uncertainty_k: Annotated[
         float,
-        Option("Standard uncertainty of the bar's temperature [K].", flag="--temp-u-k", least=0.001, most=10.0),
+        Option("Standard uncertainty of the bar's temperature [K].", least=0.001, most=10.0),
     ] = USUAL_TEMP_UNCERTAINTY_K
     expansion_um_m_k: Annotated[
         float,

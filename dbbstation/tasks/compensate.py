@@ -65,7 +65,6 @@ def compensate(
         Numbers | None,
         Option(
             "Angles at which a program of three axes runs [deg].",
-            flag="--angles",
             metavar="A,B,C",
             parse=partial(numbers_of, counts={3}),
         ),
@@ -74,7 +73,6 @@ def compensate(
         Offsets | None,
         Option(
             "Work offset in the control, G54 to G59.3 or G92, or position of G28 or G30 [mm]. A, B, C may follow [default: zero].",
-            flag="--offset",
             metavar="G54=X,Y,Z",
             parse=partial(named_numbers, counts={3, 6}),
         ),
@@ -86,7 +84,6 @@ def compensate(
         Lengths | None,
         Option(
             "Length of a tool in the control, for G43 [mm].",
-            flag="--tool-length",
             metavar="TOOL=MM",
             parse=lengths_by_tool,
         ),
@@ -130,8 +127,8 @@ def compensate(
     \b
     Examples:
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
-      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles 0,0,0 --offset G54=20,-35,-1000 --tool-length 1=52.1
-      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles 0,0,0 --parameters linuxcnc.var --tools tool.tbl
+      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles-deg 0,0,0 --offsets G54=20,-35,-1000 --tool-lengths-mm 1=52.1
+      dbbstation compensate block.ngc --model model.yaml --out true.ngc --angles-deg 0,0,0 --parameters linuxcnc.var --tools tool.tbl
       dbbstation compensate part.ngc --model model.yaml --out true.ngc --strict
 
     Args:

@@ -227,7 +227,7 @@ def test_offsets_and_lengths_come_from_linuxcncs_files_and_the_command(tmp_path,
     )
     (tmp_path / "tool.tbl").write_text("T1 P1 Z12.5 D6 ;end mill\nT2 P2 Z+3.5\n")
     files = ("--parameters", tmp_path / "linuxcnc.var", "--tools", tmp_path / "tool.tbl")
-    common = (part, "--model", model_file, "--out", out, "--force", "--angles", "0,0,0")
+    common = (part, "--model", model_file, "--out", out, "--force", "--angles-deg", "0,0,0")
     with pytest.raises(InputError, match=r"part\.ngc:6:5: the length of tool 1 is not known"):
         run(compensate, *common)
     run(compensate, *common, *files)
@@ -246,10 +246,10 @@ def test_offsets_and_lengths_come_from_linuxcncs_files_and_the_command(tmp_path,
     ]  # where Z stands is not known before G43
     cuts = [line for line in lines if line.startswith("G1 ")]
     np.testing.assert_allclose([float(cuts[0].split("Z")[1].split()[0])], [-1.0], atol=0.5)
-    run(compensate, *common, *files, "--offset", "G54=0,0,-990", "--tool-length", "1=10")
+    run(compensate, *common, *files, "--offsets", "G54=0,0,-990", "--tool-lengths-mm", "1=10")
     assert "work system G54: Z-990" in out.read_text()
     assert "the length of tool 1: Z10" in out.read_text()
-    assert run(compensate, *common, "--offset", "G54=0,0").exit_code == 2
+    assert run(compensate, *common, "--offsets", "G54=0,0").exit_code == 2
     (tmp_path / "tool.tbl").write_text("tools of the shop\n")
     with pytest.raises(InputError, match=r"tool\.tbl:1:1: this is not a line of a tool table"):
         run(compensate, *common, *files)

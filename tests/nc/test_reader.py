@@ -137,7 +137,9 @@ def test_a_program_of_another_language_does_not_flood_the_terminal():
 
 
 def test_the_first_move_must_say_where_the_machine_is():
-    with pytest.raises(InputError, match=r"part.ngc:2:1: the program does not state the place of A, B, C; --angles"):
+    with pytest.raises(
+        InputError, match=r"part.ngc:2:1: the program does not state the place of A, B, C; --angles-deg"
+    ):
         read_program("G0 X1 Y2 Z-1000\nM2\n", "part.ngc")
     with pytest.raises(InputError, match=r"the program does not state the place of X before this move"):
         read_program("G91 G0 X1 Y2 Z-1 A0 B0 C0\nM2\n", "part.ngc")

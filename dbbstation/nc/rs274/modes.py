@@ -137,7 +137,7 @@ class Modes:
             isinstance(which, str) and self._state.parameter(which) is not None
         ):
             what = f"#{which if isinstance(which, int) else f'<{which}>'} is the control's own"
-            raise block.place.fault(column, what, "set offsets with G10 L2, and lengths with --tool-length")
+            raise block.place.fault(column, what, "set offsets with G10 L2, and lengths with --tool-lengths-mm")
         self.flow.set(which, value)
 
     def _said(self, block: ProgramBlock) -> None:

@@ -133,7 +133,7 @@ class ControlState:
             raise block.place.fault(column, what, "give H, a whole number from 1")
         if int(which) not in self.lengths:
             what = f"the length of tool {which:g} is not known"
-            remedy = f"give it with --tool-length {which:g}=MM, or LinuxCNC's tool table with --tools"
+            remedy = f"give it with --tool-lengths-mm {which:g}=MM, or LinuxCNC's tool table with --tools"
             raise block.place.fault(column, what, remedy)
         self.length, self.length_said = self.lengths[int(which)], True
         self._counted()
@@ -194,7 +194,7 @@ def unknown_place(block: ProgramBlock, axes: list[str], when: str = " before thi
     """Return the fault of a block that needs the unknown position of axes."""
     what = f"the program does not state the place of {', '.join(axes)}{when}"
     remedy = (
-        "--angles A,B,C states at which a program without them runs"
+        "--angles-deg A,B,C states at which a program without them runs"
         if set(axes) <= set("ABC")
         else "name all axes in rapids before the first cut, absolutely (G90), or say with --start where the machine stands"
     )

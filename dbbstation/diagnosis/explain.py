@@ -315,6 +315,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
                 shapes_within=within,
                 amplitudes_within=float(SCALES[-1]),
                 must_settle=within is None,
+                also_held=channel.held,
             )
         except (CalibrationError, KinematicsError):
             continue

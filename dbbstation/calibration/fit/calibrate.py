@@ -141,6 +141,7 @@ def calibrate(
     shapes_within: float | None = None,
     amplitudes_within: float = np.inf,
     must_settle: bool = True,
+    also_held: Floats | None = None,
 ) -> Calibration:
     """Fit error sources to raw circles.
 
@@ -179,7 +180,7 @@ def calibrate(
     lost, held = np.zeros((0, 0)), None
     limits, at_limit, settled = layout.limits, np.zeros(0, dtype=np.int64), False
     for steps in range(MOST_STEPS):
-        seen = lost_directions(nominal, layout.known, noise.effective)
+        seen = _with(lost_directions(nominal, layout.known, noise.effective), also_held)
         if len(seen) != len(lost) or held is None:
             lost = seen
             held = lost if prescribe is None else prescribed(layout, lost, prescribe)
@@ -230,6 +231,15 @@ def calibrate(
         at_limit=tuple(at_limit.tolist()),
         settled=settled,
     )
+
+
+def _with(lost: Floats, more: Floats | None) -> Floats:
+    """Return orthonormal rows that hold more directions, too, of the first columns."""
+    if more is None:
+        return lost
+    wide = np.pad(more, ((0, 0), (0, lost.shape[1] - more.shape[1])))
+    _, size, rows = np.linalg.svd(wide - (wide @ lost.T) @ lost, full_matrices=False)
+    return np.vstack([lost, rows[size > np.sqrt(0.5)]])
 
 
 def _approached(

@@ -60,7 +60,9 @@ def test_heights_that_no_circle_shows_stay_at_nominal_beside_a_table_that_was_ra
     def moved(also_held):
         fit = calibrate(recorded.machine, recorded.observations, sources, start, also_held=also_held)
         base = np.flatnonzero(~before.layout.known.random)
-        along = before.solution.held @ ((fit.x - fit.layout.nominal)[: len(before.x)][base] / before.layout.known.scale[base])
+        along = before.solution.held @ (
+            (fit.x - fit.layout.nominal)[: len(before.x)][base] / before.layout.known.scale[base]
+        )
         return float(np.abs(along).max())
 
     assert moved(before.solution.held) < 1e-9

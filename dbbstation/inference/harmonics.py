@@ -138,7 +138,7 @@ def amplitudes_of(several: Sequence[Floats], phase_rad: Floats, highest: int) ->
         return list(np.vstack([fitted[:1].astype(np.complex128), waves]).T)
     right = [np.concatenate([sums[highest:0:-1], np.conj(sums[: highest + 1])]) for sums in further]
     found = np.linalg.solve(normal, np.column_stack(right))[highest:]
-    found[1:] *= 2.0  # negative harmonics are the conjugates of positive ones
+    found[1:] *= 2.0  # negative harmonics are conjugates of positive ones
     return list(found.T)
 
 
@@ -148,7 +148,7 @@ def smooth(residual: Floats, phase_rad: Floats, highest: int = LOW) -> Floats:
 
 
 def smooth_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> list[Floats]:
-    """Return several such residuals at equal phases."""
+    """Return several smoothed residuals at equal phases."""
     if not several:
         return []
     padded = np.zeros((len(several), (highest // AT_ONCE + 1) * min(AT_ONCE, highest + 1)), dtype=np.complex128)
@@ -163,15 +163,16 @@ def smooth_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> lis
 
 
 WORST_CONDITION = 1e6
-"""Condition of the normal equations above which they lose more than six of sixteen digits; evenly spaced phases have 1. It decides
-nothing: phases without 30 degrees have 7e5, without 45 degrees 2e9, and there, too, the basis gives the same to 1e-6 of the noise."""
+"""Largest condition number of normal equations, which lose six of sixteen digits; evenly spaced phases have 1. The
+limit is uncritical: phases without 30 degrees have 7e5, without 45 degrees 2e9, and even there the results agree to
+1e-6 of the noise."""
 
 AT_ONCE = 16
-"""Harmonics that are made from one of `basis`'s coarse waves: the root of the number that is usual."""
+"""Harmonics per coarse wave: the root of the usual number."""
 
 
 def bands(samples: int) -> tuple[int, int]:
-    """Return the highest smooth harmonic, and the highest for noise."""
+    """Return the highest harmonics of smooth misfit and of noise."""
     high = min(HIGH, max(samples // SAMPLES_PER_HARMONIC, 2))
     return min(LOW, max(high // 4, 1)), high
 
@@ -185,13 +186,13 @@ def misfit(
 ) -> Misfit:
     """Test low harmonics of residuals against noise by an F test.
 
-    Each group's common first harmonic is excluded, such as a ball's place.
+    Each group's common first harmonic, such as a ball's place, is excluded.
 
     Args:
         residuals: one period per run.
-        groups: sharing the first harmonic.
-        freedom_used: by the fit in low harmonics, beside shifts.
-        noise: None: from high harmonics.
+        groups: each run's group with a common first harmonic.
+        freedom_used: degrees of freedom of the fit in low harmonics, without shifts.
+        noise: None to estimate it from high harmonics.
     """
     low, high = bands(min(len(residual) for residual in residuals))
     mean, by_harmonic = _squares(centred_coefficients(residuals, phases_rad, groups, high), high)
@@ -217,7 +218,7 @@ def centred_coefficients(
     groups: Sequence[object],
     highest: int,
 ) -> Floats:
-    """Return all runs' coefficients without each group's common first harmonic, shape (runs, 2 highest + 1)."""
+    """Return all runs' coefficients less their group's common first harmonic, shape (runs, 2 highest + 1)."""
     found, first = _all_coefficients(residuals, phases_rad, highest), [1, highest + 1]
     for group in set(groups):
         rows = [k for k, g in enumerate(groups) if g == group]
@@ -230,12 +231,12 @@ def noise_left_by(
     phases_rad: Sequence[Floats],
     of_white: Sequence[Floats],
 ) -> Spectrum:
-    """Return noise from a residual of many columns, in higher harmonics.
+    """Estimate noise from high harmonics of the residual of many columns.
 
-    Draws of white noise measure the absorption.
+    Draws of white noise determine how much noise the columns absorb.
 
     Args:
-        of_white: residuals of white draws, per run, shape (n, draws).
+        of_white: residuals of these draws, per run, shape (n, draws).
     """
     low, high = bands(min(len(residual) for residual in residuals))
     together = [np.column_stack([one, white]) for one, white in zip(residuals, of_white, strict=True)]
@@ -244,7 +245,7 @@ def noise_left_by(
     draws = [_squares(found[:, :, k], high)[1] for k in range(1, found.shape[2])]
     freedom = 2.0 * len(residuals)
     share = np.mean(draws, axis=0) / freedom
-    # Few draws scatter from harmonic to harmonic; what a model takes out changes slowly with them.
+    # Few draws scatter between harmonics, but the absorbed share changes slowly.
     width = min(SMOOTHED, len(share))
     share = np.convolve(np.pad(share, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")[
         : len(squares)
@@ -255,17 +256,17 @@ def noise_left_by(
         return Spectrum(np.zeros(low + 1), 1.0)
     left = np.where(usable, squares[above] / np.maximum(share[above], LEAST_LEFT), np.nan)
     left = np.where(usable, left, np.nanmean(left))
-    # As many degrees of freedom as are left on average, with the power that all of them would have.
+    # The average remaining degrees of freedom, with the power of all.
     usual = float(np.mean(share[above]))
     return noise_spectrum(left * usual, low, freedom * usual)
 
 
 SMOOTHED = 9
-"""Harmonics over which the share that a model leaves is averaged."""
+"""Harmonics over which the remaining share is averaged."""
 
 LEAST_LEFT = 0.02
-"""Share of noise that columns must leave of a harmonic or frequency for it to say anything: of what they take up altogether, what priors
-leave is a shadow of the effect, not of the noise."""
+"""Least remaining share of noise of a usable harmonic or frequency. If columns absorb it completely, priors leave
+remains of the effect, not of noise."""
 
 
 def _all_coefficients(residuals: Sequence[Floats], phases_rad: Sequence[Floats], high: int) -> Floats:
@@ -298,12 +299,12 @@ def noise_spectrum(squares: Floats, low: int, freedom: float) -> Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class Continuations:
-    """Low-harmonic noise by process.
+    """Extrapolated low-harmonic noise for each process.
 
     Attributes:
         powers: at 0, 1, ... low, shape (processes, low + 1).
         likely: log likelihood of higher harmonics, up to a constant, shape (processes,).
-        variances: of the log mean power, shape (processes,).
+        variances: of the logarithm of mean power, shape (processes,).
     """
 
     powers: Floats
@@ -317,11 +318,11 @@ def continuations(
     freedom: float,
     processes: Callable[[Floats], Floats],
 ) -> Continuations | None:
-    """Continue noise below `low` with a floor and each process; None if white.
+    """Extrapolate noise below `low` by a floor plus each process; None if white.
 
     Args:
         low: excluded.
-        processes: power at harmonics, of free size, shape (processes, h).
+        processes: function from harmonics to unscaled powers, shape (processes, h).
     """
     harmonic = np.arange(low + 1.0, low + 1.0 + len(squares))
     mean = squares / freedom
@@ -335,7 +336,7 @@ def continuations(
         power = height @ under
         powers.append(power)
         likely.append(_likelihood(mean, height @ above, freedom))
-        # What floor and height leave uncertain in the low mean, by the information of the likelihood.
+        # Variance of the low mean due to floor and height, from the Fisher information.
         information = 0.5 * freedom * (above / (height @ above)) @ (above / (height @ above)).T
         wanted = (under / power).mean(axis=1)
         variances.append(float(wanted @ np.linalg.pinv(information) @ wanted))
@@ -345,7 +346,7 @@ def continuations(
 
 
 def first_order(harmonic: Floats, corners: Floats) -> Floats:
-    """Return unit first-order processes by corner, shape (processes, h)."""
+    """Return the power of unit first-order processes with each corner, shape (processes, h)."""
     return np.asarray(1.0 / (1.0 + (harmonic / corners[:, None]) ** 2))
 
 
@@ -365,7 +366,7 @@ def _fitted(mean: Floats, shapes: Floats) -> Floats:
 def _not_negative(rows: Floats, values: Floats) -> Floats:
     """Return non-negative least squares by two columns, shape (processes, 2).
 
-    A negative solution lies on an edge: one column.
+    If the solution is negative, a single column is best.
     """
     normal = np.einsum("cih,cjh->cij", rows, rows)
     right = np.einsum("cih,ch->ci", rows, values)
@@ -386,10 +387,10 @@ def _not_negative(rows: Floats, values: Floats) -> Floats:
 
 
 _SINGULAR = 1e-12
-"""Share of the product of squares below which the determinant of two columns has no digit left."""
+"""Relative determinant of two columns below which rounding dominates."""
 
 _SMALLEST_SHARE = 1e-6
-"""Least power of a harmonic, of the mean, while it is fitted: none is divided by zero. A recording of digits has more."""
+"""Least power of a fitted harmonic relative to the mean; it prevents division by zero. Rounded recordings have more."""
 
 
 def _likelihood(mean: Floats, power: Floats, freedom: float) -> float:

@@ -1,4 +1,4 @@
-"""Prediction of omitted blocks."""
+"""Predict omitted blocks."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Prediction errors of measurements that were not fitted.
+    """Prediction errors of omitted measurements.
 
     Attributes:
-        rms: with own random effects settled under priors, in the channel's unit.
-        normalised: root of squares in predicted covariance over freedom; near 1 if right.
+        rms: with the omitted blocks' random effects fitted under priors, in the channel's unit.
+        normalised: root of squares over predicted covariance and freedom; near 1 if correct.
     """
 
     rms: float
@@ -41,10 +41,10 @@ def held_out(
     """Omit groups of blocks in turn and predict them.
 
     Args:
-        groups: of each block, such as its test's fold.
+        groups: group of each block, such as the fold of its test.
         noise: white noise of equal low-frequency power.
-        held: directions kept at zero, in scales.
-        single: of a single measurement if less; None: `noise`.
+        held: directions held at zero, in scaled columns.
+        single: noise of a single measurement if smaller; None for `noise`.
     """
     used = Columns(known.prior[active], known.scale[active], known.random[active])
     thin = [_restricted(block, active) for block in blocks]
@@ -69,7 +69,7 @@ def _restricted(block: Block, active: Integers) -> Block:
 
 
 def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[float, int]:
-    # The last row of a triangle holds the length of what no column reaches, which is not one measurement's noise.
+    # The last row of a triangular factor contains the norm outside all columns, not the noise of one measurement.
     cut = [Block(b.columns, b.triangle[:-1], b.target[:-1], b.count, b.square) for b in blocks]
     whole, target = np.hsplit(spread(cut, len(fitted.x)), [-1])
     remaining = (target[:, 0] - whole @ fitted.x) / noise
@@ -89,6 +89,6 @@ def _left(blocks: Sequence[Block], known: Columns, x: Floats, noise: float) -> f
     stacked = np.vstack([whole[:, random] / noise, np.diag(1.0 / known.prior[random])])
     effects, *_ = np.linalg.lstsq(stacked, np.concatenate([remaining / noise, np.zeros(len(random))]), rcond=None)
     remaining = remaining - whole[:, random] @ effects
-    # What the triangles do not hold of the targets lies outside all columns and is left whatever is fitted.
+    # The targets' part outside all columns remains in every fit.
     beyond = sum(block.square - float(block.target @ block.target) for block in blocks)
     return float(remaining @ remaining) + max(beyond, 0.0)

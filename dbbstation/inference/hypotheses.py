@@ -1,7 +1,7 @@
-"""Search over sets of causes, with posterior probabilities.
+"""Search sets of causes and compute their posterior probabilities.
 
-A set's log posterior is its marginal likelihood, averaged over variants and sizes, plus prior odds. Growth, removal and
-exchange continue until all likely neighbours are examined.
+A set's log posterior is its log marginal likelihood, averaged over variants and sizes, plus log prior odds. The search
+adds, removes and exchanges causes until all neighbours of likely sets are examined.
 """
 
 from __future__ import annotations
@@ -23,30 +23,31 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Around, Cause, ModelComparison, Scan, Variant
 
 LIKELY = 8.0
-"""Log odds against the best hypothesis within which the neighbours of another one are looked at: what is less likely has a
+"""Largest log odds against a hypothesis, relative to the best, whose neighbours are examined; less likely ones have a
 probability of 3e-4."""
 
 CLOSE = 1.0
-"""The same where the most probable hypothesis alone is wanted: what is clearly less probable seldom has a neighbour that is more probable
-than all that the best one leads to. With 1, 3 and 8 ten groups of tests of the slowest session that is known chose the same."""
+"""The same limit if only the most probable hypothesis is wanted: clearly less probable ones seldom lead to a better
+neighbour. With 1, 3 and 8 the selections of ten groups of tests in the slowest known session were equal."""
 
 NEGLIGIBLE = 40.0
-"""Log odds against the best hypothesis from which on a first score is not kept: a million of such sets have a probability of
-4e-12 together, and their names are what a search without end fills the memory with."""
+"""Log odds against the best hypothesis above which first scores are discarded to save memory: a million such sets have
+a total probability of 4e-12."""
 
 
 SCAN, FIT = 1.0 / 3.0, 3e5
-"""Columns of a scan, and multiplications of a fit, that take as long as one cause times one column of an examined set: 16 µs. Measured on
-1,200 rows with 1,100 columns, where sets of 16 causes took 12 ms, scans of 500 columns 2.5 ms, fits 80 ms."""
+"""Work per column of a scan, and multiplications of a fit per unit of work. The unit is one cause times one column of
+an examined set, 16 µs. With 1,200 rows and 1,100 columns, sets of 16 causes took 12 ms, scans of 500 columns 2.5 ms,
+fits 80 ms."""
 
 
 @dataclass(eq=False)
 class SearchWork:
-    """Work of a search, counted by what it costs: sets, scans of all causes, and fits.
+    """Counted work of a search: examined sets, scans of all causes, and fits.
 
     Attributes:
-        most: work that may be done.
-        whole: that this is a part of, where it counts too.
+        most: limit of the work.
+        whole: total work to which this part is added.
     """
 
     most: float = np.inf
@@ -54,7 +55,7 @@ class SearchWork:
     whole: SearchWork | None = None
 
     def examine(self, members: Sequence[Member]) -> None:
-        """Count one set: causes times columns."""
+        """Count one examined set: causes times columns."""
         self._spend(len(members) * sum(len(member.columns) for member in members))
 
     def scan(self, causes: Iterable[Cause], times: int = 1) -> None:
@@ -62,7 +63,7 @@ class SearchWork:
         self._spend(times * SCAN * sum(len(one.columns) for cause in causes for one in cause.variants))
 
     def fit(self, rows: int, columns: int) -> None:
-        """Count one fit of all columns, as noise is measured and features are looked for: rows times columns squared."""
+        """Count one fit of all columns, rows times squared columns, for noise estimates and feature searches."""
         self._spend(rows * float(columns) ** 2 / FIT)
 
     def _spend(self, work: float) -> None:
@@ -71,7 +72,7 @@ class SearchWork:
             self.whole._spend(work)  # noqa: SLF001 - of the same class
 
     def part(self, stages: int) -> SearchWork:
-        """Return the work for one of so many stages; the stages share evenly what may still be done."""
+        """Return the work limit of one of several stages, which share the remaining work evenly."""
         return SearchWork(max(self.most - self.spent, 0.0) / stages, whole=self)
 
     @property
@@ -85,8 +86,8 @@ class Hypothesis:
     """A set of causes.
 
     Attributes:
-        members: with best variants and sizes.
-        log_factors: Bayes factor of each member beside others, averaged.
+        members: its causes with best variants and sizes.
+        log_factors: averaged log Bayes factor of each member, given the others.
     """
 
     members: tuple[Member, ...]
@@ -100,25 +101,25 @@ class Hypothesis:
 
     @property
     def lean(self) -> bool:
-        """Return whether every member is worth its prior odds."""
+        """Return whether every member's Bayes factor outweighs its prior odds."""
         return all(f + m.cause.log_prior_odds > 0.0 for m, f in zip(self.members, self.log_factors, strict=True))
 
     def without(self, *names: str) -> tuple[Member, ...]:
-        """Return the members without those named."""
+        """Return the members without the named ones."""
         return tuple(member for member in self.members if member.cause.name not in names)
 
     def log_factor(self, name: str) -> float:
-        """Return a cause's log Bayes factor beside the others."""
+        """Return a member's log Bayes factor, given the others."""
         return next(f for m, f in zip(self.members, self.log_factors, strict=True) if m.cause.name == name)
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Probabilities over sets of causes.
+    """Posterior probabilities of sets of causes.
 
     Attributes:
-        weights: log posterior of every relevant scored set.
-        at_limit: a larger set would be better; common members stay certain.
+        weights: log posteriors of all relevant sets.
+        at_limit: whether a set beyond the size limit would be better; common members stay certain.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -131,14 +132,14 @@ class Posterior:
         return self.hypotheses[0]
 
     def probability(self, names: Iterable[str]) -> float:
-        """Return the probability that at least one is present."""
+        """Return the probability that at least one cause is present."""
         wanted = frozenset(names)
         return self.probability_of(lambda key: bool(key & wanted))
 
     def probability_of(self, holds: Callable[[frozenset[str]], bool]) -> float:
         """Return the probability of sets with a property."""
         inside = [weight for key, weight in self.weights.items() if holds(key)]
-        # A part of a sum can round to more than the whole.
+        # Rounding can make a partial sum exceed the whole.
         return min(1.0, float(np.exp(logsumexp(inside) - self._total))) if inside else 0.0
 
     @cached_property
@@ -157,15 +158,15 @@ def search(
     thorough: bool = True,
     work: SearchWork | None = None,
 ) -> Posterior:
-    """Return the posterior over sets of causes.
+    """Search the sets of causes and return their posterior.
 
     Args:
         seeds: further sets to examine, such as earlier ones.
-        most_expanded: sets whose neighbours are examined.
-        most_members: None: unlimited.
-        likely: log odds of examined sets below the best; `CLOSE` for the best alone.
+        most_expanded: most sets whose neighbours are examined.
+        most_members: largest size of a set; None for no limit.
+        likely: log odds below the best of examined sets; `CLOSE` to find only the best.
         thorough: also replace two members by one, and one by two.
-        work: limit of counted work; at the limit the best so far is returned. None: unlimited.
+        work: limit of counted work, at which the best set so far is returned; None for no limit.
     """
     limit = work or SearchWork()
     return _Search(comparison, causes, most_expanded, most_members, likely, limit, thorough=thorough).run(seeds)
@@ -192,7 +193,7 @@ class _Search:
         self._beyond = -np.inf  # log posterior of the most probable set that is too large
         self._room = BOUNDS.scores
         self._top = -np.inf  # log posterior of the most probable hypothesis so far
-        self._begun = False  # seeds are looked at without a limit: they are the best so far
+        self._begun = False  # seeds are examined without a limit, because they are the best so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
         """Search until all likely sets are examined."""
@@ -264,7 +265,7 @@ class _Search:
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
-        """Keep a first score; examine a likely set whose last member is worth its odds."""
+        """Store a first score; examine a likely set whose last member outweighs its odds."""
         if len(members) > self._most_members:
             self._beyond = max(self._beyond, log_posterior)
             return
@@ -283,7 +284,7 @@ class _Search:
         hidden = {
             c.name for c, factor in zip(scan.causes, scan.log_factor, strict=True) if factor + c.log_prior_odds <= 0.0
         }
-        # What does not show alone seems small alone: beside what hides it, it may be as large as is plausible.
+        # A hidden cause seems small alone, but may have its plausible size given the cause that hides it.
         named = [
             replace(member, scale=1.0) if member.cause.name in hidden else member
             for member in (*scan.best, *scan.narrow)
@@ -298,7 +299,7 @@ class _Search:
             for (a, b), evidence in evidences.items()
             if named[a].cause is not named[b].cause
         ]
-        # A flexible form imitates two causes; what two that are not flexible do together is looked at by itself.
+        # A flexible form imitates two causes, so pairs of inflexible causes are examined separately.
         slim = [pair for pair in both if max(len(named[k].variant.columns) for k in pair[1:]) < FLEXIBLE]
         alone = self._comparison.log_evidence(members)
         for pairs in (both, slim):
@@ -362,9 +363,9 @@ class _Search:
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
 
     def _possible(self, comparison: ModelComparison, members: list[Member]) -> list[float]:
-        """Return the evidence of non-negative amplitudes.
+        """Return the members' log Bayes factors for non-negative amplitudes.
 
-        A truncated prior doubles density above zero: posterior over prior probability of positivity, a half.
+        The factor is the posterior over the prior probability of positive values, one half.
         """
         found = [0.0] * len(members)
         if not any(any(member.variant.positive) for member in members):
@@ -380,7 +381,7 @@ class _Search:
         return found
 
     def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:
-        """Return members by their best laws with best slack shares, and the gain of averaging over shares."""
+        """Return members with their best laws and slack shares, and the log gain of averaging over shares."""
         more = 0.0
         for k, member in enumerate(members):
             if len(member.variant.slack) == member.variant.tangents:
@@ -415,10 +416,10 @@ class _Search:
 
 
 class _Beside:
-    """Members of one set evaluated beside each other, the largest eliminated once.
+    """Evaluation of one set's members given each other; the largest member is eliminated only once.
 
     Attributes:
-        local: of their causes alone.
+        local: comparison of their causes only.
     """
 
     def __init__(self, comparison: ModelComparison, members: Sequence[Member]) -> None:
@@ -427,14 +428,14 @@ class _Beside:
         self._last: tuple[Member, ModelComparison] | None = None
 
     def others(self, members: Sequence[Member], k: int) -> tuple[ModelComparison, list[Member]]:
-        """Return comparison and remaining members, for questions beside all but one."""
+        """Return a comparison and members that together represent all members but one."""
         if k == self._largest:
             return self.local, [*members[:k], *members[k + 1 :]]
         first = self._largest
         return self._beside_largest(members), [m for j, m in enumerate(members) if j not in {k, first}]
 
     def log_evidence(self, members: Sequence[Member]) -> float:
-        """Return all members' log marginal likelihood."""
+        """Return the log marginal likelihood of all members."""
         if not members:
             return self.local.log_evidence(members)
         first = self._largest
@@ -448,7 +449,7 @@ class _Beside:
 
 
 def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[Member]:
-    """Return a member by each other law that is laid out: a scan compares laws without slack, which one may need more than another."""
+    """Return a member with each other law that has slack columns, because scans compare laws without slack."""
     if not (causes := other_laws(members[k], lambda variant: len(variant.slack) > 0)):
         return []
     comparison, others = beside.others(members, k)
@@ -456,7 +457,7 @@ def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[M
 
 
 def other_laws(member: Member, wanted: Callable[[Variant], bool] = lambda _: True) -> list[Cause]:
-    """Return a member's cause by each of its other laws, under the law's name, with the wanted forms."""
+    """Return one cause per other law of a member, named after the law, with the wanted forms."""
     laws: dict[str, list[Variant]] = {}
     for variant in member.cause.variants:
         if variant.law != member.variant.law and wanted(variant):

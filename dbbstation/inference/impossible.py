@@ -1,4 +1,4 @@
-"""Significantly negative values that cannot be."""
+"""Detect impossible values, such as significantly negative ones."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from dbbstation.inference.channel import Law
 
 NEGATIVE_SIGMA = 3.0
-"""Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
+"""Standard deviations below zero at which a non-negative parameter is impossible: one in 700 by chance."""
 
 
 def impossible(law: Law, values: Floats, variances: Floats) -> str:
-    """Return why amplitudes are impossible, or an empty text."""
+    """Return why amplitudes are impossible, else an empty text."""
     for k, positive in enumerate(law.positive):
         value = float(values[k])
         sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
@@ -28,19 +28,19 @@ def impossible(law: Law, values: Floats, variances: Floats) -> str:
 
 
 BEYOND = 5.0
-"""Root mean square of an effect over a variable, over that of the whole difference, beyond which it is impossible: most of it would cancel with
+"""Largest rms of an effect over a variable, relative to the whole difference; a larger effect would mostly cancel with
 others."""
 
 
 def beyond_reach(law: Law, rms: float) -> str:
-    """Return why an effect of a family is too large to be; empty if possible."""
+    """Return why an effect of a pattern is too large, else an empty text."""
     if law.family is None or law.reach is None or rms <= BEYOND * law.reach:
         return ""
     return f"It would have to be {rms / law.reach:.2g} times the difference itself, and cancel with others."
 
 
 def impossible_beside(law: Law, values: Mapping[str, Value], every: Mapping[str, float]) -> str:
-    """Return why values of a law cannot be beside those of others, by name, or an empty text."""
+    """Return why a law's values contradict the values of other laws, else an empty text."""
     if law.possible(every):
         return ""
     shown = ", ".join(f"{name} {value.value:.3g} {value.unit}" for name, value in values.items())
@@ -48,7 +48,7 @@ def impossible_beside(law: Law, values: Mapping[str, Value], every: Mapping[str,
 
 
 def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
-    """Return why a negative value is impossible, or an empty text."""
+    """Return why a negative value is impossible, else an empty text."""
     if value >= -NEGATIVE_SIGMA * sigma:
         return ""
     return (

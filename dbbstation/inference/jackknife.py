@@ -1,7 +1,8 @@
-"""Uncertainty of least squares by omitting blocks in turn.
+"""Uncertainty of least squares by omitting each block.
 
-It covers correlated or uneven noise without a model. [Tukey 1958; delete-a-group jackknife in Künsch, The jackknife and
-the bootstrap for general stationary observations, Annals of Statistics 17 (1989) 1217, sec. 2]
+The jackknife includes correlated and uneven noise without a noise model. [Tukey 1958; delete-a-group jackknife in
+Künsch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989) 1217, sec.
+2]
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ def weighted_jackknife(
     without: Floats,
     variances_without: Floats,
 ) -> Floats:
-    """Return standard uncertainties by omitted parts, shape (p,), weighted by remaining information.
+    """Return jackknife standard uncertainties, shape (p,), weighted by remaining information.
 
-    The expected square is the stated variance if right [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261,
-    eq. 5.1, by value].
+    If the stated variance is correct, it equals the expected square [weighted jackknife, Wu, Annals of Statistics 14
+    (1986) 1261, eq. 5.1, by value].
 
     Args:
-        without: values without each part, shape (k, p).
+        without: values fitted without each part, shape (k, p).
         variances_without: their stated variances, shape (k, p); infinite if a part alone determines the value.
     """
     with np.errstate(all="ignore"):
@@ -42,13 +43,13 @@ def weighted_jackknife(
 
 
 def widening(variances: Floats, moved: Floats, variances_without: Floats) -> Floats:
-    """Return factors to the larger of model and jackknife uncertainty, shape (p,).
+    """Return factors, shape (p,), from the model's uncertainty to the larger of model and jackknife uncertainty.
 
-    Values of one weak direction get similar factors, so scaled covariances keep combinations. Held values stay.
+    Values of one weak direction have similar factors, so scaled covariances keep combinations. Held values keep factor 1.
 
     Args:
         variances: shape (p,).
-        moved: changes without each part, shape (k, p).
+        moved: changes of values without each part, shape (k, p).
         variances_without: shape (k, p).
     """
     found = weighted_jackknife(np.zeros(len(variances)), variances, moved, variances_without)
@@ -56,7 +57,7 @@ def widening(variances: Floats, moved: Floats, variances_without: Floats) -> Flo
 
 
 def refits_without(settled: Settled, parts: Sequence[Flags]) -> tuple[Solution, ...]:
-    """Return refits of base and best members without each part, nothing chosen anew."""
+    """Refit base and best members without each part, with unchanged selection."""
     bank, channel, members = settled.bank, settled.channel, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     known = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))

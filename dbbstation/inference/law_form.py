@@ -1,4 +1,4 @@
-"""The law of a class of variables, by held-out scores."""
+"""Find the law of a class of variables by held-out scores."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ def law_form(
     parts: Sequence[Flags] | None,
     refuted: Collection[str] = (),
 ) -> LawForm:
-    """Score single causes, and the best set's own sum, over the variables of a class.
+    """Score the single causes over a class of variables, and the best set's sum of causes.
 
-    A part's score is the log evidence of all rows minus the evidence without the part, in equal noise. A law is named
-    if it surely beats every other candidate and no law at all, even without its best part. If a sum is best, each of
-    its laws is tested in place.
+    A part's score is the log evidence of all rows minus the log evidence without the part, for equal noise. A law is
+    named if it is surely better than every other candidate and than no law, even without its best part. If a sum is
+    best, each of its laws is tested against alternatives.
 
-    A law and a more flexible candidate that contains it predict about equally well. The evidence of all rows, which
-    counts amplitudes, may refute the flexible one; otherwise it leaves the law open.
+    A more flexible candidate that contains a law predicts about equally well. The evidence of all rows penalises
+    amplitudes and may refute it; otherwise the law stays open.
 
     Args:
-        parts: rows of each part, shape (n,); None: the evidence of all rows decides.
-        refuted: causes that are not named, since held-out rows speak against them.
+        parts: rows of each part, shape (n,); None to decide by the evidence of all rows.
+        refuted: causes that held-out rows refute, so they are not named.
     """
     barred = settled.bank.nameless | set(refuted)
     whole = _place(settled, one.members, one.wanted, parts, barred)
@@ -72,7 +72,7 @@ def _place(
     alive = [name for name in order if not _is_worse(scores[order[0]], scores[name], parts)]
     best = max(alive, key=lambda name: worth[name])
     if best not in names:
-        # What is the same to these rows keeps the name that the most probable set has.
+        # Among causes equal for these rows, the name in the most probable set stays.
         own = (name for name in alive if name in names)
         best = next((n for n in own if _are_the_same(settled, candidates[n], candidates[best], others)), best)
     not_worse, same = list[str](), list[str]()
@@ -112,7 +112,7 @@ def _candidates(
     best = {scan.causes[k].name: k for k in possible[: BOUNDS.candidates]}
     best |= {scan.causes[k].name: k for k in range(len(worth)) if len(names) == 1 and scan.causes[k].name in names}
     found: dict[str, tuple[Member, ...]] = {name: (scan.best[k],) for name, k in best.items()}
-    # A set that was compared has what its formulas may be off by in it.
+    # Compared sets include the inaccuracy of their formulas.
     weights, beside = settled.posterior.weights, frozenset(taken)
     values = {name: weights.get(beside | {name}, np.inf) - weights.get(beside, -np.inf) for name in best}
     values = {name: value if np.isfinite(value) else float(worth[best[name]]) for name, value in values.items()}
@@ -136,7 +136,7 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
 
 
 def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:
-    """Return whether parts other than the best one's strongest, or all rows if none were held back, surely prefer it."""
+    """Return whether all rows, or held-out parts without the best one's strongest part, surely prefer the best one."""
     apart = best - other
     return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
 
@@ -147,7 +147,7 @@ def _scores(
     others: Sequence[Member],
     parts: Sequence[Flags],
 ) -> dict[str, Floats]:
-    """Return each part's conditional log evidence over an empty place, shape (parts,) each."""
+    """Return each candidate's conditional log evidence of the parts, relative to no candidate, shape (parts,)."""
     bank = settled.bank
     every = np.unique(np.concatenate([m.columns for ms in (others, *candidates.values()) for m in ms]))
     whole = bank.beside().comparison(bank.target, every)
@@ -182,5 +182,5 @@ def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Membe
 
 
 def _count(members: Sequence[Member]) -> int:
-    """Return the numbers that some members have, nonlinear ones too: by each of them a law can bend to a part."""
+    """Return the number of parameters of members, nonlinear ones included: each can adapt to a part."""
     return sum(len(member.variant.columns) + len(member.variant.nonlinear) for member in members)

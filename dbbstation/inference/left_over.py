@@ -1,7 +1,7 @@
-"""Test a residual as noise: squares, periodogram, runs of sign, blocks, variables.
+"""Test whether a residual is noise: squares, periodogram, runs of sign, blocks, variables.
 
-All must pass. Each is a chance probability times its number of looks [Bonferroni; Miller, Simultaneous Statistical
-Inference, 2nd ed., sec. 1.3].
+The residual must pass all tests. Each gives a chance probability times the number of trials [Bonferroni; Miller,
+Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 SIGNIFICANT = 0.001
-"""Probability by chance, over all tests, below which something is left."""
+"""Chance probability over all tests below which a residual effect remains."""
 
 COUNTS_SIGMA = 4.0
-"""A smoothed deviation counts as misfit above this many of its standard deviations."""
+"""Standard deviations above which a smoothed deviation counts as misfit."""
 
 BINS = 20
-"""Pieces of a variable that are asked for by themselves, with as many rows in each."""
+"""Bins of a variable that are tested separately, with equal numbers of rows."""
 
 FEWEST = 20
-"""Rows that a test of their order needs."""
+"""Fewest rows for a test of their order."""
 
 
 @dataclass(frozen=True)
 class ResidualTest:
-    """One test for a remaining effect.
+    """Result of one test for a residual effect.
 
     Attributes:
         name: `sum of squares`, `wave in time`, `runs of sign`, `blocks`, or a variable.
-        rms: beyond noise, in the residual's unit.
+        rms: residual beyond noise, in its unit.
     """
 
     name: str
@@ -49,7 +49,7 @@ class ResidualTest:
 
 @dataclass(frozen=True)
 class LeftOver:
-    """Whether something is left beyond noise."""
+    """Results of all tests for residual effects."""
 
     is_noise: bool
     probability: float
@@ -57,7 +57,7 @@ class LeftOver:
 
     @property
     def worst(self) -> ResidualTest:
-        """Return the least probable test."""
+        """Return the test with the least probability."""
         return min(self.looks, key=lambda look: look.probability)
 
 
@@ -70,7 +70,7 @@ def left_over(settled: Settled) -> LeftOver:
     freedom = max(float(len(left) - used), 1.0)
     square = float(left @ left) / freedom
     beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma
-    # The noise was measured on the same rows, beside more columns: it is known about as well as the square.
+    # The noise was estimated on the same rows with more columns, so it is about as uncertain as the square.
     looks = [ResidualTest("sum of squares", float(f.sf(square, freedom, freedom)), beyond, "")]
     if channel.time is not None:
         looks += _in_order(left, channel.stretches, settled.noise.sigma)
@@ -91,7 +91,8 @@ def _in_order(left: Floats, stretches: Sequence[slice], sigma: float) -> list[Re
     if len(longest) >= FEWEST:
         power = np.abs(np.fft.rfft(longest - longest.mean())[1 : (len(longest) + 1) // 2]) ** 2
         at = int(power.argmax())
-        # Share of the largest of m exponential powers [Fisher, Proc. R. Soc. A 125 (1929) 54].
+        # Distribution of the largest of m exponential powers, as share of their sum [Fisher, Proc. R. Soc. A 125 (1929)
+        # 54].
         share = float(power[at] / max(float(power.sum()), 1e-300))
         chance = min(1.0, len(power) * (1.0 - share) ** (len(power) - 1))
         size = sigma * 2.0 * float(np.sqrt(power[at])) / len(longest) / float(np.sqrt(2.0))

@@ -1,6 +1,6 @@
-"""The three levels: does anything differ, what does it follow, which law.
+"""The three answers: whether anything differs, which variables it follows, which law it obeys.
 
-Each has own probability over all sets and held-out gain. An uncertain level takes nothing from the one above.
+Each answer has a probability over all sets and a held-out gain. An uncertain answer does not weaken the previous one.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
     from dbbstation.inference.verdict import DensityGains
 
 TIME, RUN = "time", "run"
-"""What is followed by what acts in single rows or over the clock, and by offsets of runs."""
+"""Names of what is followed by effects in single rows or over the clock, and by offsets of runs."""
 
 BALL, BAR = "a ball put up elsewhere", "the bar's length"
-"""What set-up faults of circles follow."""
+"""Names of what set-up faults of circles follow."""
 
 ONCE = frozenset({TIME, RUN, BALL, BAR})
-"""What happens in a run, or goes on in time: no other rows can show it again."""
+"""Effects in single runs or in time, which other rows cannot show again."""
 
 JOINED = " + "
-"""Between the names of a sum of laws."""
+"""Separator between the names of a sum of laws."""
 
 
 class Differs(StrEnum):
-    """Level 1: difference beyond noise and refit."""
+    """Answer 1: whether a difference exists beyond noise and refit."""
 
     YES = "yes"
     NO = "no"
@@ -41,7 +41,7 @@ class Differs(StrEnum):
 
 
 class FollowsAnswer(StrEnum):
-    """Level 2: knowledge of a variable class."""
+    """Answer 2: whether a class of variables is followed."""
 
     FOLLOWS = "follows"
     GOES_ON = "goes on in time"
@@ -56,8 +56,8 @@ class Detectable:
     """Smallest detectable effect.
 
     Attributes:
-        size: rms found in nine of ten cases, in the residual's unit; None if absorbed at any size.
-        confirm: what shows it; absent for variables.
+        size: rms detected in nine of ten cases, in the residual's unit; None if the base absorbs it at any size.
+        confirm: measurement that shows it; absent for variables.
     """
 
     follows: str
@@ -73,13 +73,13 @@ class Detectable:
 
 @dataclass(frozen=True)
 class DifferenceFound:
-    """Level 1.
+    """Answer 1 with its figures.
 
     Attributes:
-        why: reason if not a plain yes.
+        why: reason, unless the answer is a plain yes.
         matters: size of interest, in the residual's unit.
-        matters_stated: False: `matters` is the refitted residual.
-        gain: held-out log density of everything over the base; None if not tested.
+        matters_stated: False if `matters` is the refitted residual.
+        gain: held-out log density gain of all effects over the base; None if not tested.
     """
 
     answer: Differs
@@ -95,10 +95,10 @@ class DifferenceFound:
 
 @dataclass(frozen=True)
 class ScoredLaw:
-    """A law, or the sum of several, in one place.
+    """A law, or a sum of laws, as candidate for one class.
 
     Attributes:
-        log_density: held-out, over an empty place.
+        log_density: held-out, relative to no candidate.
     """
 
     name: str
@@ -107,13 +107,13 @@ class ScoredLaw:
 
 @dataclass(frozen=True)
 class LawForm:
-    """Level 3: the law of a class.
+    """Answer 3: the law of a class.
 
     Attributes:
-        name: None if open.
-        not_worse: causes as good as it or the best, with equivalents.
-        together: laws each named in its own place, if a sum is best.
-        rivals: of each other member of that sum, causes as good in its own place.
+        name: the law; None if open.
+        not_worse: causes about as good as this law or the best, with equivalents.
+        together: laws that are each named, if a sum is best.
+        rivals: equally good causes for each other member of the sum.
     """
 
     name: str | None
@@ -130,21 +130,21 @@ class LawForm:
 
 @dataclass(frozen=True)
 class Followed:
-    """Level 2: one class of variables.
+    """Answer 2 for one class of variables.
 
     Attributes:
-        variables: one is followed, most probable first.
-        or_variables: indistinguishable ones.
-        ways: probability by value, direction, lateness, time.
-        rms: fitted sum, in the residual's unit.
-        before: held-out error without them; None if not tested.
-        gain: held-out log density, with minus without; None if not tested.
-        consequence: the variable results from the simulation, as stated, and is no cause.
-        may_result: the variable carries the difference itself: cause or consequence.
-        form: None if not followed, or time.
-        slope: of the straight line through the members' sum over the first variable; None for times and angles.
-        straight: share of the squares that the line makes.
-        where: strut, all struts, or the set-up of all tests; None if uncertain.
+        variables: most probable first; one of them is followed.
+        or_variables: indistinguishable variables.
+        ways: probabilities that it follows value, direction, delay or time.
+        rms: of the fitted sum, in the residual's unit.
+        before: held-out error without the class; None if not tested.
+        gain: held-out gain of log density by the class; None if not tested.
+        consequence: whether the variable, as stated, results from the simulation and is no cause.
+        may_result: whether the variable contains the difference itself, so it may be cause or consequence.
+        form: answer 3; None for time or if nothing is followed.
+        slope: of the straight line through the fitted sum over the first variable; None for times and angles.
+        straight: share of squares that the line explains.
+        where: strut, all struts, or set-up of all tests; None if uncertain.
     """
 
     variables: tuple[tuple[str, ...], ...]
@@ -168,7 +168,7 @@ class Followed:
 
     @property
     def in_time(self) -> bool:
-        """Return whether the effect follows time or run alone, which other rows cannot repeat."""
+        """Return whether the effect follows only time or run, which other rows cannot repeat."""
         return set[str]().union(*self.variables) <= ONCE
 
     @property
@@ -179,11 +179,11 @@ class Followed:
 
 @dataclass(frozen=True)
 class Levels:
-    """The answer.
+    """All three answers.
 
     Attributes:
-        follows: with level 3, most probable first; consequences last.
-        correction: whether the fitted sum predicts better than the simulation; None if nothing was found or tested.
+        follows: answers 2 and 3 per class, most probable first; consequences last.
+        correction: whether the fitted sum predicts better than the simulation; None if not found or not tested.
     """
 
     differs: DifferenceFound
@@ -192,11 +192,11 @@ class Levels:
 
     @property
     def corrects(self) -> frozenset[str]:
-        """Return variables that a correction uses; empty: all."""
+        """Return the variables that a correction uses; empty for all."""
         return corrects_of(self.follows)
 
     def times(self, factor: float) -> Levels:
-        """Return the levels in a smaller unit."""
+        """Return the answers in another unit."""
 
         def scaled(size: float | None) -> float | None:
             return None if size is None else factor * size
@@ -215,11 +215,11 @@ class Levels:
 
 
 CORRECTS = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.NOT_TESTED)
-"""Answers of classes that a correction is made of: what happened, or predicts nothing, is true of these rows alone."""
+"""Answers of classes that a correction uses; single events and classes that do not predict apply to these rows only."""
 
 
 def corrects_of(classes: Iterable[Followed]) -> frozenset[str]:
-    """Return variables that a correction by classes uses; empty: all."""
+    """Return the variables that a correction by classes uses; empty for all."""
     every = [one for one in classes if one.answer in CORRECTS]
     own = frozenset(name for one in every for names in one.variables for name in names)
     return own | {name for one in every for name in one.or_variables if name != TIME}
@@ -237,12 +237,12 @@ def difference_of(
     *,
     correction: bool | None = None,
 ) -> DifferenceFound:
-    """Return level 1 from the others.
+    """Derive answer 1 from answers 2 and 3.
 
-    An effect that happened once is no evidence beside effects that other rows refute. It may only make up for them.
+    A single event is no evidence together with effects that other rows refute, because it may only compensate for them.
 
     Args:
-        rest: size of interest, whether stated, independent samples, detectable sizes.
+        rest: size of interest, whether it is stated, independent samples, detectable sizes.
     """
     matters, stated, samples, detectable = rest
     answer, why = Differs.NO, ""

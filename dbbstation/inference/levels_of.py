@@ -1,4 +1,4 @@
-"""The three levels from a comparison and held-out parts."""
+"""Derive the three answers from a comparison and held-out parts."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 SLOW = 10
-"""Slowest frequencies of a stretch, whose power is held against that of the next twice as many: noise with `FEWEST_INDEPENDENT` independent
-samples is flat over them."""
+"""Number of slowest frequencies of a stretch; their power is compared with the power of the next twice as many. Noise
+with `FEWEST_INDEPENDENT` independent samples is flat over them."""
 
 WAYS = ("value", "direction", "late", "in_time")
 
@@ -49,18 +49,18 @@ def levels_of(
     worse: bool = False,
     sizes: tuple[Detectable, ...] | None = None,
 ) -> Levels:
-    """Return the three levels.
+    """Return the three answers.
 
     Args:
-        worse: without held-out parts: the fitted sum leaves more of all rows than the reference.
-        sizes: smallest detectable ones for a known kind of noise; None: computed over variables.
+        worse: without held-out parts, whether the fitted sum leaves larger residuals than the reference.
+        sizes: smallest detectable sizes for a known kind of noise; None to compute them over variables.
     """
     probabilities = VariableProbabilities(settled)
     every = classes_of(settled, probabilities)
-    # Parts may have in time what the best set has as part of a law, such as the drift of an integral.
+    # Selections without a part may attribute a law's part, such as an integral's drift, to time.
     ways = [one.wanted for one in every if _in_time(one)] or [frozenset({TIME, RUN})]
     if parts is not None and not any(parts.of(wanted).predicts for wanted in ways):
-        # What happened, and goes on in no other rows, would fill these with what a curve over time has between its rows.
+        # Single events do not continue in other rows; a curve over time would interpolate them there.
         parts = parts.but_for({TIME, RUN})
     found = [_followed(settled, one, probabilities, parts, held_out) for one in every]
     classes = tuple(sorted(found, key=lambda one: (one.consequence, one.may_result)))
@@ -113,7 +113,7 @@ def _doubts_about_noise(settled: Settled) -> tuple[str, ...]:
 
 
 def slow_chance(settled: Settled) -> float:
-    """Return the chance of as much power at the slowest frequencies relative to the next."""
+    """Return the chance probability of so much power at the slowest frequencies, relative to the next."""
     channel = settled.channel
     if channel.time is None:
         return 1.0
@@ -123,7 +123,7 @@ def slow_chance(settled: Settled) -> float:
     low, following = power[:SLOW], power[SLOW : 3 * SLOW]
     if len(following) < 2 * SLOW:
         return 1.0
-    # What the base takes out of slow rows is taken out of the slowest.
+    # The base is assumed to absorb only the slowest frequencies.
     free = max(SLOW - 0.5 * channel.base.samples.shape[1], 2.0)
     return float(f_distribution.sf(low.sum() / free / following.mean(), 2.0 * free, 2.0 * len(following)))
 

@@ -1,4 +1,4 @@
-"""Limits at which a computation ended, to show what remains open."""
+"""Limits at which a computation ended, for reports of incomplete results."""
 
 from __future__ import annotations
 

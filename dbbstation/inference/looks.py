@@ -22,30 +22,30 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 PLACED = (Family.WAVE, Family.BUMP, Family.STEP)
-"""Patterns whose place, width or frequency is a nonlinear parameter."""
+"""Families whose place, width or frequency is a nonlinear parameter."""
 
 ROWS_PER_PIECE = 4
-"""Rows in a piece of a variable, at the least, on average; waves over what is no time have one, since a pitch of four rows is a wave."""
+"""Least average rows per bin of a variable; 1 for waves except over time, because four rows can be a wave."""
 
 PIECES_PER_WAVE = 4
-"""Pieces in the shortest wave."""
+"""Bins in the shortest wave."""
 
 WIDTHS = (64.0, 32.0, 16.0, 8.0)
-"""Standard deviations of bumps: shares of the range, one over."""
+"""Ratios of the range to standard deviations of bumps."""
 
 FINER_CURVES = (14, 28)
-"""Functions of curves that bend more often than the usual one."""
+"""Numbers of functions of more flexible curves."""
 
 NEIGHBOUR = 0.7
-"""Share of what the best form about one of a list explains that this one explains itself, at the least: a wave half a step of
-frequency away explains sinc²(1/4) = 0.81 of it, a bump half a step away and a factor of 1.4 wider 0.92."""
+"""Least ratio of squares explained by a form of the list to squares explained by the best nearby form: half a frequency
+step gives sinc²(1/4) = 0.81, a bump half a step away and 1.4 times wider 0.92."""
 
 
 def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: float) -> list[Pattern]:
-    """Return the best waves, bumps and steps over variables.
+    """Find the best waves, bumps and steps over variables.
 
     Args:
-        size: one standard deviation, in noise.
+        size: prior standard deviation, over noise.
     """
     found: list[Pattern] = []
     for variable in variables:
@@ -56,7 +56,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
             continue
         sums = _sums(left, values, pieces, size)
         fine = pieces if variable.kind is Kind.TIME else min(BOUNDS.pieces, distinct)
-        # Where noise is not white, a first look does not know how much of each form whitening leaves.
+        # In correlated noise the first scan does not know how much of a form remains after whitening.
         roughly = left.whitening is not None
         most = BOUNDS.strongest_coloured if roughly else BOUNDS.strongest
         finely = sums if fine == pieces else _sums(left, values, fine, size)
@@ -71,7 +71,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
                 (Family.BUMP, bumps(variable.low, variable.high, widths), 3.0),
                 (Family.STEP, steps(variable.low, variable.high, BOUNDS.step_places), 1.0),
             ):
-                tried = max(len(forms) / apart, 1.0)  # of neighbours every so many-th counts as a try
+                tried = max(len(forms) / apart, 1.0)  # neighbouring forms are correlated and count as fewer trials
                 least = 0.0 if roughly else _least(tried)
                 for explained, form in sums.best(forms, most):
                     if explained >= least:
@@ -81,7 +81,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
 
 
 def _sums(left: Left, values: Floats, pieces: int, size: float) -> Sums:
-    """Return sums over equal pieces of a variable, shape (n,)."""
+    """Return sums over equal bins of a variable, shape (n,)."""
     low, high = float(values.min()), float(values.max())
     place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
     own, number, count = np.unique(place, return_inverse=True, return_counts=True)
@@ -93,7 +93,7 @@ def _sums(left: Left, values: Floats, pieces: int, size: float) -> Sums:
 
     squares, base = np.asarray(count * size**2, dtype=np.float64), size * added(left.beside)
     if left.whitening is not None:
-        # How much whitening leaves of a curve depends on how fast it changes; for a first look, as of the noise itself.
+        # Whitening reduces a curve according to its rate of change; the first scan assumes the noise's factor.
         squares, base = squares * (left.coloured.innovation / left.coloured.sigma) ** 2, base[:, :0]
     return Sums(
         added(values) / count, own, size * added(left.towards)[:, None], squares[:, None, None], base[:, None, :]
@@ -115,26 +115,26 @@ def _waves(
     )
     waves = [wave for _, wave in found[:strongest]]
     if variable.kind is not Kind.TIME:
-        # What is found may be the pitch, or a multiple of it.
+        # The found frequency may be a multiple of the fundamental.
         pitches = [wave.frequency / k for wave in waves[: BOUNDS.strongest] for k in MULTIPLES]
         most = pieces / (2.0 * extent)
         waves += [Wave(f, h) for f in pitches if f > 2.0 / extent for h in HARMONICS if h * f < most]
-    # Each pitch and each number of harmonics beside a wave was tried, too.
+    # Each fundamental and each number of harmonics is a further trial.
     beside = len(MULTIPLES) * len(HARMONICS)
     return [_pattern(variable, Family.WAVE, w, tried * (beside if w.harmonics > 1 else 1)) for w in waves]
 
 
 MULTIPLES = (1, 2, 3)
-"""Times its pitch that the frequency of a wave may be."""
+"""Multiples of the fundamental that a wave's frequency may be."""
 
 
 def _least(tried: float) -> float:
-    """Return the sum of squares below which no form is worth its odds: twice a log Bayes factor."""
+    """Return the least explained squares that outweigh prior odds: twice a log Bayes factor."""
     return -2.0 * NEIGHBOUR * log_odds(1, tried)
 
 
 def placed_better(pattern: Pattern, left: Left, kept: Flags, size: float) -> Pattern:
-    """Return a pattern refined in frequency, place and width."""
+    """Return a pattern with refined frequency, place and width."""
     (variable,), form = pattern.variables, pattern.form
     if form is None:
         return pattern
@@ -172,7 +172,7 @@ def _moved(form: Form, finer: float, extent: float) -> list[Form]:
 
 
 CLOSER = (1.0, 1.0, 0.3, 0.3, 0.1, 0.03)
-"""Steps in which a place is moved to where it is best, in steps of the finest list."""
+"""Successive steps of refinement, in steps of the finest list."""
 
 
 def _near(form: Form) -> list[Form]:

@@ -1,4 +1,4 @@
-"""Whether a residual is larger in some stretches."""
+"""Test whether a residual is larger in some stretches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 FEWEST = 8
-"""Stretches of either kind that a comparison of their mean squares needs, at the least."""
+"""Fewest stretches of each kind for a comparison of mean squares."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Louder:
 
 
 def louder(residuals: Sequence[Floats], begins: Sequence[Integers], length: int) -> Louder | None:
-    """Compare stretches from given rows with equally long others; None if too few.
+    """Compare the stretches that begin at given rows with other stretches of equal length; None for too few.
 
-    Freedom of correlated mean squares is 2 mean² / variance [Satterthwaite, Biometrics Bulletin 2 (1946) 110].
+    Correlated mean squares have 2 mean² / variance degrees of freedom [Satterthwaite, Biometrics Bulletin 2 (1946) 110].
 
     Args:
         begins: rows per run, unordered.
@@ -44,7 +44,7 @@ def louder(residuals: Sequence[Floats], begins: Sequence[Integers], length: int)
         squares, taken = residual**2, np.zeros(len(residual), dtype=bool)
         for row in rows.tolist():
             own = slice(row, row + length)
-            # A stretch that runs into the one before it is not counted twice.
+            # A stretch that overlaps the previous one is not counted.
             if row + length <= len(residual) and not taken[own].any():
                 inside.append(float(squares[own].mean()))
             taken[own] = True

@@ -19,20 +19,20 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 SHORTEST_ROWS = 2.0
-"""Rows in the shortest time constant: what is over within a row is no memory."""
+"""Shortest time constant in rows; faster effects are no memory."""
 
 LONGEST_SHARE = 1.0 / 3.0
-"""Share of the longest block that the longest time constant is: of a longer one, only the start is seen, which is a drift."""
+"""Longest time constant over the longest block; of longer ones only the drift at the start is visible."""
 
 LONGEST_DELAY_SHARE = 0.1
-"""Share of the longest block that the longest dead time is: the rows before it say nothing about it."""
+"""Longest dead time over the longest block; earlier rows contain no information on it."""
 
 LATE = 0.1
-"""Probability that an effect that follows a variable does so late enough to be seen, by either of both ways: a linear effect over what
-changes slowly is as late as one likes, and is called linear."""
+"""Prior probability that an effect has a visible delay of either kind. Over a slow variable any delay is invisible, and
+the effect is called linear."""
 
 AT_ONCE = 0.5
-"""Probability that the simulation has the effect, but at once: then the memory shows as what comes late less what comes at once."""
+"""Prior probability that the simulation contains the effect without delay; the residual is then the delayed minus the immediate effect."""
 
 
 def memory_laws(
@@ -43,7 +43,7 @@ def memory_laws(
     size: float,
     unit: str,
 ) -> list[Law]:
-    """Return lag and dead time of each path variable."""
+    """Return laws with lag and dead time for each path variable."""
     usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
     moving = [rows for rows in blocks if rows.stop - rows.start > 1]
     steps = [np.diff(time[rows]) for rows in moving]
@@ -83,7 +83,7 @@ def memory_laws(
 
 
 def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:
-    """Return choices: the effect is missing, or simulated at once; with or without initial state."""
+    """Return two choices: the simulation lacks the effect, or has it without delay; both with initial states."""
     starts = tuple(range(2, width))
     return (
         ((0, *starts), float(np.log(1.0 - AT_ONCE)), "which the simulation lacks"),
@@ -96,7 +96,7 @@ def _grid(shortest: float, longest: float) -> tuple[float, ...]:
 
 
 def _lag(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple[float, ...]) -> Floats:
-    """Return late, late less present, and initial transients by block, shape (n, 2 + starts)."""
+    """Return delayed values, delayed less present values, and initial transients, shape (n, 2 + starts)."""
     starts = starts_of(blocks)
     found = np.zeros((len(time), 2 + starts))
     for k, rows in enumerate(blocks):
@@ -108,12 +108,12 @@ def _lag(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple
 
 
 def starts_of(blocks: Sequence[slice]) -> int:
-    """Return initial states of a law: one per run, or one for all if there are many runs."""
+    """Return the number of a law's initial states: one per run, or one in all if there are many runs."""
     return len(blocks) if len(blocks) <= BOUNDS.memory_starts else 1
 
 
 def _delay(variable: Variable, time: Floats, blocks: Sequence[slice], point: tuple[float, ...]) -> Floats:
-    """Return the delayed value, and less the present one, shape (n, 2), constant before the first row."""
+    """Return delayed values and delayed less present values, shape (n, 2); values are constant before the first row."""
     found = np.zeros((len(time), 2))
     for rows in blocks:
         values, at = variable.travel(rows), time[rows]
@@ -127,10 +127,10 @@ def _middle(variable: Variable) -> float:
 
 
 def lagging(values: Floats, time: Floats, constant: float) -> Floats:
-    """Return a first-order lag of values less these, shape (n,), initially settled.
+    """Return values after a first-order lag, less the values, shape (n,); the initial state is steady.
 
-    Exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital Control of Dynamic
-    Systems, 3rd ed., sec. 6.3.2].
+    The result is exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital
+    Control of Dynamic Systems, 3rd ed., sec. 6.3.2].
 
     Args:
         constant: in `time`'s unit.

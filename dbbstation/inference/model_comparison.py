@@ -1,9 +1,9 @@
-"""Missing causes compared by marginal likelihood.
+"""Compare missing causes by marginal likelihood.
 
-target = base + causes + noise, linear in amplitudes; the base is projected out. Gaussian priors give closed forms
-[MacKay, Bayesian interpolation, Neural Computation 4 (1992), eqs 2.5 and 4.1]. Prior sizes and variants are averaged
-over. Formula inaccuracy is a variant's slack, proportional to its amplitudes [Kennedy and O'Hagan, J. R. Stat. Soc. B 63
-(2001) 425, on model discrepancy].
+The model target = base + causes + noise is linear in amplitudes; the base is projected out. Gaussian priors give closed
+forms [MacKay, Bayesian interpolation, Neural Computation 4 (1992), eqs 2.5 and 4.1]. The evidence is averaged over
+prior sizes and variants. The slack of a variant represents its formula's inaccuracy, proportional to its amplitudes
+[Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
-"""Standard deviations of amplitudes that are averaged over, in units of the plausible size."""
+"""Prior standard deviations of amplitudes for averaging, in plausible sizes."""
 
 LOG_SCALE_WEIGHTS = np.log([0.19, 0.19, 0.19, 0.19, 0.19, 0.05])
-"""Their prior probabilities: log-uniform over two decades up to the plausible size, one in twenty beyond it."""
+"""Prior probabilities of `SCALES`: log-uniform over two decades up to the plausible size, one in twenty beyond."""
 
 NO_SLACK = np.zeros(0)
 FLEXIBLE = 12
-"""Amplitudes from which on a form can imitate two causes at once: two for each strut."""
+"""Fewest amplitudes of a form that can imitate two causes: two per strut."""
 
 SLACK_SHARES = np.array([0.1, 1.0])
-"""Shares of the stated slack that are averaged over: some machines follow a formula ten times as closely as it is stated, and a
-slack that nothing calls for would count against a cause that is there."""
+"""Shares of the stated slack for averaging. Some machines follow a formula ten times better than stated, and
+unnecessary slack would count against a present cause."""
 
 MOST_SLACK = 1.5
-"""Times the amplitudes that the slack of a variant was made for up to which it grows with them."""
+"""Largest ratio of amplitudes to the amplitudes of a variant's slack up to which slack grows."""
 
 
 _Eliminated: TypeAlias = "tuple[Floats, Floats, float]"
-"""Cholesky factor, what it makes of the target, log evidence."""
+"""Cholesky factor, transformed target, log evidence."""
 
 _Group: TypeAlias = "tuple[Integers, Integers, Floats, Floats]"
-"""Forms of one number of amplitudes: their numbers, columns, plausible sizes, and products of the columns."""
+"""Forms with equal numbers of amplitudes: indices, columns, plausible sizes, and products of columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +54,13 @@ class Variant:
 
     Attributes:
         label: kind or strut; may be empty.
-        law: if a cause has several.
-        whole: columns of the form with all amplitudes, shape (q,); may be empty.
-        slack: columns, shape (d,).
-        slack_sd: at amplitudes `slack_at`, shape (d,).
-        slack_at: rms amplitude in plausible ones.
-        tangents: first columns of slack, of nonlinear parameters, which are not formula inaccuracy.
-        positive: shape (p,); may be empty.
+        law: name, if a cause has several.
+        whole: columns of the cause's form with all amplitudes, shape (q,); may be empty.
+        slack: columns of formula inaccuracy, shape (d,).
+        slack_sd: standard deviations of slack at amplitudes `slack_at`, shape (d,).
+        slack_at: rms amplitude in plausible sizes.
+        tangents: number of first slack columns that are derivatives by nonlinear parameters.
+        positive: amplitudes that cannot be negative, shape (p,); may be empty.
     """
 
     columns: Integers
@@ -79,11 +79,11 @@ class Variant:
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """Something that the base model may lack.
+    """An effect that the base model may lack.
 
     Attributes:
-        variants: weights sum to one.
-        named: physical; else unmodelled or a set-up fault.
+        variants: alternative forms, with weights that sum to one.
+        named: True for a physical cause, False for unmodelled effects and set-up faults.
     """
 
     name: str
@@ -98,7 +98,7 @@ class Member:
     """A cause in a hypothesis, with best variant and size.
 
     Attributes:
-        scale: prior standard deviation in plausible amplitudes.
+        scale: prior standard deviation in plausible sizes.
     """
 
     cause: Cause
@@ -116,20 +116,20 @@ class Member:
     def sd(self) -> Floats:
         """Return prior standard deviations."""
         slack = self.variant.slack_sd * self.slack_scale
-        # A parameter is as unknown as it is where a formula is closer than stated.
+        # A formula closer than stated does not reduce the prior of parameters.
         slack[: self.variant.tangents] /= self.slack_share
         return np.concatenate([self.variant.plausible * self.scale, slack])
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Causes beside a hypothesis.
+    """Bayes factors of causes, given a hypothesis.
 
     Attributes:
-        log_factor: Bayes factor, averaged, shape (c,).
-        factors: by form and size, shape (m, s).
+        log_factor: averaged log Bayes factors, shape (c,).
+        factors: log Bayes factors by form and size, shape (m, s).
         first: first form of each cause, shape (c,).
-        last: one behind its last, shape (c,).
+        last: one after its last form, shape (c,).
     """
 
     causes: tuple[Cause, ...]
@@ -141,24 +141,24 @@ class Scan:
     slim: tuple[list[int], ...]
 
     def best_of(self, k: int) -> Member:
-        """Return a cause's best variant and scale."""
+        """Return a cause as member with best variant and scale."""
         form, scale = self._best(k)
         return Member(self.causes[k], self.causes[k].variants[form], float(SCALES[scale]))
 
     @cached_property
     def best(self) -> tuple[Member, ...]:
-        """Return the best variant and scale of each cause."""
+        """Return each cause as member with best variant and scale."""
         return tuple(self.best_of(k) for k in range(len(self.causes)))
 
     @cached_property
     def log_best(self) -> Floats:
-        """Return best log Bayes factors without weights, shape (c,)."""
+        """Return the best log Bayes factors without weights, shape (c,)."""
         best = (self._best(k) for k in range(len(self.causes)))
         return np.array([self.factors[self.first[k] + form, scale] for k, (form, scale) in enumerate(best)])
 
     @cached_property
     def narrow(self) -> tuple[Member | None, ...]:
-        """Return the best slim variants; None if they are `best` or missing."""
+        """Return the best inflexible variants; None if equal to `best` or missing."""
         return tuple(self._narrow(k) for k in range(len(self.causes)))
 
     def of(self, kept: Sequence[int]) -> Scan:
@@ -187,7 +187,7 @@ class Scan:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Posterior means and covariance of members' columns, in order."""
+    """Posterior means and covariance of members' columns."""
 
     values: Floats
     covariance: Floats
@@ -197,7 +197,7 @@ class _OfCause:
     """Forms of one cause by number of amplitudes.
 
     Attributes:
-        groups: by p: forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
+        groups: for each p, forms, shape (m,); columns and plausible sizes, shape (m, p) each; products, shape (m, p, p).
     """
 
     def __init__(self, cause: Cause, gram: Floats, at: Callable[[Integers], Integers]) -> None:
@@ -220,7 +220,7 @@ class _Forms:
 
     Attributes:
         needed: columns, shape (q,).
-        groups: forms, shape (m,); places in `needed` and plausible sizes, shape (m, p) each; products, shape (m, p, p).
+        groups: forms, shape (m,); indices in `needed` and plausible sizes, shape (m, p) each; products, shape (m, p, p).
         weights: log probability of each form within its cause.
     """
 
@@ -249,9 +249,9 @@ class ModelComparison:
     """Marginal likelihoods over sets of causes.
 
     Args:
-        gram: products beside the base, in noise, shape (n, n).
-        towards: with the target, shape (n,).
-        evidence: of causes already in this base.
+        gram: products with the base projected out, over noise, shape (n, n).
+        towards: products with the target, shape (n,).
+        evidence: log evidence of causes already in the base.
     """
 
     def __init__(
@@ -269,7 +269,7 @@ class ModelComparison:
         self._forms_of_many: _Forms | None = None
 
     def among(self, causes: Iterable[Cause]) -> ModelComparison:
-        """Return the comparison of some causes, stored together for speed."""
+        """Return the comparison of some causes, with contiguous arrays for speed."""
         every = [part for cause in causes for one in cause.variants for part in (one.columns, one.slack)]
         columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *every]))
         own = self._at(columns)
@@ -282,11 +282,11 @@ class ModelComparison:
         return ModelComparison(self._gram - across.T @ across, self._towards - across.T @ z, self._columns, evidence)
 
     def _across(self, members: Sequence[Member], lower: Floats, places: Integers) -> Floats:
-        """Return the members' factor applied to columns, shape (p, q)."""
+        """Return the members' inverse Cholesky factor times their products with columns, shape (p, q)."""
         if not members:
             return np.zeros((0, len(places)))
         taken, sd = _stacked(members)
-        products = self._gram[np.ix_(places, self._at(taken))]  # so that the solver finds them in its order
+        products = self._gram[np.ix_(places, self._at(taken))]  # contiguous in the solver's order
         products *= sd
         return _solved(lower, products.T)
 
@@ -294,11 +294,11 @@ class ModelComparison:
         return columns if self._columns is None else np.searchsorted(self._columns, columns)
 
     def log_evidence(self, members: Sequence[Member]) -> float:
-        """Return members' log marginal likelihood over the base."""
+        """Return the members' log marginal likelihood, relative to the base."""
         return self._eliminated(members)[2]
 
     def explained(self, members: Sequence[Member]) -> float:
-        """Return the chi-square reduction less the cost of sizes."""
+        """Return the penalised chi-square reduction."""
         _, z, _ = self._eliminated(members)
         return float(z @ z)
 
@@ -318,7 +318,7 @@ class ModelComparison:
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
     def beside(self, members: Sequence[Member], columns: Integers) -> Floats:
-        """Return products of columns beside base and members, shape (p, p)."""
+        """Return products of columns with base and members projected out, shape (p, p)."""
         columns = self._at(columns)
         own = self._gram[np.ix_(columns, columns)]
         if not members:
@@ -328,7 +328,7 @@ class ModelComparison:
         return np.asarray(own - across.T @ across, dtype=np.float64)
 
     def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> dict[tuple[int, int], float]:
-        """Return members' log marginal likelihood with every pair, pairs without slack."""
+        """Return the log marginal likelihood of the members with every pair of causes, without slack of the pair."""
         lower, z, evidence = self._eliminated(members)
         columns = self._at(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)]))
         sd = np.concatenate([np.zeros(0), *(m.variant.plausible * m.scale for m in more)])
@@ -345,7 +345,7 @@ class ModelComparison:
             of_widths.setdefault((widths[a], widths[b]), []).append((a, b))
         found: dict[tuple[int, int], float] = {}
         for (first, second), pairs in of_widths.items():
-            # Pairs that are alike in their widths are worked out at once.
+            # Pairs with equal numbers of amplitudes are computed together.
             a, b = starts[np.array(pairs)].T
             own = np.hstack([a[:, None] + np.arange(first), b[:, None] + np.arange(second)])
             halves = _factors(information[own[:, :, None], own[:, None, :]])
@@ -356,7 +356,7 @@ class ModelComparison:
         return found
 
     def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
-        """Scan every cause beside members, over variants and sizes."""
+        """Scan every cause given members, over variants and sizes."""
         forms = self._forms_of(tuple(causes))
         needed = forms.needed
         lower, z, _ = self._eliminated(members)
@@ -369,21 +369,21 @@ class ModelComparison:
         return _scanned(forms, towards, left)
 
     def around(self, members: Sequence[Member], causes: Iterable[Cause]) -> Around:
-        """Return every cause beside all members but a few, by one elimination."""
+        """Return scans of every cause given all members but a few, by one elimination."""
         forms = self._forms_of(tuple(causes))
         lower, z, evidence = self._eliminated(members)
         across = self._across(members, lower, forms.needed)
         return Around(tuple(members), forms, lower, z, evidence, across, self._towards[forms.needed])
 
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
-        """Scan each member beside the others, in its variant, without slack, at all sizes.
+        """Scan each member given the others, in its variant, without slack, over all sizes.
 
-        The inverse of a block of A's inverse is the block's information beside the others [Schur complement; Horn and Johnson, Matrix
-        Analysis, 2nd ed., sec. 0.7.3].
+        The inverse of a block of A's inverse is the block's information given the others [Schur complement; Horn and
+        Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
 
         Returns:
-            Per member: it with the size that suits it best; its log Bayes factor averaged over sizes, with the weight of its
-            variant; and that of its best size without weights.
+            Per member: the member with its best size, the log Bayes factor averaged over sizes with the variant's
+            weight, and the log Bayes factor of the best size without weights.
         """
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
@@ -433,7 +433,7 @@ class ModelComparison:
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         if not members:
             return np.zeros((0, 0)), np.zeros(0), self._evidence
-        # A search scans beside a set of members and asks for the evidence of the same set right after it.
+        # A search scans given a set, then immediately requests the evidence of this set.
         if self._last is not None and len(self._last[0]) == len(members) and all(map(is_, self._last[0], members)):
             return self._last[1]
         columns, sd = _stacked(members)
@@ -462,10 +462,11 @@ def _scanned(forms: _Forms, towards: Floats, left: Sequence[Floats]) -> Scan:
 
 
 class Around:
-    """Causes beside a hypothesis without some members.
+    """Scans of causes given a hypothesis without some members.
 
-    With A the members' information, P its inverse and C products with a cause, members without columns k absorb C^T P C -
-    R^T (P_kk)^-1 R, R the rows k of P C [Schur complement; Horn and Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
+    A is the members' information, P its inverse, C the products with a cause, R the rows k of P C. Members without
+    columns k absorb C^T P C - R^T (P_kk)^-1 R [Schur complement; Horn and Johnson, Matrix Analysis, 2nd ed., sec.
+    0.7.3].
     """
 
     def __init__(
@@ -494,11 +495,11 @@ class Around:
         self._places = {m.cause.name: np.arange(a, b) for m, a, b in zip(members, ends[:-1], ends[1:], strict=True)}
 
     def without(self, names: Collection[str]) -> tuple[Scan, float]:
-        """Return causes beside members without these, and those members' log evidence."""
+        """Return the scan given members without some, and the remaining members' log evidence."""
         if not names:
             return self._of_absent(_scanned(self._forms, self._towards, self._left), names), self._evidence
         own = np.concatenate([self._places[m.cause.name] for m in self.members if m.cause.name in names])
-        # A root of P_kk, without squares of the information.
+        # A root of P_kk, computed without squaring the information.
         root = np.asarray(np.linalg.qr(self._inverse[:, own], mode="r"), dtype=np.float64).T
         rows = _solved(root, self._rows[own])
         values = _solved(root, self._values[own])
@@ -523,7 +524,7 @@ def _solved(lower: Floats, right: Floats, *, transposed: bool = False) -> Floats
 
 
 def _factors(information: Floats) -> Floats:
-    """Return several Cholesky factors, shape (k, p, p), as `cholesky`."""
+    """Return several Cholesky factors, shape (k, p, p), as by `cholesky`."""
     try:
         return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
     except np.linalg.LinAlgError:
@@ -531,9 +532,9 @@ def _factors(information: Floats) -> Floats:
 
 
 def cholesky(information: Floats) -> Floats:
-    """Return the Cholesky factor of information in prior units, shape (p, p).
+    """Return the Cholesky factor of information in units of the prior, shape (p, p).
 
-    All eigenvalues are at least one; rounding below is lifted to one.
+    All eigenvalues are at least one; eigenvalues below, by rounding, are set to one.
     """
     try:
         return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
@@ -544,7 +545,7 @@ def cholesky(information: Floats) -> Floats:
 
 
 def with_slack_of(member: Member, values: Floats) -> Member:
-    """Return the member with the slack of these amplitudes."""
+    """Return the member with slack for the given amplitudes."""
     if len(member.variant.slack) == 0:
         return member
     size = amplitude_size(member, values)
@@ -552,7 +553,7 @@ def with_slack_of(member: Member, values: Floats) -> Member:
 
 
 def amplitude_size(member: Member, values: Floats) -> float:
-    """Return a member's rms amplitude in plausible ones."""
+    """Return a member's rms amplitude in plausible sizes."""
     return float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
 
 

@@ -1,6 +1,6 @@
-"""Formula inaccuracy: the effect modulated along its variable.
+"""Inaccuracy of formulas, as effects modulated along a variable.
 
-Smooth modulations represent the inaccuracy [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+Smooth modulations represent it [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 DEGREE = 3
-"""Of the polynomials that modulate an effect: four functions over the range of a variable."""
+"""Degree of the modulating polynomials: four functions over the range of a variable."""
 
 LATER = 2.0
-"""Samples by which a transit may be later: a degree of the turn."""
+"""Possible delay of a transit after a reversal, in samples: a degree of the turn."""
 
 
 def bernstein(values: Floats, low: float, high: float, degree: int = DEGREE) -> Floats:
@@ -34,10 +34,10 @@ def modulated(
     along: Sequence[Floats],
     signs: Sequence[Floats] | None,
 ) -> Floats:
-    """Return effects of m movers times smooth functions, over all runs, shape (n, q).
+    """Return the effects of m actuators times smooth functions, over all runs, shape (n, q).
 
     Args:
-        signs: direction per run if relevant, shape (n, m); or None.
+        signs: directions of travel per run, shape (n, m); None if irrelevant.
     """
     effect, values = np.vstack(effects), np.vstack(along)
     ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
@@ -54,7 +54,7 @@ def modulated(
 
 
 def _other_transits(effects: Sequence[Floats], signs: Sequence[Floats], mover: int) -> Floats:
-    """Return changes by faster and later transits after reversals, shape (n, 2)."""
+    """Return changes of one effect if its transition after a reversal is instantaneous, and if it is delayed, shape (n, 2)."""
     found = []
     for effect, sign in zip(effects, signs, strict=True):
         own, way = effect[:, mover], np.sign(sign[:, mover])

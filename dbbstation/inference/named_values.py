@@ -1,4 +1,4 @@
-"""Named values of a finding with unit and uncertainty."""
+"""Values of a finding's parameters, with names, units and uncertainties."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def named_values(settled: Settled, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
-    """Return amplitudes and nonlinear parameters, slack included in uncertainty."""
+    """Return amplitudes and nonlinear parameters; uncertainties include slack."""
     law = settled.bank.laws.get(member.cause.name)
     if law is not None:
         found = values_of_law(law, member, values, covariance, law.form_uncertainty)
@@ -32,7 +32,7 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
             for name in settled.best.names & set(settled.bank.patterns)
             for v in settled.bank.patterns[name].variables
         ):
-            found.pop("zero", None)  # a drift beside it has a part of it
+            found.pop("zero", None)  # part of it is in the drift
         return found
     sigma, width = np.sqrt(np.maximum(np.diag(covariance), 0.0)), len(member.variant.columns)
     pattern = settled.bank.patterns[member.cause.name]
@@ -48,7 +48,7 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
 
 
 def values_of_law(law: Law, member: Member, values: Floats, covariance: Floats, share: float) -> dict[str, Value]:
-    """Return amplitudes, uncertain by at least a share of themselves, and nonlinear numbers, NaN if not laid out."""
+    """Return a law's amplitudes and nonlinear parameters; `share` is the least relative uncertainty of amplitudes, and a parameter without tangent has NaN."""
     sigma, width, every = np.sqrt(np.diag(covariance).clip(0.0)), len(member.variant.columns), len(law.plausible)
     found = {
         law.parameters[j]: Value(float(values[k]), float(np.hypot(sigma[k], share * values[k])), law.units[j])
@@ -68,7 +68,7 @@ def values_of_law(law: Law, member: Member, values: Floats, covariance: Floats, 
 
 
 def moved(law: Law, member: Member, values: Floats, per: float = 1.0) -> tuple[float, ...]:
-    """Return nonlinear parameters moved along tangents within grids.
+    """Return nonlinear parameters corrected by their tangents, within grids.
 
     Args:
         per: `growth` for tangents of another form.
@@ -82,7 +82,7 @@ def moved(law: Law, member: Member, values: Floats, per: float = 1.0) -> tuple[f
 
 
 def growth(member: Member, values: Floats) -> float:
-    """Return a member's amplitudes over those of its tangents."""
+    """Return the ratio of a member's amplitudes to the amplitudes of its tangents."""
     if not len(member.variant.slack):
         return 1.0
     size = amplitude_size(member, values[: len(member.variant.columns)])
@@ -90,7 +90,7 @@ def growth(member: Member, values: Floats) -> float:
 
 
 def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
-    """Return values with the larger of own and jackknife uncertainty."""
+    """Return values with the larger of stated and jackknife uncertainty."""
     if not found:
         return {}
     u = weighted_jackknife(

@@ -1,4 +1,4 @@
-"""A channel's noise, and the information of correlated samples."""
+"""Noise of a channel with correlated samples."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Noise:
     """Noise of one sample.
 
     Attributes:
-        correlation_samples: per independent sample; 1 if white.
+        correlation_samples: samples per independent sample; 1 if white.
     """
 
     sigma: float
@@ -29,15 +29,15 @@ class Noise:
 
     @property
     def effective(self) -> float:
-        """Return the white noise of equal effect on smooth quantities."""
+        """Return the white noise that affects smooth quantities equally."""
         return self.sigma * float(np.sqrt(self.correlation_samples))
 
 
 def noise_of(residuals: Sequence[Floats], freedom_used: float) -> Noise:
-    """Return noise from fit residuals, by run.
+    """Estimate noise from the residuals of runs.
 
-    Integrated autocorrelation over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo, Statistical Science
-    7 (1992), sec. 3.3].
+    The autocorrelation is integrated over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo,
+    Statistical Science 7 (1992), sec. 3.3].
     """
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
@@ -53,13 +53,13 @@ def noise_of(residuals: Sequence[Floats], freedom_used: float) -> Noise:
 
 
 def noise_of_turns(residuals: Sequence[Floats], freedom_used: float) -> Noise:
-    """Return noise from residuals of whole turns.
+    """Estimate noise from residuals of whole turns.
 
-    Misfit and absorption are smooth, so noise is measured in higher harmonics and extrapolated
-    (`dbbstation.inference.harmonics`). Residual beyond noise counts as white.
+    Misfit and absorption are smooth, so high harmonics give the noise, which is extrapolated
+    (`dbbstation.inference.harmonics`). Other residuals count as white noise.
 
     Args:
-        freedom_used: on smooth columns.
+        freedom_used: degrees of freedom of smooth columns.
     """
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
@@ -74,20 +74,20 @@ def noise_of_turns(residuals: Sequence[Floats], freedom_used: float) -> Noise:
     above = float(np.mean(np.concatenate([power[low + 1 :] for power in lines])))
     share = 2.0 * (low + 0.5) / float(np.mean([len(turn) for turn in turns]))
     of_noise = share * float(below.mean()) + (1.0 - share) * above
-    # Smooth columns take the low harmonics' power out of the sum of squares.
+    # Smooth columns absorb power of low harmonics.
     spent = freedom_used * float(below[0]) / max(of_noise, np.finfo(float).tiny)
     variance = square / max(count - spent, 1.0)
     return Noise(float(np.sqrt(variance)), 1.0 + (float(below[0]) - of_noise) / variance)
 
 
 FEWEST_SAMPLES = 60
-"""Samples of a turn from which its low harmonics are five at least: the form of a circle that a machine's geometry bends has few more."""
+"""Fewest samples of a turn: then at least five harmonics are low, nearly all that geometric errors cause."""
 
 _LAGS = 201
-"""Lags looked at, in samples; longer correlations are structure that a model should name, not noise."""
+"""Number of lags in samples; longer correlations are structure that a model should name."""
 
 
 def _autocovariance(residual: Floats) -> Floats:
-    size = next_fast_len(len(residual) + _LAGS, real=True)  # room for the lags: nothing wraps round into them
+    size = next_fast_len(len(residual) + _LAGS, real=True)  # padding, so lags do not wrap around
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
     return np.fft.irfft(spectrum, size)[:_LAGS]

@@ -1,4 +1,4 @@
-"""Patterns: effects without physics over variables, with prior odds."""
+"""Patterns: effects over variables without known physics, with prior odds."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 FAMILY_ODDS = float(np.log(0.1 / 0.9))
-"""Log prior odds that a kind of effect without physics is there: one recording in ten. All variables of a kind share them, and so
-do the frequencies or places that a wave, a bump, a step or a pulse was picked from."""
+"""Log prior odds of a family of patterns, present in one recording of ten. All variables share them, and so do all
+searched frequencies or places."""
 
 CURVES = 7
-"""Functions of a smooth curve: it bends about five times over its range."""
+"""Functions of a smooth curve, which has about five bends."""
 
 DISTINCT = 5
-"""Different values that a variable needs for a curve over it."""
+"""Fewest different values of a variable for a curve."""
 
 WAVE_SHARE = 0.15
-"""Share of a turn that an angle must cover for a wave of one turn to differ from a straight line by more than a hundredth."""
+"""Least share of a turn that an angle must cover; with less, a wave once per turn is a straight line to one hundredth."""
 
 
 class Family(StrEnum):
@@ -75,21 +75,21 @@ NAMED = frozenset(
         Family.BLOCKS,
     }
 )
-"""Those that a search tries in pairs: each may show only beside the other."""
+"""Families tried in pairs, because each may hide the other."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """One effect without physics.
+    """One effect without known physics.
 
     Attributes:
-        samples: of amplitudes, all rows, shape (n, p), at most about one.
-        form: over the first variable or row number; None for a product.
+        samples: effects of unit amplitudes, all rows, shape (n, p), at most about one.
+        form: curve over the first variable or row number; None for a product.
         units: of amplitudes, shape (p,); empty: the channel's.
-        per: divisors for these, shape (p,).
-        tried: independent forms of the choice.
+        per: divisors that convert to these units, shape (p,).
+        tried: number of independent forms from which it was picked.
         choices: alternative forms: columns, log probability, label.
-        acts_once: no other rows can show it.
+        acts_once: whether it is a single event that other rows cannot show.
     """
 
     family: Family
@@ -121,7 +121,7 @@ _JOIN = {
     Family.DRIFT: " with ",
     Family.PRODUCT: " of ",
 }
-"""Between a family and its variables."""
+"""Words between a family and its variables."""
 
 
 def patterns(
@@ -134,8 +134,8 @@ def patterns(
     """Return patterns that need no search.
 
     Args:
-        time: shape (n,); None: unordered, without direction and speed.
-        simulated: None: lateness is not tested.
+        time: shape (n,); None for unordered rows without direction and speed.
+        simulated: None for no test of delays.
     """
     usable = [v for v in variables if v.distinct >= 2]  # noqa: PLR2004 - a constant has no effect
     found = [pattern for v in usable for pattern in _over(v)]
@@ -147,7 +147,7 @@ def patterns(
         paths = [v for v in usable if v.kind in TRAVELS and v.name != late and v.is_path(blocks)]
         found += [_speed(v, time, blocks, f"/({v.unit or v.name}/{time_unit})") for v in paths]
         if simulated is not None and simulated.is_path(blocks):
-            # What is late by T lags behind by T times its rate.
+            # A delay T shifts a value by T times its rate.
             found.append(_speed(simulated, time, blocks, time_unit, Family.LAG))
     found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
     if len(blocks) > 1:
@@ -157,17 +157,17 @@ def patterns(
 
 
 DRIVEN_ODDS = -float(np.log(19.0))
-"""Log odds by which a driven variable is a less probable cause than another: it comes first only where rows prefer it by the odds at which
-something is called sure. At odds of 4 and 99 the cause came before its consequence in four of four tables, too."""
+"""Log prior odds against driven variables as causes: rows must prefer one by the odds of a sure answer. With odds of 4
+and 99 the cause also ranked before its consequence in four of four tables."""
 
 
 def odds_of_driven(variables: Iterable[Variable]) -> float:
-    """Return log odds over variables, less for driven ones."""
+    """Return the log prior odds for variables, lower for driven ones."""
     return DRIVEN_ODDS if any(variable.driven for variable in variables) else 0.0
 
 
 def log_odds(members: int, tried: float = 1.0) -> float:
-    """Return log prior odds of one pattern by family size and tries."""
+    """Return a pattern's log prior odds, from family size and number of trials."""
     return FAMILY_ODDS - float(np.log(max(members, 1) * max(tried, 1.0)))
 
 
@@ -209,7 +209,7 @@ def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
 
 def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: Floats) -> Pattern:
     widths = [share * variable.extent for share in TRANSITS]
-    # A row at which it turns may belong to either way: as it came there, or as it goes on.
+    # A row at a turning point may belong to the old or the new direction.
     arriving = variable.arriving(blocks)
     leaving = np.concatenate([np.append(arriving[rows][1:], arriving[rows][-1:]) for rows in blocks])
     samples = np.column_stack([sign, arriving, leaving, *(play(variable.values, blocks, width) for width in widths)])
@@ -226,17 +226,17 @@ def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: Floats) -> Pa
 
 
 TRANSITS = (0.003, 0.01, 0.03, 0.1)
-"""Ways after a reversal over which hysteresis turns to its other side, in shares of the range."""
+"""Travels after a reversal over which hysteresis changes sides, in shares of the range."""
 
 
 def play(values: Floats, blocks: Sequence[slice], width: float) -> Floats:
-    """Return the place within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; each block begins in the middle."""
+    """Return the position within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; blocks start in the middle."""
     found = np.empty(len(values))
     for rows in blocks:
         own = values[rows]
         rises = np.diff(own) >= 0.0
         turns = np.concatenate([[0], np.flatnonzero(rises[1:] != rises[:-1]) + 1])
-        # From one turn to the next it goes one way, and where it began tells where it is.
+        # Between turning points motion is monotonic, so the position follows from the last turning point.
         there, last = [0.0], 0.0
         for change in np.diff(own[turns]).tolist():
             last = min(max(last + 2.0 * change / width, -1.0), 1.0)
@@ -257,9 +257,9 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Return the product of two variables, each with its zero at both ends and the middle of its range.
+    """Return products of two variables, each with its zero at the ends or the middle of its range.
 
-    For angles, cosines and sines are multiplied: waves of their sum and difference.
+    For angles, products of cosines and sines give waves of sum and difference.
     """
     if covers_turns(one) or covers_turns(other):
         a, b = (
@@ -282,8 +282,8 @@ def _product(one: Variable, other: Variable) -> Pattern:
 
 
 ZEROS = (-1.0, 0.0, 1.0)
-"""Where a factor may be zero: at the ends and in the middle of its range. Beyond them the product is less than a straight line in the other
-factor, which is a cause of its own and comes first."""
+"""Zeros of a factor: ends and middle of its range. Farther zeros give nearly a straight line in the other factor, a
+separate and more probable cause."""
 
 
 def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:

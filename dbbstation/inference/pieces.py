@@ -1,4 +1,4 @@
-"""Whitened residuals beside fitted columns."""
+"""Whitened residuals of fits, and their projections."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """A whitened residual with the fit's directions, in noise.
+    """A whitened residual over noise, with the directions of the fit.
 
     Attributes:
-        axes: orthonormal fitted directions, less priors, shape (n, k).
+        axes: orthonormal fitted directions, reduced by priors, shape (n, k).
         whitening: shape (n, n), or None.
-        known: `beside` if known, shape (n, k).
+        known: `beside` if already computed, shape (n, k).
     """
 
     rest: Floats
@@ -45,25 +45,25 @@ class Left:
         coloured: Coloured,
         whitening: csr_array | None,
     ) -> Left:
-        """Return the residual of a whitened target beside Gaussian columns."""
+        """Return the residual of a whitened target after fitting columns with Gaussian priors."""
         return Fitting.of(columns, sd, coloured, whitening).left(target)
 
     @cached_property
     def towards(self) -> Floats:
-        """Return `rest` transposed-whitened, for unwhitened columns, shape (n,)."""
+        """Return the transposed whitening times `rest`, for products with unwhitened columns, shape (n,)."""
         return self.transposed(self.rest)
 
     @cached_property
     def beside(self) -> Floats:
-        """Return `axes` transposed-whitened, for unwhitened columns, shape (n, k)."""
+        """Return the transposed whitening times `axes`, for products with unwhitened columns, shape (n, k)."""
         return self.transposed(self.axes) if self.known is None else self.known
 
     def whitened(self, rows: Floats) -> Floats:
-        """Return rows with white noise."""
+        """Return whitened rows."""
         return rows if self.whitening is None else np.asarray(self.whitening @ rows)
 
     def whitened_part(self, rows: Floats, here: slice, there: slice) -> Floats:
-        """Return a whitened place of rows that are zero elsewhere."""
+        """Return part of the whitened rows, for rows that are zero outside a slice."""
         if self.whitening is None:
             return rows
         if there.start >= there.stop:
@@ -72,7 +72,7 @@ class Left:
             whole = np.zeros((len(self.rest), rows.shape[1]))
             whole[here] = rows
             return self.whitened(whole)[there]
-        # To cut a few rows out of a sparse matrix takes longer than all the rest.
+        # Slicing a sparse matrix would take most of the time.
         ends = self.whitening.indptr[there.start : there.stop + 1]
         own = slice(int(ends[0]), int(ends[-1]))
         column = self.whitening.indices[own] - here.start
@@ -81,16 +81,16 @@ class Left:
         return np.add.reduceat(taps[:, None] * rows[np.where(inside, column, 0)], ends[:-1] - ends[0], axis=0)
 
     def transposed(self, rows: Floats) -> Floats:
-        """Return transposed whitening of rows."""
+        """Return the transposed whitening times rows."""
         return rows if self.whitening is None else np.asarray(self.whitening.T @ rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Fitting:
-    """Whitened Gaussian columns made orthonormal; extensible.
+    """Orthonormal basis of whitened columns with Gaussian priors; extensible.
 
     Attributes:
-        axes: of rows and one row per prior, shape (n + b, k).
+        axes: orthonormal basis over rows and one row per prior, shape (n + b, k).
     """
 
     axes: Floats
@@ -100,12 +100,12 @@ class Fitting:
 
     @classmethod
     def of(cls, columns: Floats, sd: Floats, coloured: Coloured, whitening: csr_array | None) -> Fitting:
-        """Return columns alone; arguments as of `Left.of`."""
+        """Return the basis of columns; arguments as for `Left.of`."""
         none = np.zeros((len(columns), 0))
         return cls(none, len(columns), coloured, whitening).beside(columns, sd)
 
     def beside(self, columns: Floats, sd: Floats) -> Fitting:
-        """Return these with further columns, shape (n, k), priors infinite if unknown."""
+        """Return the basis with further columns, shape (n, k); unknown priors are infinite."""
         noise = self.coloured.innovation
         bounded = np.flatnonzero(np.isfinite(sd))
         size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
@@ -116,7 +116,7 @@ class Fitting:
         return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
 
     def without_axes(self, columns: Floats) -> Floats:
-        """Return columns in noise, shape (n, k), minus their projection on these, shape (n + b, k)."""
+        """Return columns over noise, shape (n, k), less their projection on `axes`, shape (n + b, k)."""
         new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
         for _ in range(2 if self.axes.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
             new = new - self.axes @ (self.axes.T @ new)
@@ -130,7 +130,7 @@ class Fitting:
 
 
 class LeftBesideOthers:
-    """A fit's residual beside columns but one; repeated parts are cached."""
+    """Residuals of a fit with all groups of columns but one; common parts are cached."""
 
     def __init__(
         self,
@@ -148,7 +148,7 @@ class LeftBesideOthers:
         self._products = np.eye(len(sd))
 
     def __call__(self, but_for: int, own: Floats) -> Left:
-        """Return the residual beside unwhitened columns, shape (n, k), but one."""
+        """Return the residual of the fit without one group of unwhitened columns, shape (n, k)."""
         changed = np.arange(own.shape[1])
         if len(self._own):
             changed = np.flatnonzero((own != self._own).any(axis=0))

@@ -1,4 +1,4 @@
-"""Levels of tests held back in groups, and the strut on which each class acts."""
+"""The three answers with tests held out in groups, and the strut on which each class acts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) -> Levels:
-    """Return the three levels, with the strut, or all struts, on which each class surely acts."""
+    """Return the three answers, with the strut, or all struts, on which each class surely acts."""
     anew = None if gains is None else gains.anew
     found = levels_of(settled, left, gains, anew, sizes=detectable_causes(settled))
     follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
@@ -29,14 +29,14 @@ def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) 
 
 
 def _place(settled: Settled, names: tuple[str, ...]) -> str | None:
-    """Return the form that all members surely have; None if there is none, or it has no name."""
+    """Return the label of the form that all members surely have; None without such a form or label."""
     labels = {max(form_probabilities(settled, name).items(), key=lambda one: one[1]) for name in names}
     found = {label if probability >= SURE else "" for label, probability in labels}
     return (found.pop() or None) if len(found) == 1 else None
 
 
 def form_probabilities(settled: Settled, name: str) -> dict[str, float]:
-    """Return the probability of each form of a member, by label, beside the other members."""
+    """Return the probability of each form of a member, by label, given the other members."""
     cause = next(one for one in settled.causes if one.name == name)
     scan = settled.comparison.scan(settled.best.without(name), [cause])
     worth = logsumexp(scan.weighted, axis=1)

@@ -1,7 +1,7 @@
-"""Causes' columns beside a refitted base.
+"""Columns of causes with a refitted base projected out.
 
-Base columns are orthonormalised once, then per noise level with a row per prior. Projection does not square the base's
-condition.
+Base columns are orthonormalised once, then for each noise with a row per prior. The projection does not square the
+base's condition number.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 
 
 LEAST_SHARE = 1e-12
-"""Share of a direction of the base in the rows that are kept below which these do not show it: thousands of times rounding, 2e-16, so that
-a share that counts is known to a thousandth. Directions that one run alone shows, a mounting's, have none. In diagnoses of two sessions all
-shares were below 1e-14 or above 4e-4; from 1e-14 to 1e-8 the answers are the same to a millionth."""
+"""Least squared share of a base direction in the kept rows that determines it, thousands of times the rounding 2e-16.
+Directions of a single omitted run, such as a mounting's, have zero. In diagnoses of two sessions all shares were below
+1e-14 or above 4e-4; limits from 1e-14 to 1e-8 give equal answers to a millionth."""
 
 
 class CauseColumns:
-    """Causes' columns over all samples, extensible.
+    """Columns of causes over all samples, extensible.
 
     Args:
         base: shape (n, k).
-        whitened: from columns, shape (m, q), to samples, shape (n, q), on demand; None: identity.
+        whitened: function from columns, shape (m, q), to samples, shape (n, q), called on demand; None for identity.
 
     Attributes:
-        numbers: columns with known products, if not all.
-        axes: of the base, shape (n, k).
+        numbers: columns with products, if not all.
+        axes: orthonormal axes of the base, shape (n, k).
         on_axes: base along these, shape (k, k).
     """
 
@@ -58,7 +58,7 @@ class CauseColumns:
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
         self._free: list[int] = []
-        self._changed: list[int] = []  # columns of which products and share of the axes are those of former ones
+        self._changed: list[int] = []  # replaced columns, whose products and projections are outdated
         self.count = 0
         self.numbers: Integers | None = None
 
@@ -68,18 +68,18 @@ class CauseColumns:
         if self._waiting:
             self._make_room(self.count)
         while self._waiting:
-            part = self._waiting.pop(0)  # held twice no longer than need be
+            part = self._waiting.pop(0)  # free the copy early
             first, last = self._ready, self._ready + part.shape[1]
             self._buffer[:, first:last] = part if self._whitened is None else self._whitened(part)
             self._ready = last
         return self._buffer[:, : self.count]
 
     def copy(self) -> CauseColumns:
-        """Return an independently extensible copy with shared columns."""
+        """Return an independently extensible copy that shares columns."""
         other: CauseColumns = copy(self)
         other._waiting = list(self._waiting)
         self._free, other._free, other._changed = [], [], list(self._changed)
-        # Either writes columns behind those that are there, and needs a buffer of its own for that.
+        # Both append columns and then need separate buffers.
         self._shared = other._shared = True
         return other
 
@@ -103,7 +103,7 @@ class CauseColumns:
         """Return all products, shape (p, p)."""
         known = len(self._products)
         if known < self.count:
-            # Many columns at once take a fraction of the time that they take one after the other.
+            # Joint products of many columns take a fraction of the time.
             products = np.empty((self.count, self.count))
             products[:known, :known] = self._products
             products[:, known:] = self.samples.T @ self.samples[:, known:]
@@ -113,7 +113,7 @@ class CauseColumns:
         return self._products
 
     def own_gram(self) -> Floats:
-        """Return all products in an array that the caller may change."""
+        """Return a copy of all products, shape (p, p)."""
         return self.gram.copy()
 
     def _renew(self) -> None:
@@ -131,7 +131,7 @@ class CauseColumns:
 
     @property
     def along(self) -> Floats:
-        """Return columns along base axes, shape (k, p)."""
+        """Return the columns' components along base axes, shape (k, p)."""
         known = self._along.shape[1]
         if known < self.count:
             self._along = np.hstack([self._along, self.axes.T @ self.samples[:, known:]])
@@ -139,7 +139,7 @@ class CauseColumns:
         return self._along
 
     def add(self, columns: Floats) -> Integers:
-        """Add columns, shape (m, q), in freed places first, and return their numbers."""
+        """Add columns, shape (m, q), reusing freed places, and return their numbers."""
         taken = np.array(self._free[: columns.shape[1]], dtype=np.int64)
         if len(taken):
             self._free = self._free[len(taken) :]
@@ -148,7 +148,7 @@ class CauseColumns:
             columns = columns[:, len(taken) :]
         first, last = self.count, self.count + columns.shape[1]
         if self._whitened is None:
-            # Nothing is to be worked out later, and a copy of what waits would take as much memory again.
+            # No whitening is needed later, and waiting columns would double the memory.
             self._make_room(last)
             self._buffer[:, first:last] = columns
             self._ready = last
@@ -172,20 +172,20 @@ class CauseColumns:
         self._buffer, self._shared = wider, False
 
     def towards(self, target: Floats) -> tuple[Floats, Floats]:
-        """Return products with a target, shape (n,), of columns, shape (p,), and axes, shape (k,)."""
+        """Return products of columns, shape (p,), and of axes, shape (k,), with a target, shape (n,)."""
         return self.samples.T @ target, self.axes.T @ target
 
     def but_for(self, rows: Flags, only: Integers | None = None) -> CauseColumns:
-        """Return the causes without some rows, where targets must be zero.
+        """Return the causes without some rows, in which targets must be zero.
 
         Args:
-            only: rising, shape (q,); None: all.
+            only: ascending, shape (q,); None for all.
         """
         return _Without(self, rows, only)
 
 
 class _Without(CauseColumns):
-    """All rows but a part; axes are renewed from few products."""
+    """Columns without one part's rows; axes are updated by few products."""
 
     def __init__(self, whole: CauseColumns, rows: Flags, only: Integers | None) -> None:
         self._whole, self.numbers, self.count = whole, only, whole.count
@@ -225,7 +225,7 @@ def _less(products: Floats, columns: Floats) -> Floats:
         return products
     found = np.asarray(dsyrk(-1.0, columns, beta=1.0, c=products.T, trans=1, overwrite_c=1), dtype=np.float64)
     for first in range(0, len(found), BOUNDS.mirrored_at_once):
-        # Above the diagonal are the products; below it are those that came in.
+        # New products are above the diagonal, old ones below.
         strip, behind = slice(first, first + BOUNDS.mirrored_at_once), slice(first + BOUNDS.mirrored_at_once, None)
         upper = np.triu(found[strip, strip])
         found[strip, strip] = upper + np.triu(upper, 1).T
@@ -239,11 +239,11 @@ def _orthonormal(base: Floats) -> tuple[Floats, Floats]:
 
 
 class BesideBase:
-    """Causes beside a base.
+    """Causes with a base projected out.
 
     Args:
-        held: orthonormal directions kept at zero in the base fit, in scales; here of usual size, so that visible curvature is no
-            cause.
+        held: orthonormal directions held at zero in the base fit, in scaled columns. Here they are free with usual
+            size, so their nonlinear effects do not look like a cause.
     """
 
     def __init__(self, causes: CauseColumns, known: Columns, held: Floats, noise: float) -> None:
@@ -256,11 +256,11 @@ class BesideBase:
         bounded = np.isfinite(known.prior[fitted])
         priors = np.zeros((sized + int(bounded.sum()), columns.shape[1]))
         np.fill_diagonal(priors[:sized], noise)
-        # A tolerance bounds a parameter, which free and held directions move together.
+        # A tolerance bounds a parameter, which depends on free and held directions.
         moved = np.hstack([np.zeros((len(fitted), len(random))), usual, free])[bounded]
         priors[sized:] = noise * moved / known.prior[fitted][bounded][:, None]
         self._causes, self._noise = causes, noise
-        # Of what lies along the axes of the base, how much its fit takes, given its priors.
+        # Share of each base axis that the fit absorbs, given its priors.
         self._taken = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)].T
 
     def comparison(self, target: Floats, only: Integers | None = None) -> ModelComparison:
@@ -283,14 +283,14 @@ class BesideBase:
         causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)
         size = sd[used] / self._noise
-        # Nearly all columns are multiplied where they are: to pick them would copy all that the memory is full of.
+        # Nearly all columns are multiplied in place, because selecting them would copy most of the memory.
         every = len(used) > BOUNDS.columns_apart * causes.count
         columns = causes.samples if every else causes.of(used)
         own = used if every else np.arange(len(used))
         along = causes.along[:, used] if every else axes.T @ columns
         products = causes.gram[np.ix_(used, used)] if every else columns.T @ columns
         of_base = self._taken @ (along * size)
-        # As many products as columns times columns fill tens of megabytes: one array of them is worked on in place.
+        # The product matrix has tens of megabytes, so it is changed in place.
         products *= size[:, None]
         products *= size
         products -= of_base.T @ of_base

@@ -1,4 +1,4 @@
-"""Counting events in time: equal sizes count once, and too many count as none."""
+"""Count events in time: equal sizes count once, and too many sizes are not events."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 MOST_PUSHES = 8
-"""Stretches of time of sizes of their own, at the most: each has three numbers that nothing but the residual says, and with more of them
-they can follow whatever a law or a model of the noise leaves."""
+"""Most stretches of time with different sizes. Each has three numbers from the residual alone; more could imitate any
+residual of a law or noise model."""
 
 ONE_SIZE = 0.999
-"""Probability up to which pushes of one size scatter as little as that."""
+"""Coverage of the scatter within which pushes have equal size."""
 
 
 def too_many(sizes: Sequence[Value]) -> str:
-    """Return why so many sizes are no events, or an empty text."""
+    """Return why so many sizes are not events, else an empty text."""
     distinct = distinct_sizes(sizes)
     if distinct <= MOST_PUSHES:
         return ""
@@ -33,12 +33,12 @@ def too_many(sizes: Sequence[Value]) -> str:
 
 
 def within_a_step(sizes: Sequence[Value], step: float) -> str:
-    """Return why sizes may be rounding, or an empty text.
+    """Return why sizes may be rounding, else an empty text.
 
     Rounding of slow values keeps its sign over many rows, up to half a step.
 
     Args:
-        step: zero if none.
+        step: zero without rounding.
     """
     if not sizes or any(abs(one.value) - step >= OUT * one.uncertainty for one in sizes):
         return ""
@@ -51,7 +51,7 @@ def distinct_sizes(sizes: Sequence[Value]) -> int:
 
 
 def most_of_one_size(sizes: Sequence[Value]) -> list[int]:
-    """Return the largest group of equal sizes by chi-square, rising."""
+    """Return the largest group of equal sizes by chi-square, ascending."""
     order = sorted(range(len(sizes)), key=lambda k: sizes[k].value)
     best: range = range(0)
     for first in range(len(order)):
@@ -63,11 +63,11 @@ def most_of_one_size(sizes: Sequence[Value]) -> list[int]:
 def _is_one(sizes: Sequence[Value]) -> bool:
     mean = pooled(sizes).value
     squares = sum(((one.value - mean) / one.uncertainty) ** 2 for one in sizes)
-    return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - one agrees with itself
+    return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - a single size is a group
 
 
 def pooled(sizes: Sequence[Value]) -> Value:
-    """Return the weighted mean with the larger of stated and scatter uncertainty [ISO 13528; Birge 1932]."""
+    """Return the weighted mean with the larger of stated uncertainty and scatter [ISO 13528; Birge 1932]."""
     values, sigmas = (np.array([getattr(one, name) for one in sizes]) for name in ("value", "uncertainty"))
     weights = 1.0 / np.square(sigmas)
     mean = float(weights @ values / weights.sum())

@@ -1,4 +1,4 @@
-"""Findings from probabilities of sets: verdict, size, place, equivalents."""
+"""Derive findings from probabilities of sets: verdict, size, place, equivalents."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Solution
 
 HALF = 0.5
-"""Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
+"""Share of its largest value above which an effect counts as present in a span."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Where an effect is.
+    """A range of a variable in which an effect is present.
 
     Attributes:
         low: [unit].
@@ -58,20 +58,20 @@ class CauseFinding:
     """Finding on one cause.
 
     Attributes:
-        form: family; None for a law.
-        rms: beyond the base, over its rows; in the residual's unit.
-        sigmas: norm over standard deviation.
-        confounded: R² of the effect on base parameters.
-        spans: variables' ranges of at least half size.
-        rows_there: number; 0 if not asked.
-        rows: first and last of each stretch; may be empty.
-        equivalent: indistinguishable causes, itself first; may be empty.
-        ambiguous_with: one is present if not this.
+        form: family of a pattern; None for a law.
+        rms: with the base projected out, over the effect's rows, in the residual's unit.
+        sigmas: norm of the effect over its standard deviation.
+        confounded: R² of the effect on base columns.
+        spans: ranges of variables with at least half the largest effect.
+        rows_there: number of rows with the effect; 0 if not computed.
+        rows: first and last row of each stretch; may be empty.
+        equivalent: indistinguishable causes, this one first; may be empty.
+        ambiguous_with: causes of which one is present if this is not.
         text: reason; may be empty.
         acts: whether other rows can show it.
-        gains: held-out; None if not tested.
-        persists: a single event that held-out parts confirm.
-        recurs: a wave over time, found anew without each predicted part.
+        gains: held-out gains; None if not tested.
+        persists: whether held-out parts confirm a single event.
+        recurs: whether a wave over time is found without each predicted part.
     """
 
     name: str
@@ -101,11 +101,11 @@ class CauseFinding:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Evidence of parts on findings.
+    """Evidence of held-out parts on findings.
 
     Attributes:
-        refits: [`refits_without`]; none: model uncertainties.
-        is_worse_here: worse than the reference on the rows themselves, without held-out parts.
+        refits: from `refits_without`; empty to use only model uncertainties.
+        is_worse_here: without held-out parts, whether the findings leave larger residuals than the reference.
     """
 
     held_out: HeldOutError | ChosenAnew | None = None
@@ -119,20 +119,20 @@ class Trial:
 
 
 def read_off(settled: Settled, trial: Trial | None, levels: Levels) -> tuple[CauseFinding, ...]:
-    """Return a finding per law and pattern, present ones first, by size.
+    """Return one finding per law and pattern, ordered by presence, then size.
 
     Args:
-        trial: evidence of parts; None: not tested.
+        trial: evidence of held-out parts; None if not tested.
         levels: source of the verdicts.
     """
     return CauseJudge(settled, trial, levels).every()
 
 
 class CauseJudge:
-    """Findings on causes. Clients derive their own class for words and values.
+    """Makes findings on causes. Clients derive classes with other words and values.
 
     Attributes:
-        is_catalogue: causes are asked for by name; what level 3 leaves open and is improbable by itself is judged as absent.
+        is_catalogue: whether users ask for causes by name; an improbable cause that answer 3 leaves open is then absent.
     """
 
     is_catalogue = False
@@ -174,7 +174,7 @@ class CauseJudge:
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
 
     def every(self) -> tuple[CauseFinding, ...]:
-        """Return a finding per cause and refused law, present ones first, by size."""
+        """Return one finding per cause and refused law, ordered by presence, then size."""
         found = [self.finding(cause) for cause in self._settled.causes]
         found += [self._refused(name, why) for name, why in self._settled.refused.items()]
         return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_bayes_factor)))
@@ -191,7 +191,7 @@ class CauseJudge:
         probability = self._settled.averaged(self._alternatives.probability(equal), equal)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
-            # The prior must not say how much could hide.
+            # The prior must not limit the size that could be hidden.
             shown = replace(shown, scale=float(SCALES[-1]))
             found = self._settled.comparison.estimates([shown, *self._best.without(*self._instead_of(cause.name))])
             own = len(shown.columns)
@@ -268,7 +268,7 @@ class CauseJudge:
         return any(0 <= first - b.start < SHORTEST or 0 <= b.stop - 1 - last < SHORTEST for b in blocks)
 
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
-        """Return parameters with the larger of model and jackknife uncertainty."""
+        """Return parameters with the larger of model and jackknife uncertainties."""
         found = named_values(self._settled, member, values, covariance)
         own = self._own.get(member.cause.name)
         if own is None or self._trial is None or not self._trial.refits:
@@ -301,7 +301,7 @@ class CauseJudge:
         return frozenset() if name in self._members else self._levels.instead_of(name)
 
     def _alike(self, name: str) -> str:
-        """Return a member equivalent to a cause, alone or among others; may be empty."""
+        """Return a member equivalent to a cause, alone or with others; may be empty."""
         equal = any(name in names for names in self._classes.values())
         if self.is_catalogue and not equal and self._alternatives.probability((name,)) <= ABSENT:
             return ""
@@ -328,7 +328,7 @@ class CauseJudge:
             return ""
         own = values_of_law(law, shown, values, covariance, law.form_uncertainty)
         every = self._of_laws | {name: value.value for name, value in own.items()}
-        # What is negative by less than its uncertainty allows may be zero.
+        # An insignificantly negative value may be zero.
         signed = [name for name, sign in zip(law.parameters, law.positive, strict=False) if sign and name in own]
         every |= {name: max(every[name], 0.0) for name in signed}
         return impossible(law, values, np.diag(covariance)) or impossible_beside(law, own, every)
@@ -373,7 +373,7 @@ class CauseJudge:
 
 
 def concealed(effect: Floats, rest: Floats) -> tuple[float, float, float]:
-    """Return the rms of an effect and of the rest that fitted parameters leave, and the share of squares that they take."""
+    """Return the rms of an effect, the rms that fitted parameters do not absorb, and the share of squares that they absorb."""
     whole, left = rms(effect), rms(rest)
     return whole, left, float(np.clip(1.0 - (left / whole) ** 2 if whole > 0.0 else 0.0, 0.0, 1.0))
 

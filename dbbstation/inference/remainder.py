@@ -1,6 +1,6 @@
-"""Where and how a residual differs from noise: harmonic, run, pulse.
+"""Find where a residual differs from noise: harmonic, run, pulse.
 
-A global sum of squares hides single features. Probabilities are multiplied by the number of looks [Bonferroni; Miller,
+A total sum of squares hides single features. Probabilities are multiplied by the number of trials [Bonferroni; Miller,
 Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
 """
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Largest:
-    """The largest of many features.
+    """The most significant of many features.
 
     Attributes:
-        place: harmonic, or run from 0.
-        rms: beyond noise, in the channel's unit.
+        place: harmonic, or run number from 0.
+        rms: residual beyond noise, in the channel's unit.
     """
 
     probability: float
@@ -38,11 +38,11 @@ class Largest:
 
 @dataclass(frozen=True)
 class Remainder:
-    """Residuals of a model by harmonic, run and sample.
+    """Most significant harmonic, run and pulse of a model's residuals.
 
     Attributes:
-        run: worst over low harmonics.
-        pulse: run with the worst stretch, one of `BOUNDS.pulses` per turn.
+        run: the run with the largest low harmonics.
+        pulse: the run with the largest stretch; a turn has `BOUNDS.pulses` stretches.
     """
 
     harmonic: Largest
@@ -52,7 +52,7 @@ class Remainder:
 
     @property
     def probability(self) -> float:
-        """Return the probability by noise of any feature."""
+        """Return the probability that noise causes any of the three features."""
         return min(1.0, 3.0 * min(one.probability for one in (self.harmonic, self.run, self.pulse)))
 
 
@@ -62,10 +62,10 @@ def remainder(
     groups: Sequence[object],
     noise: Spectrum,
 ) -> Remainder:
-    """Find the worst harmonic, run and stretch.
+    """Find the most significant harmonic, run and stretch.
 
     Args:
-        groups: sharing the first harmonic.
+        groups: each run's group with a common first harmonic.
     """
     low, _ = bands(min(len(residual) for residual in residuals))
     samples = float(np.mean([len(residual) for residual in residuals]))

@@ -1,4 +1,4 @@
-"""Outstanding features beside base and members."""
+"""Find significant features of the residual after base and members."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Pattern
 
 IN_TIME = (Family.PULSES, Family.PULSES_BY_DIRECTION)
-"""Patterns whose edges are nonlinear parameters: they are moved to their best places in each noise."""
+"""Families whose edges are nonlinear parameters, optimised for each noise."""
 
 MOVED = (*IN_TIME, *PLACED)
-"""Patterns that have places, edges, widths or frequencies that are moved."""
+"""Families whose places, edges, widths or frequencies are optimised."""
 
 
 def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
-    """Return patterns that stand out."""
+    """Return the significant patterns of the residual."""
     channel = bank.channel
     left = _left(bank, *_fitted(bank, members))
     size = channel.size / left.noise
@@ -58,7 +58,7 @@ def _left(bank: Bank, columns: Floats, sd: Floats) -> Left:
 
 
 def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
-    """Return members with re-optimised places in present noise."""
+    """Return members with places optimised for the present noise."""
     channel = bank.channel
     members = list(members)
     for number, member in enumerate(members):

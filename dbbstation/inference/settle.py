@@ -1,4 +1,4 @@
-"""The set of laws and patterns that explains a channel: compare, search, refine, repeat."""
+"""Find the laws and patterns that explain a channel: compare, search, refine, repeat."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from dbbstation.inference.projection import BesideBase
 
 BETTER = 3.0
-"""Log probability by which one thing is clearly more probable than another: odds of twenty. Another look must add so much, noise included, to
-be followed by one more, and so must what a formula may be off by, to be told."""
+"""Log odds of a clear improvement, a factor of twenty. Each scan of the residual must add so much, noise included, to
+be followed by another; formula inaccuracy must add so much to be reported."""
 
 
 @dataclass(frozen=True)
 class _How:
-    """How a comparison is made; the fields before `progress` are options of `settle`."""
+    """Options of a comparison; fields before `progress` are options of `settle`."""
 
     look: bool = True
     static: bool = True
@@ -61,12 +61,12 @@ def settle(
     """Compare sets of laws and patterns.
 
     Args:
-        rivals: noise of any colour competes; False: first order beside everything.
-        most_work: limit of all searches together [`SearchWork`].
+        rivals: whether noise with any spectrum competes; False for first-order noise, estimated with all causes.
+        most_work: limit of all searches together, see `SearchWork`.
         options: `look`: search waves, bumps, steps and pulses. `static`: include patterns that need no search.
-            `most_expanded`: of one search. `most_looks`: successive searches of the residual. `in_time`: search steps and
-            pulses in time; False if blocks have own curves. `thorough`: several starts and a final look; False: one fast
-            search. `progress`: told each stage.
+            `most_expanded`: limit of one search. `most_looks`: number of successive scans of the residual. `in_time`:
+            search steps and pulses in time; False if blocks have separate curves. `thorough`: several starts and a
+            final scan; False for one fast search. `progress`: called with each stage.
     """
     how, stages = _How(**options, work=SearchWork(most_work)), len(beginnings) + 1
     if not rivals:
@@ -74,7 +74,7 @@ def settle(
     found: list[Settled] = []
     laid_out = _begun(channel, how)
     begun: tuple[Bank, Settled] | None = None
-    # Long tails come last: where nothing has any, they are no rival.
+    # Long tails come last, and only if innovations may have them.
     for number, one in enumerate(sorted(beginnings, key=lambda one: one in LONG_TAILS)):
         if one in LONG_TAILS and found and not _may_have_long_tails(laid_out, found):
             continue
@@ -83,7 +83,7 @@ def settle(
             found.append(_from(laid_out.copy(), (), one, how.part(share), found))
             continue
         if begun is None:
-            # What stands beside everything is worked out once, and gone on with under each kind of noise.
+            # The comparison with all causes is computed once and continued for each kind of noise.
             bank = laid_out.copy()
             begun, share = (bank, _settled(bank, how.part(share))), share - 1
         found.append(_from(begun[0].copy(), begun[1].best.members, one, how.part(share), found))
@@ -149,11 +149,11 @@ def _settled(
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
     looked: set[frozenset[str]] = set()
-    compared: Settled | None = None  # after the last look
+    compared: Settled | None = None  # after the last scan
     most_probable, times_placed = -np.inf, 0
-    # Members to begin with come from a comparison that had been looked about for.
+    # Starting members come from a comparison whose residual was already scanned.
     blank = not best
-    # Laws come first, at their best values: what they leave is looked at, and not what they do.
+    # Laws come first, at their best values, so scans see only their residual.
     looking = look and not channel.laws
     for number in range(BOUNDS.rounds):
         _measured(bank, best, work)
@@ -189,7 +189,7 @@ def _settled(
             break
         if looking:
             looked.add(posterior.best.names)
-            # Looks that go on finding other places for the same do not make it more probable.
+            # Scans that only find other places for one effect do not improve the probability.
             before, most_probable = most_probable, max(most_probable, log_probability(bank, best))
             if most_probable < before + BETTER:
                 break
@@ -198,7 +198,7 @@ def _settled(
 
 
 def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
-    """Return promising laws that have no exact columns yet; empty if the limit of work is reached."""
+    """Return promising laws without exact columns; empty at the limit of work."""
     return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in laid_out]
 
 
@@ -240,7 +240,8 @@ def _looked(
         more = places_anew(bank, grown(comparison, bank.causes, members, work), set(new))
         fresh = set(bank.patterns) - known
         taken = {member.cause.name for member in more}
-        # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
+        # Added causes reduce the noise, and less noise admits more causes, so both together must be more probable than
+        # before.
         if bank.measures_beside_members:
             _measured(bank, more, work)
         after = log_probability(bank, more)
@@ -262,8 +263,8 @@ def _looked_about(
 ) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
     starts: list[tuple[Member, ...]] = []
     if first and how.in_time and how.thorough:
-        # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
-        # follow variables have a start of their own, and what comes at once has one beside the laws alone.
+        # Stretches of time can imitate effects with memory, and curves over time can imitate sudden effects. Separate
+        # starts therefore include effects over variables, and sudden effects with laws only.
         begun = grown(bank.beside().comparison(bank.target), bank.causes)
         starts.append(_looked(bank, begun, how, in_time=False))
         laws = tuple(member for member in begun if member.cause.name in bank.laws)
@@ -286,11 +287,11 @@ def grown(
     start: Sequence[Member] = (),
     work: SearchWork | None = None,
 ) -> tuple[Member, ...]:
-    """Return greedily grown causes, pruned at the end.
+    """Add causes greedily, then prune, and return the members.
 
     Args:
-        start: initial members; missing ones are skipped.
-        work: where each scan is counted.
+        start: initial members; unknown ones are skipped.
+        work: counter of scans.
     """
     there = {cause.name: cause for cause in causes}
     members = [

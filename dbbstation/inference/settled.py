@@ -1,4 +1,4 @@
-"""The outcome of a comparison with noise and other beginnings."""
+"""The outcome of a comparison, with noise and outcomes from other initial noise models."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 class Beginning(Enum):
-    """What noise is first measured beside.
+    """Initial noise models, by the causes whose residual gives the first noise.
 
-    Wandering noise resembles curves, smooth effects resemble noise, and pulses resemble outliers. All are tried.
+    All are tried, because wandering noise resembles curves, smooth effects resemble noise, and pulses resemble outliers.
     """
 
     EVERYTHING = "everything"
@@ -37,7 +37,7 @@ class Settled:
 
     Attributes:
         log_probability: of noise and best hypothesis, up to a constant.
-        stopped: the search reached its limit of work; the best so far is returned.
+        stopped: whether the search reached its limit of work; the result is then the best so far.
     """
 
     channel: Channel
@@ -61,7 +61,7 @@ class Settled:
         """Return the effect of some members over all rows, in the residual's unit, shape (n,).
 
         Args:
-            members: that are fitted together; None: the best ones.
+            members: members to fit together; None for the best ones.
         """
         total, members = np.zeros(len(self.channel.residual)), self.best.members if members is None else members
         values = self.comparison.estimates(members).values if members else np.zeros(0)
@@ -72,7 +72,7 @@ class Settled:
         return total
 
     def base_values(self, effect: Floats | None = None) -> Floats:
-        """Return base values beside an effect; None: of all members, shape (k,)."""
+        """Return the refitted base's values, shape (k,), given an effect; None for all members."""
         return self.bank.base_values(self.effect() if effect is None else effect)
 
     def predicted(self) -> Floats:
@@ -81,10 +81,10 @@ class Settled:
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
 
     def averaged(self, probability: float, names: Collection[str]) -> float:
-        """Return causes' probability over all initial noise models.
+        """Return the probability of causes, averaged over initial noise models.
 
         Args:
-            names: found effects of one family and variables count alike.
+            names: causes; found patterns of one family over equal variables count together.
         """
         if not self.others:
             return probability

@@ -1,7 +1,8 @@
 """Linear least squares with random effects in square-root form.
 
-target = J x + noise in blocks of few columns. Orthogonal compression to triangles keeps information and condition. Stated
-priors are further rows. [Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, ch. II and V]
+The model is target = J x + noise in blocks of few columns. Orthogonal compression to triangular factors preserves
+information and condition. Priors are further rows. [Bierman, Factorization Methods for Discrete Sequential Estimation,
+1977, ch. II and V]
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ if TYPE_CHECKING:
 
 
 ROUNDING = 1e-9
-"""A column of which only its prior is known is exactly as uncertain as its scale: rounding must not lose it."""
+"""Tolerance of rounding: a column known only by its prior is exactly as uncertain as its scale and must not be lost."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spreads:
-    """A covariance as shared and own parts of random effects.
+    """A covariance as the sum of a shared root and roots of groups of random effects.
 
     Attributes:
         shared: root, shape (k, q).
@@ -59,7 +60,7 @@ class Spreads:
         return covariance
 
     def times(self, factor: Floats) -> Spreads:
-        """Return standard deviations scaled by factors, shape (k,)."""
+        """Return the covariance with standard deviations scaled by factors, shape (k,)."""
         return Spreads(
             factor[:, None] * self.shared,
             tuple((columns, factor[columns, None] * root) for columns, root in self.own),
@@ -79,10 +80,10 @@ class Spreads:
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Directions of fitted columns in scales, most certain first.
+    """Directions of scaled fitted columns, most certain first.
 
     Attributes:
-        singular: one over standard deviation, shape (f,).
+        singular: reciprocal standard deviations, shape (f,).
         vectors: orthonormal rows, shape (f, f).
     """
 
@@ -95,11 +96,11 @@ class Solution:
     """Result of `solve`.
 
     Attributes:
-        directions: of fitted columns, random ones averaged.
-        held: rows held at zero, in scales, shape (h, f).
-        chi2: weighted residual squares with priors.
-        stated_chi2: part of priors and blocks with own noise.
-        freedom_used: on measurements of the channel's noise.
+        directions: of fitted columns, marginalised over random ones.
+        held: directions held at zero, in scaled columns, shape (h, f).
+        chi2: weighted sum of squared residuals, with priors.
+        stated_chi2: part of `chi2` from priors and blocks with separate noise.
+        freedom_used: degrees of freedom of measurements with the channel's noise.
     """
 
     x: Floats
@@ -127,10 +128,10 @@ def solve(
     noise: float,
     held: Floats | None = None,
 ) -> Solution:
-    """Return best estimates of fitted and predictions of random columns.
+    """Return estimates of fitted columns and predictions of random columns.
 
     Args:
-        held: rows kept at zero, in scales, shape (h, f).
+        held: directions held at zero, in scaled columns, shape (h, f).
     """
     arrow = arrow_of(blocks, known, noise)
     random, fitted = arrow.random, arrow.fitted
@@ -189,7 +190,7 @@ def chi2_without(
     held: Floats,
     parts: Sequence[Sequence[int]],
 ) -> list[float]:
-    """Return chi-square without each part's blocks, priors included."""
+    """Return the chi-square without each part's blocks, with priors."""
     towards = known.scale[~known.random][:, None] * complement(held).T
     found = []
     for root, target, floor in triangles_without(blocks, known, noise, parts):
@@ -200,17 +201,17 @@ def chi2_without(
 
 
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Floats:
-    """Return orthonormal directions, in scales, more uncertain than 1."""
+    """Return the orthonormal directions, in scaled columns, with standard deviations above 1."""
     arrow = arrow_of(blocks, known, noise)
     directions = directions_of(arrow.root_of_fitted * known.scale[arrow.fitted])
     return directions.vectors[directions.singular < 1.0 - ROUNDING]
 
 
 def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, held: Floats) -> Floats:
-    """Return combinations that blocks cannot determine, at scale size, shape (h, k).
+    """Return combinations that blocks do not determine, with sizes by scale, shape (h, k).
 
-    A direction lost at the first linearisation differs at the solution: here other columns follow by least squares.
-    Combinations are orthonormal in scales, with zero random effects.
+    Directions lost at the first linearisation change until the solution, so other columns are adjusted by least
+    squares. Combinations are orthonormal in scaled columns, with zero random effects.
     """
     combinations = np.zeros((len(held), len(known.prior)))
     if len(held):
@@ -224,7 +225,7 @@ def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, h
 
 
 def directions_of(seen: Floats) -> Directions:
-    """Return directions of a scaled information root, shape (r, f), most certain first."""
+    """Return the directions of a scaled root of information, shape (r, f), most certain first."""
     _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
     padded = np.zeros(seen.shape[1])
     padded[: len(singular)] = singular
@@ -240,7 +241,7 @@ def complement(rows: Floats) -> Floats:
 
 
 def free_directions(base: Columns, fitted: Integers, held: Floats) -> Floats:
-    """Return fitted columns along free directions, in scales, shape (f, free)."""
+    """Return fitted columns along free directions of scaled columns, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])
     return base.scale[fitted][:, None] * complement(held).T

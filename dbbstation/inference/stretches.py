@@ -1,4 +1,4 @@
-"""Steps and pulses in time: stretches with a shifted residual."""
+"""Find steps and pulses in time: stretches with a shifted residual."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 SHORTEST = 3
-"""Rows of the shortest stretch: one row alone is a wrong value, which no effect of the object explains."""
+"""Shortest stretch in rows; a single wrong value is no effect of the object."""
 
 
 @dataclass(frozen=True)
 class _Window:
-    """First row, one behind the last, and log Bayes factor."""
+    """A stretch by first row and one after the last, with log Bayes factor."""
 
     first: int
     last: int
@@ -42,12 +42,12 @@ def stretches(
     clock: Clock | None = None,
     by: tuple[Variable, Floats] | None = None,
 ) -> list[Pattern]:
-    """Return outstanding stretches as patterns of one, two and more.
+    """Return the significant stretches as patterns of one, two and more stretches.
 
     Args:
-        size: one standard deviation, in noise.
-        clock: None: gapless with immediate steps.
-        by: time, and direction, shape (n,), for odd effects.
+        size: prior standard deviation, over noise.
+        clock: None for gapless rows and immediate steps.
+        by: time, and directions of travel, shape (n,), for effects that change sign with direction.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
     kinds: list[tuple[Family, tuple[Variable, ...], Floats]] = [(Family.PULSES, (), np.ones(len(kept)))]
@@ -63,7 +63,7 @@ def stretches(
                 break
             found.append(look.take(best))
         if over:
-            # Without a reversal within it, it is the same as one that does not turn.
+            # Without a reversal inside, the stretch equals one that ignores direction.
             ways = np.sign(factor)
             found = [(a, b) for a, b in found if {-1.0, 1.0} <= set(ways[(clock.rows > a) & (clock.rows < b)].tolist())]
         if found:
@@ -82,10 +82,10 @@ def refined(
     clock: Clock | None = None,
     direction: Floats | None = None,
 ) -> Pattern:
-    """Return a pattern's first stretches with re-optimised ends.
+    """Return a pattern of its first stretches with optimised ends.
 
     Args:
-        lefts: residual without one, by number and all columns, shape (n, count).
+        lefts: function from a stretch's number and all columns, shape (n, count), to the residual without it.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
     factor = np.ones(len(kept)) if direction is None else direction
@@ -94,13 +94,13 @@ def refined(
         return pattern
     found = list(zip(form.first, form.last, strict=True))[:count]
     columns = pattern.samples[:, :count].copy()
-    # Two that share an edge may be one with a wrong edge and another one that makes up for it: the shorter one comes back only if
-    # it is still worth it beside the others at their best places.
+    # Two stretches with a common edge may be one with a wrong edge plus a compensation. The shorter one is kept only if
+    # it is still worth its odds given the others at their best places.
     doubtful = [k for k in range(len(found)) if _shares_an_edge(found, k)]
     columns[:, doubtful] = 0.0
     for k in sorted(range(len(found)), key=lambda one: one in doubtful):
         window = np.searchsorted(clock.rows[kept], [found[k]])
-        # Beside the others it may have come to be shorter than a stretch can be, also at the end of the rows.
+        # Refinement of the others may have made it too short, also at the end of the rows.
         window[0, 1] = max(window[0, 1], min(window[0, 0] + SHORTEST, int(kept.sum())))
         window[0, 0] = min(window[0, 0], window[0, 1] - SHORTEST)
         look = _Look(lefts(k, columns), blocks, kept, size, clock, factor[kept], window)
@@ -132,7 +132,7 @@ def _pattern(
 ) -> Pattern:
     form = Stretches(tuple(a for a, _ in found), tuple(b for _, b in found), clock.response)
     width = len(found)
-    # A pattern of k stretches is one of tried**k / k! [k places, in whatever order].
+    # A pattern of k stretches is one of tried**k / k! [k places in any order].
     sizes = sorted({1, 2, 3, 4, 6, 9, 13, 19, 28, width} & set(range(1, width + 1)))
     choices = tuple(
         (tuple(range(k)), float(gammaln(k + 1) - (k - 1) * np.log(tried) - np.log(len(sizes))), f"{k} of them")
@@ -159,7 +159,7 @@ def _label(found: Sequence[tuple[float, float]]) -> str:
 
 
 class _Look:
-    """Sums over windows: by bins, then rows at the best ends."""
+    """Search for the best window by cumulative sums: first by bins, then by rows at both ends."""
 
     def __init__(
         self,
@@ -195,10 +195,10 @@ class _Look:
             for length in lengths[(lengths * per >= SHORTEST) & (lengths < many)]:
                 begin = np.arange(0, many - length + 1, max(1, int(length) // 8)) * per + first
                 found.append(np.column_stack([begin, begin + length * per]))
-            # To the end of the block, and to the end of all: a step.
+            # Windows to the end of the block or of all rows are steps.
             begin = np.arange(first, last - SHORTEST + 1, per)
             found += [np.column_stack([begin, np.full(len(begin), end)]) for end in (last, len(self._rows))]
-        # One number for each pair is put in order far sooner than the pairs.
+        # Encoding each pair as one number makes sorting fast.
         per_row = len(self._rows) + 1
         starts, ends = np.divmod(np.unique(np.vstack(found) @ np.array([per_row, 1])), per_row)
         return np.column_stack([starts, ends])[ends - starts < len(self._rows)]
@@ -211,7 +211,7 @@ class _Look:
         return np.asarray(own)
 
     def best(self) -> _Window | None:
-        """Return the best window, ends refined."""
+        """Return the best window with refined ends."""
         if not len(self._windows):
             return None
         along = self._total[self._windows[:, 1]] - self._total[self._windows[:, 0]]
@@ -224,7 +224,7 @@ class _Look:
             first = min(first, high - SHORTEST)
             last = first + SHORTEST + int(self._worth_between(first, slice(first + SHORTEST, high + 1)).argmax())
             if sought == (low, high, last):
-                break  # its beginning is the best one for this end
+                break  # its beginning is already optimal for this end
             first = low + int(self._worth_between(last, slice(low, last - SHORTEST + 1)).argmax())
             sought = low, high, last
         return _Window(first, last, float(self._worth_between(first, slice(last, last + 1))[0]))
@@ -254,7 +254,7 @@ class _Look:
         ends = float(0.5 * (self._at[last - 1] + self._at[last])) if last < len(self._at) else np.inf
         for finer in FINER:
             moves = np.arange(-4.0, 5.0) * finer
-            # Edges between rows must leave the rows that a stretch has at the least.
+            # The edges must enclose at least the shortest stretch.
             begins, _ = self._best_edges(np.minimum(begins + moves, ends - SHORTEST), np.full(len(moves), ends))
             _, ends = self._best_edges(np.full(len(moves), begins), np.maximum(ends + moves, begins + SHORTEST))
         return begins, ends
@@ -265,7 +265,7 @@ class _Look:
         column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))[:, 0]
         axes = self._axes.columns
         beside = column - axes @ (axes.T @ column)
-        # Of what it explains its prior leaves a little; then all of it is as if it had been fitted with the rest [Woodbury].
+        # The prior leaves part of the explained residual; the result equals a joint fit [Woodbury].
         information = max(float(column @ beside), 0.0) + 1.0 / self._size**2
         self._rest = self._rest - beside * (float(column @ self._rest) / information)
         axis = beside / np.sqrt(information)
@@ -278,7 +278,8 @@ class _Look:
         return begins, ends
 
     def _best_edges(self, begins: Floats, ends: Floats) -> tuple[float, float]:
-        # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once, where it is not zero.
+        # Stretches differ only about the moving edge, so their common part is whitened and multiplied once, within its
+        # support.
         rings, reach = self._left.coloured.order, self._clock.reach
         moving = begins if begins[0] < begins[-1] else ends
         here = self._within_times(begins[0] - reach, ends[-1] + reach)
@@ -310,7 +311,7 @@ class _Look:
 
 
 class _Growing:
-    """Columns, shape (n, k), growing without copies."""
+    """Columns, shape (n, k), with room to append without copies."""
 
     def __init__(self, columns: Floats) -> None:
         self.columns, self._room = columns, columns
@@ -326,13 +327,13 @@ class _Growing:
 
 
 INDEPENDENT = 4.0
-"""Windows that are about the same: only every so many-th counts as another try."""
+"""Number of similar windows that count as one trial."""
 
 FINER = (0.25, 0.25, 0.06, 0.06, 0.015)
-"""Steps in which either edge is moved to where it is best, in rows: an edge of a hundred times the noise shows to a hundredth of one."""
+"""Successive steps of edge refinement, in rows: an edge of a hundred times the noise is determined to a hundredth of a row."""
 
 ALIKE = 1e-12
-"""Relative difference that is none."""
+"""Negligible relative difference."""
 
 
 def _squares(rows: Floats) -> Floats:
@@ -346,11 +347,11 @@ def _cumulative(rows: Floats) -> Floats:
 
 
 def _squares_of_edges(noise: Coloured, longest: int) -> Floats:
-    """Return two edges' squares after whitening, by stretch length 0 to `longest`."""
+    """Return the squares of both whitened edges, for stretch lengths 0 to `longest`."""
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
     inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2 - taps.sum() ** 2)])
-    reach = min(len(taps), longest)  # longer ones have all of it
+    reach = min(len(taps), longest)  # constant for longer stretches
     near = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(reach + 1)]
     behind = np.pad(near, (0, longest - reach), mode="edge")
     return np.asarray(inside + behind, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Sums over pieces of a variable, which make curves cheap and exact within a piece; what curves explain."""
+"""Sums over bins of a variable, from which curves' explained squares are computed quickly."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Sums over one variable for d directions.
+    """Sums over one variable's bins for d directions.
 
     Gains are in prior standard deviations of an amplitude over noise.
 
     Attributes:
-        at: piece means, shape (b,) or (b, c).
-        place: piece numbers from zero, shape (b,).
-        rest: gain times residual, shape (b, d).
-        gains: gain times gain, shape (b, d, d).
-        base: gain times base directions, shape (b, d, k).
+        at: mean values of bins, shape (b,) or (b, c).
+        place: numbers of bins from zero, shape (b,).
+        rest: sums of gain times residual, shape (b, d).
+        gains: sums of gain times gain, shape (b, d, d).
+        base: sums of gain times base directions, shape (b, d, k).
     """
 
     at: Floats
@@ -41,7 +41,7 @@ class Sums:
     base: Floats
 
     def explained(self, curves: Floats) -> Floats:
-        """Return squares explained by curves beside the base, shape (m,), from (b, m, p)."""
+        """Return squares explained by curves, shape (b, m, p), given the base, shape (m,)."""
         pieces, many, count = curves.shape
         flat = curves.reshape(pieces, many * count).T
         rest = (flat @ self.rest).reshape(many, count, -1)
@@ -56,7 +56,7 @@ class Sums:
         return self.explained(np.stack(curves, axis=1)) if curves else np.zeros(0)
 
     def of_waves(self, length: int, first: int, last: int) -> Floats:
-        """Return squares explained by waves of `first` to `last` - 1 periods in `length` pieces, by Fourier transform."""
+        """Return squares explained by waves of `first` to `last` - 1 periods in `length` bins, by Fourier transform."""
         pieces, directions, width = self.base.shape
 
         def transformed(values: Floats, step: int) -> NDArray[np.complex128]:
@@ -72,12 +72,12 @@ class Sums:
         return solved(sides(transformed(self.rest, 1)), of_base, squares(self.gains.sum(axis=0), twice))
 
     def best(self, forms: Sequence[Form], most: int) -> list[tuple[float, Form]]:
-        """Return the local maxima of a list with what they explain, best first."""
+        """Return the local maxima of a list with explained squares, best first."""
         explained = self.of_forms(forms)
         return [(float(explained[k]), forms[k]) for k in peaks(explained, most)]
 
     def finer(self, frequencies: Iterable[float], extent: float) -> list[tuple[float, Wave]]:
-        """Return waves at their best frequencies near given ones with what they explain, best first.
+        """Optimise waves' frequencies near given ones; return them with explained squares, best first.
 
         Args:
             extent: of the variable.
@@ -95,8 +95,8 @@ class Sums:
 
 
 FINER = (1.0 / 30.0, 1.0 / 450.0)
-"""Steps of frequency about the best one, as shares of one over the extent: the last keeps a wave's phase to a degree from one end to the
-other."""
+"""Successive frequency steps, in units of one over the extent; the last gives the phase within a degree over the
+extent."""
 
 
 def peaks(explained: Floats, most: int) -> Integers:
@@ -107,12 +107,12 @@ def peaks(explained: Floats, most: int) -> Integers:
 
 
 def bumps(low: float, high: float, widths: Iterable[float]) -> list[Form]:
-    """Return bumps of some widths away from the ends."""
+    """Return bumps of given widths, not at the ends."""
     return [Bump(float(at), width) for width in widths for at in np.arange(low + width, high - width, width / 2.0)]
 
 
 def steps(low: float, high: float, count: int) -> list[Form]:
-    """Return sharp steps away from the ends."""
+    """Return sharp steps, not at the ends."""
     wide = (high - low) / count
     return [StepForm(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
 
@@ -120,8 +120,8 @@ def steps(low: float, high: float, count: int) -> list[Form]:
 class NearbyWaves:
     """Squares explained by waves near a frequency, from polynomial sums.
 
-    For place x in -1..1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x) [Jacobi and Anger; Abramowitz and Stegun, eqs
-    9.1.44 and 9.1.45]; `TERMS` suffice within `REACH` waves.
+    For x in -1..1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x) [Jacobi and Anger; Abramowitz and Stegun, eqs 9.1.44
+    and 9.1.45]; `TERMS` terms suffice within `REACH` waves.
     """
 
     def __init__(self, sums: Sums, frequency: float) -> None:
@@ -138,7 +138,7 @@ class NearbyWaves:
         self._twice = _moments(wave**2, x, sums.gains.reshape(pieces, -1), TERMS_OF_SQUARES)
 
     def explained(self, frequencies: Floats) -> Floats:
-        """Return squares explained by waves, shape (m,), from (m,)."""
+        """Return squares explained by waves of given frequencies, shape (m,)."""
         many, d = len(frequencies), self._directions
         turned = 2.0 * np.pi * (frequencies - self._frequency) * self._half
         once, twice = _weights(turned, TERMS), _weights(2.0 * turned, TERMS_OF_SQUARES)
@@ -148,16 +148,16 @@ class NearbyWaves:
 
 
 REACH = 0.55
-"""Waves over the extent of the variable by which frequencies are off the one that sums are made near."""
+"""Largest distance from the central frequency, in waves over the extent."""
 
 TERMS, TERMS_OF_SQUARES = 18, 24
-"""Polynomials: J_n(pi REACH) and J_n(2 pi REACH) are below 2e-17 from there on."""
+"""Numbers of polynomials: higher J_n(pi REACH) and J_n(2 pi REACH) are below 2e-17."""
 
 
 def _moments(wave: NDArray[np.complex128], x: Floats, values: Floats, terms: int) -> NDArray[np.complex128]:
     """Return sums of wave times polynomials times values, shape (terms, q), from (b,), (b,) and (b, q)."""
     curves = np.empty((terms, 2, len(x)))
-    before, now = x, np.ones(len(x))  # T_1, which is also T_-1, and T_0
+    before, now = x, np.ones(len(x))  # T_1 = T_-1, and T_0
     for curve in curves:
         np.multiply(wave.real, now, out=curve[0])
         np.multiply(wave.imag, now, out=curve[1])
@@ -175,12 +175,12 @@ def _weights(turned: Floats, terms: int) -> NDArray[np.complex128]:
 
 
 def sides(transform: NDArray[np.complex128]) -> Floats:
-    """Return cosine and sine sums, shape (m, 2, ...), from those with exp(-ix), shape (m, ...)."""
+    """Return cosine and sine sums, shape (m, 2, ...), from sums with exp(-ix), shape (m, ...)."""
     return np.stack([transform.real, -transform.imag], axis=1)
 
 
 def squares(mean: Floats, twice: NDArray[np.complex128]) -> Floats:
-    """Return cosine and sine products, shape (m, 2, 2, d, d), from those with one, (d, d), and exp(-2ix), (m, d, d)."""
+    """Return sums of cosine and sine products, shape (m, 2, 2, d, d), from sums with 1, (d, d), and exp(-2ix), (m, d, d)."""
     # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2
     found = np.empty((len(twice), 2, 2, *mean.shape))
     found[:, 0, 0], found[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
@@ -189,13 +189,13 @@ def squares(mean: Floats, twice: NDArray[np.complex128]) -> Floats:
 
 
 def taken(base: Floats) -> Floats:
-    """Return the base's part of curve products, (m, p d, p d), from (m, p, d, k)."""
+    """Return the base's part of curve products, (m, p d, p d), from sums of shape (m, p, d, k)."""
     side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
     return np.asarray(side @ side.transpose(0, 2, 1))
 
 
 def solved(rest: Floats, of_base: Floats, gains: Floats) -> Floats:
-    """Return squares that columns explain, from (m, p, d), `taken` and (m, p, p, d, d)."""
+    """Return squares explained by columns, from residual sums (m, p, d), `taken` and products (m, p, p, d, d)."""
     many, size = len(rest), rest.shape[1] * rest.shape[2]
     normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)
     right = rest.reshape(many, size, 1)

@@ -1,4 +1,4 @@
-"""Uneven noise: growing variance or long-tailed innovations."""
+"""Uneven noise: variance that grows with a variable, or long-tailed innovations."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-"""Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
+"""Tried ratios of average growing variance to constant variance."""
 
 TAILS = (2.5, 3.0, 4.0, 6.0, 10.0)
-"""Degrees of freedom of Student's t that are tried."""
+"""Tried degrees of freedom of Student's t."""
 
 
 def most_probable_variance(powers: Floats, even: Floats, grows: Floats, odds: float) -> tuple[float, Floats]:
-    """Return the cost and the most probable variance of each row [Schwarz 1978]."""
+    """Return the least cost and each row's most probable variance [Schwarz 1978]."""
     squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
     every = np.array(list(product(GROWN, repeat=squares.shape[1])))
     costs = []
@@ -35,7 +35,7 @@ def most_probable_variance(powers: Floats, even: Floats, grows: Floats, odds: fl
 
 
 def spread_by_kind(powers: Floats, kinds: Integers) -> Floats:
-    """Return rows' relative standard deviations by kind, shape (m,)."""
+    """Return relative standard deviations of rows, estimated by kind, shape (m,)."""
     count = np.maximum(np.bincount(kinds), 1)
     mean = np.bincount(kinds, powers) / count
     own = np.maximum(mean, QUIET**2 * float(mean.max(initial=0.0)))[kinds]
@@ -43,11 +43,11 @@ def spread_by_kind(powers: Floats, kinds: Integers) -> Floats:
 
 
 QUIET = 1e-4
-"""Least noise of a kind of rows, over the largest: what is quieter is a column of digits."""
+"""Least noise of a kind of rows, relative to the largest; less is rounding."""
 
 
 def most_probable_tails(new: Floats) -> tuple[Floats, float]:
-    """Return root weights, shape (m,), and best Student's t degrees of innovations."""
+    """Return root weights, shape (m,), and the best degrees of freedom of innovations."""
     squares = np.square(new)
     best, found = -np.inf, (np.ones(len(new)), np.inf)
     for tails in TAILS:
@@ -59,7 +59,7 @@ def most_probable_tails(new: Floats) -> tuple[Floats, float]:
 
 
 def student_likelihood(new: Floats, tails: float) -> float:
-    """Return Student's t log likelihood at best scale, over the normal density's height.
+    """Return the log likelihood of Student's t at its best scale, relative to the normal density's height.
 
     Args:
         tails: degrees of freedom.
@@ -72,7 +72,7 @@ def _likelihood(new: Floats, tails: float, scale: float) -> float:
 
 
 def _scale_of(squares: Floats, tails: float) -> float:
-    """Return the best squared scale by expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
+    """Return the best squared scale by expectation maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]."""
     scale = 1.0
     for _ in range(BOUNDS.tail_rounds):
         weight = (tails + 1.0) / (tails + squares / scale)
@@ -89,6 +89,6 @@ def has_long_tails(new: Floats) -> bool:
 
 
 def log_student(new: Floats, tails: float) -> Floats:
-    """Return Student's t log density over the normal density's height, shape (m,)."""
+    """Return the log density of Student's t, relative to the normal density's height, shape (m,)."""
     height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
     return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))

@@ -1,7 +1,7 @@
-"""Variables that an error may follow, with direction of motion.
+"""Variables that an error may follow, with directions of motion.
 
-A variable is a column in time order by blocks. Its kind decides which effects make sense: turns for angles, order for
-times.
+A variable is a column, in time order within blocks. Its kind decides which effects are tried, such as waves of a turn
+for angles.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Kind(StrEnum):
-    """What a variable is."""
+    """Kinds of variables."""
 
     TIME = "time"
     ANGLE = "angle"
@@ -31,27 +31,27 @@ class Kind(StrEnum):
 
 
 TRAVELS = frozenset({Kind.ANGLE, Kind.LENGTH, Kind.FORCE, Kind.ANY})
-"""Kinds of which the direction of travel may matter: play, friction and hysteresis follow them."""
+"""Kinds whose direction of travel may matter, for play, friction and hysteresis."""
 
 CONTINUOUS = 0.1
-"""Share of its range that a variable that is sampled along a path changes from one row to the next, at the most, half of the time;
-one that jumps from pose to pose has no speed."""
+"""Largest median change between rows, relative to the range, of a variable sampled along a path; between separate poses
+there is no speed."""
 
 MANY = 10
-"""Different values that suffice for every effect."""
+"""Number of different values that suffices for every effect."""
 
 STILL = 1e-9
-"""Share of its range by which a variable must change from one row to the next to have moved."""
+"""Least change between rows, relative to the range, that counts as motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Variable:
-    """What an error may follow.
+    """A variable that an error may follow.
 
     Attributes:
         period: one turn of an angle, in its unit; else None.
-        driven: results from the simulation, so may be caused by the difference.
-        range: of the rows that effects were fitted to, if these are others.
+        driven: True if it results from the simulation, so the difference may cause it.
+        range: of the rows to which effects were fitted, if different.
     """
 
     name: str
@@ -64,12 +64,12 @@ class Variable:
 
     @property
     def low(self) -> float:
-        """Return the least value that effects are fitted to."""
+        """Return the least fitted value."""
         return float(self.values.min()) if self.range is None else self.range[0]
 
     @property
     def high(self) -> float:
-        """Return the greatest value that effects are fitted to."""
+        """Return the greatest fitted value."""
         return float(self.values.max()) if self.range is None else self.range[1]
 
     @property
@@ -100,7 +100,7 @@ class Variable:
         return np.asarray(np.unwrap(own, period=self.period), dtype=np.float64)
 
     def is_path(self, blocks: Sequence[slice]) -> bool:
-        """Return whether the variable moves continuously, as along a path."""
+        """Return whether the variable changes continuously, as along a path."""
         steps = [np.abs(np.diff(self.travel(rows))) for rows in blocks]
         every = np.concatenate([np.zeros(0), *steps])
         return len(every) > 0 and float(np.median(every)) < CONTINUOUS * self.extent
@@ -108,17 +108,17 @@ class Variable:
     def directions(self, blocks: Sequence[slice]) -> Floats:
         """Return each row's direction: 1 up, -1 down, shape (n,).
 
-        Along a path by speed; between poses by arrival. Stationary rows keep the last direction; before a block's first
-        move, the next.
+        Speed gives the direction along a path, the previous pose gives it between poses. Stationary rows keep the last
+        direction, or have the next one before a block's first motion.
         """
         return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
 
     def arriving(self, blocks: Sequence[slice]) -> Floats:
-        """Return directions by the previous row alone, for ambiguous turns."""
+        """Return directions from the previous row alone, for ambiguous turning points."""
         return _signs(self, blocks, _arriving)
 
     def rates(self, time: Floats, blocks: Sequence[slice]) -> Floats:
-        """Return central differences per time within blocks, shape (n,); zero if time does not advance."""
+        """Return speeds by central differences within blocks, shape (n,); zero if time does not advance."""
         found = np.zeros(len(self.values))
         for rows in blocks:
             own, at = self.travel(rows), time[rows]

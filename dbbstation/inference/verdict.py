@@ -1,4 +1,4 @@
-"""Verdicts of causes, alike for tables, drives, circles and two sessions; docs/verdicts.md has the table of tests and words."""
+"""Verdicts on causes, equal for tables, drives, circles and two sessions; docs/verdicts.md lists tests and words."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from pydantic import computed_field
 from dbbstation.facts.serialise import Kept
 
 SURE = 0.95
-"""Probability from which on something is said to be there: one claim in twenty may be wrong if the model of noise and causes is right."""
+"""Probability above which a cause is reported as present: if the models of noise and causes are correct, one claim of twenty is wrong."""
 
 OUT = 5.0
-"""Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out: physics'
-usual limit of a discovery, since effects are picked from many."""
+"""Significance, in standard deviations of the norm, of a reported effect, and of an effect that can be ruled out: the
+usual limit of discoveries in physics, because effects are picked from many."""
 
 ABSENT = 1.0 - SURE
-"""Probability up to which something that would have been seen is ruled out: as sure as what is there. It is the prior probability of a
-named cause, so what the recording makes more probable than it was is never ruled out."""
+"""Probability below which a detectable cause is ruled out, as sure as a reported presence. It equals the prior
+probability of a named cause, so a cause that the recording supports is never ruled out."""
 
 PARTS_WITH_GAIN = 0.7
-"""Share of the held-out parts, by rows, in which an effect must bring something. An effect that brings nothing gains by chance in half of them:
-in seven of ten or more once in six times, and then still has to gain in sum without its best part."""
+"""Share of held-out rows in parts with a gain that an effect needs. A useless effect gains by chance in half of the
+parts, in seven of ten or more once in six times; then it also needs a total gain without its best part."""
 
 SEEN_WORSE = 1e-3
-"""Share by which one error must exceed another to be worse: what three printed figures hardly show."""
+"""Relative excess of a worse error: about the last of three printed figures."""
 
 
 class Verdict(StrEnum):
-    """What can be said of a cause, in the order of listings; the values are the tokens of `--json`."""
+    """Verdicts on a cause, in the order of lists; the values are the tokens of `--json`."""
 
     IDENTIFIED = "identified"
     HAPPENED = "happened"
@@ -42,7 +42,7 @@ class Verdict(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Return the place in listings."""
+        """Return its place in lists."""
         return tuple(Verdict).index(self)
 
 
@@ -55,10 +55,10 @@ class Acts(StrEnum):
 
 @dataclass(frozen=True)
 class Gains:
-    """An effect's gain in each held-out part, chosen anew.
+    """An effect's gain in each held-out part, with selection repeated.
 
     Attributes:
-        parts: squared errors without less with it, others refitted, in squared units; zero if not chosen.
+        parts: squared errors without the effect, others refitted, less squared errors with it; zero if not selected.
     """
 
     parts: tuple[float, ...]
@@ -67,7 +67,7 @@ class Gains:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def with_gain(self) -> int:
-        """Return the number of parts with gain."""
+        """Return the number of parts with a gain."""
         return sum(part > 0.0 for part in self.parts)
 
     @computed_field  # type: ignore[prop-decorator]
@@ -78,7 +78,7 @@ class Gains:
 
     @property
     def counted(self) -> str:
-        """Return the count of gains, as printed."""
+        """Return the numbers of gaining and all parts, as printed."""
         return f"{self.with_gain} of {len(self.parts)}"
 
     @property
@@ -89,30 +89,30 @@ class Gains:
 
     @property
     def without_best(self) -> float:
-        """Return the sum without the best part."""
+        """Return the total gain without the best part."""
         return self.total - max(self.parts, default=0.0)
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def predicts(self) -> bool:
-        """Return whether enough parts gain, and the sum without the best."""
+        """Return whether enough parts gain, and the total without the best part is positive."""
         return self.share_with_gain >= PARTS_WITH_GAIN and self.without_best > 0.0
 
 
 @dataclass(frozen=True)
 class DensityGains(Gains):
-    """An effect's gain in predictive density.
+    """An effect's gain in log predictive density.
 
     Parts that hardly show the effect contribute little, and the sum is evidence [Good, J. R. Stat. Soc. B 14 (1952)
-    107], so parts need not be counted.
+    107], so gaining parts are not counted.
     """
 
     @property
     def predicts(self) -> bool:
-        """Return whether held-out parts without the best one surely favour the effect."""
+        """Return whether the held-out parts without the best surely favour the effect."""
         return self.without_best >= math.log(SURE / ABSENT)
 
 
 def is_worse(corrected: float, reference: float) -> bool:
-    """Return whether a correction predicts worse than the reference, by rms on held-out rows."""
+    """Return whether a correction has a larger rms error on held-out rows than the reference."""
     return corrected > (1.0 + SEEN_WORSE) * reference

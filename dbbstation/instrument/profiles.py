@@ -3,72 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from dbbstation.files.yaml.schema import Schema, validate
-from dbbstation.instrument.fields import Bytes  # noqa: TC001 (pydantic needs it at run time)
+from dbbstation.files.yaml.schema import Partly, Schema, validate
 from dbbstation.instrument.frame import Frame  # noqa: TC001 (pydantic needs it at run time)
-from dbbstation.instrument.protocol import FollowUp, LineCommand, Name, Protocol, Reference
+from dbbstation.instrument.protocol import Ask, Length, LineSettings, Name, Protocol, Reference, Reply, Timing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dbbstation.errors import Problem
     from dbbstation.files.yaml.text import Location, YamlDocument
-
-
-class LineInstead(Schema):
-    """Keys of `line` that a profile replaces."""
-
-    baud: int | None = None
-    baud_choices: tuple[int, ...] | None = None
-    data_bits: int | None = None
-    parity: str | None = None
-    stop_bits: int | None = None
-    flow: str | None = None
-
-
-class AskInstead(Schema):
-    """Keys of `ask` that a profile replaces."""
-
-    mode: str | None = None
-    request: Bytes | None = None
-    request_end: Bytes | None = None
-    start: tuple[LineCommand, ...] | None = None
-    stop: tuple[LineCommand, ...] | None = None
-    follow_up: FollowUp | None = None
-
-
-class ReplyInstead(Schema):
-    """Keys of `reply` that a profile replaces."""
-
-    prefix: Bytes | None = None
-    end: Bytes | None = None
-
-
-class LengthInstead(Schema):
-    """Keys of `length` that a profile replaces."""
-
-    unit: str | None = None
-    mm_per_count: float | None = None
-    sense: int | None = None
-    range_mm: tuple[float, float] | None = None
-    stroke_mm: float | None = None
-    relative: bool | None = None
-    zero_mm: float | None = None
-
-
-class TimingInstead(Schema):
-    """Keys of `timing` that a profile replaces."""
-
-    latch_delay_s: float | None = None
-    latch_bounds_s: tuple[float, float] | None = None
-    reply_latency_s: float | None = None
-    rate_hz: float | None = None
-    timeout_s: float | None = None
-    retries: int | None = None
 
 
 class Profile(Schema):
@@ -82,12 +29,12 @@ class Profile(Schema):
     setup: tuple[str, ...] | None = None
     references: tuple[Reference, ...] = ()
     features: tuple[str, ...] | None = None
-    line: LineInstead | None = None
-    ask: AskInstead | None = None
-    reply: ReplyInstead | None = None
-    length: LengthInstead | None = None
+    line: Annotated[Any, Partly(LineSettings)] = None
+    ask: Annotated[Any, Partly(Ask)] = None
+    reply: Annotated[Any, Partly(Reply)] = None
+    length: Annotated[Any, Partly(Length)] = None
     frames: tuple[Frame, ...] | None = None
-    timing: TimingInstead | None = None
+    timing: Annotated[Any, Partly(Timing)] = None
 
 
 class ProtocolFile(Protocol):

@@ -22,7 +22,7 @@ from dbbstation.files.formats.jig import (
 )
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
+from dbbstation.files.yaml.schema import Partly, Schema, dotted, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, Plate
@@ -68,23 +68,6 @@ class PathSchema(Schema):
     """Senses of travel in the order they are run."""
 
 
-class PathOverride(Schema):
-    """Parts of the path that differ in one test."""
-
-    radius_mm: _Radius | None = None
-    """Length of the bar R [mm]."""
-    feed_mm_min: _Feed | None = None
-    """Speed of the tool tip along its path [mm/min]."""
-    start_deg: _Start | None = None
-    """Angle where the full turn starts, from +X towards +Y positive [deg]."""
-    overshoot_deg: _Overshoot | None = None
-    """Arc travelled before and after the full turn [deg]."""
-    feed_in_mm: _FeedIn | None = None
-    """Distance of the feed-in's start outside the circle [mm]."""
-    directions: _Directions | None = None
-    """Senses of travel in the order they are run."""
-
-
 class TestSchema(Schema):
     """One test: a circle about a ball."""
 
@@ -103,7 +86,7 @@ class TestSchema(Schema):
     elevation_deg: Annotated[float, Quantity("deg", 0.6, 80, or_zero=True, signed=True)] = 0.0
     """Angle of the bar above the horizontal, moving ball higher positive [deg]: the tool tip's circle then has the
     radius R cos e and lies R sin e above the ball."""
-    path: PathOverride | None = None
+    path: Annotated[Any, Partly(PathSchema)] = None
     """Parts of the path in which this test differs from the plan."""
 
 

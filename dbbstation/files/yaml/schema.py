@@ -2,11 +2,12 @@
 
 import difflib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import BaseModel, Field, GetCoreSchemaHandler, ValidationError, create_model
+from pydantic_core import CoreSchema, ErrorDetails
 
 from dbbstation.errors import MOST_FAULTS, Problem, few
 from dbbstation.facts.record import STRICT, Record
@@ -37,6 +38,20 @@ class Schema(BaseModel):
     """Base of every part of a file format; the docstring under each field states its unit and sign."""
 
     model_config = STRICT
+
+
+@dataclass(frozen=True)
+class Partly:
+    """Marks keys of another part of a format, all of which may be absent; what goes together is checked elsewhere."""
+
+    part: type[Schema]
+
+    def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
+        kinds, fields = get_type_hints(self.part, include_extras=True), self.part.model_fields
+        keys: Any = {key: (kinds[key] | None, Field(None, description=one.description)) for key, one in fields.items()}
+        said = f"Keys that replace those of: {self.part.__doc__}"
+        made: Any = create_model(f"{self.part.__name__}Instead", __base__=Schema, __doc__=said, **keys)
+        return handler.generate_schema(made | None)
 
 
 S = TypeVar("S", bound=Schema | Record)

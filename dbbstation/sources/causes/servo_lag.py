@@ -156,20 +156,17 @@ def _follow(
     e = -tau dx/dt + tau² d²x/dt² is a solution; the difference decays as exp(-t / tau).
     """
     rows, columns = speed.shape
-    for i in range(columns):
-        tau = constant[i]
-        gain = (speed[1, i] - speed[0, i]) / step[0] if rows > 1 else 0.0
-        # The steady solution.
-        lag[0, i] = -tau * speed[0, i] + tau * tau * gain
-        by_constant[0, i] = -speed[0, i] + 2.0 * tau * gain
-        for k in range(1, rows):
-            h = step[k - 1]
-            gain = (speed[k, i] - speed[k - 1, i]) / h
+    for k in range(rows if rows > 1 else 0):
+        last = max(k, 1) - 1
+        h = step[last]
+        for i in range(columns):
+            tau, gain = constant[i], (speed[last + 1, i] - speed[last, i]) / h
+            # At first the solution that has forgotten how it began.
             lag[k, i] = -tau * speed[k, i] + tau * tau * gain
             by_constant[k, i] = -speed[k, i] + 2.0 * tau * gain
-            if h < FORGOTTEN * tau:
+            if k > 0 and h < FORGOTTEN * tau:
                 kept = np.exp(-h / tau)
-                beside = lag[k - 1, i] + tau * speed[k - 1, i] - tau * tau * gain
-                by_beside = by_constant[k - 1, i] + speed[k - 1, i] - 2.0 * tau * gain
+                beside = lag[last, i] + tau * speed[last, i] - tau * tau * gain
+                by_beside = by_constant[last, i] + speed[last, i] - 2.0 * tau * gain
                 lag[k, i] += kept * beside
                 by_constant[k, i] += kept * (by_beside + beside * h / (tau * tau))

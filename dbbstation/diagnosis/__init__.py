@@ -1,1 +1,1 @@
-"""What recordings show that a model lacks: detect, locate, name, ask."""
+"""Find what a model lacks: detect, locate, name, propose tests."""

@@ -1,4 +1,4 @@
-"""Whether the residual grows after one strut's reversals: a ringing strut."""
+"""Detect a ringing strut: the residual grows after its reversals."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.shapes import Samples
 
 WITHIN_S = (0.5, 1.0, 2.0, 4.0)
-"""Times after a reversal that are looked at [s]: what a drive's control or its mounting oscillates for."""
+"""Tested times after a reversal [s]: usual durations of oscillations of a drive's control or mounting."""
 
 FEWEST_ROWS = 4
-"""Samples of such a stretch, at the least: an oscillation of two samples is no more than noise."""
+"""Fewest samples of such a stretch: two samples cannot distinguish an oscillation from noise."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class AfterReversals:
 
     Attributes:
         strut: 1 to 6.
-        probability: by even noise, over all struts and times.
+        probability: under uniform noise, over all struts and times.
     """
 
     strut: int
@@ -41,7 +41,7 @@ class AfterReversals:
 
     @property
     def text(self) -> str:
-        """Two sentences for people."""
+        """Return the finding in two sentences."""
         return (
             f"The residual is larger just after strut {self.strut} turns round: {self.rms_um:.2g} µm rms within {self.within_s:g} s, "
             f"{self.elsewhere_um:.2g} µm elsewhere. A strut that rings does that; noise that is the same everywhere does not."
@@ -49,7 +49,7 @@ class AfterReversals:
 
 
 def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[Floats]) -> AfterReversals | None:
-    """Return the strut whose reversals the residual follows most, or None for too few."""
+    """Return the strut with the largest residual after reversals; None for too few samples."""
     if not all({"time", "strut-speed-sign"} <= run.values.keys() for run in runs):
         return None
     apart_s = float(np.median(np.concatenate([np.diff(run.values["time"]) for run in runs])))

@@ -1,4 +1,4 @@
-"""Bar readings as a channel: base columns, causes' columns, target."""
+"""Bar readings as a channel, with columns of base and causes."""
 
 from __future__ import annotations
 
@@ -37,24 +37,24 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource, Parameter
 
 SETUP_ODDS = float(np.log(0.01 / 0.99))
-"""Log prior odds that a ball, a row of the CMM sheet or a bar is far off: one session in a hundred, each."""
+"""Log prior odds of a displaced ball, wrong CMM row or wrong bar, each in one session of a hundred."""
 
 SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 """Random effects of the base that may be far larger than stated."""
 
 SEEN = 1e-5
-"""Relative singular value of machine parameters below which a direction is not identifiable and takes up nothing."""
+"""Least relative singular value of identifiable directions of machine parameters; only these absorb effects."""
 
 OUTSIZE = 20.0
-"""Size of such an effect in units of the stated one, one standard deviation."""
+"""Prior standard deviation of such an effect, in stated standard deviations."""
 
 
 class CircleChannel:
-    """All that a diagnosis compares.
+    """Runs, base and causes of a diagnosis.
 
     Attributes:
-        set_up: balls and bars far off, a variant each.
-        sources: candidates, laws of one cause under one name; runs must give their needs.
+        set_up: causes for displaced balls and wrong bars, one variant each.
+        sources: candidates; laws of one cause share a name. Runs must provide their inputs.
     """
 
     def __init__(self, calibration: Calibration, sources: Sequence[ErrorSource]) -> None:
@@ -91,7 +91,7 @@ class CircleChannel:
 
     @property
     def named(self) -> tuple[Cause, ...]:
-        """Return named causes; all laws and forms of one cause are equally likely."""
+        """Return the named causes; all laws and forms of a cause have equal prior probability."""
         found = []
         for name in dict.fromkeys(name for name, _ in self.sources):
             laws = [key for key in self.sources if key[0] == name]
@@ -104,15 +104,15 @@ class CircleChannel:
         return tuple(found)
 
     def columns_of(self, variants: Sequence[Variant]) -> Integers:
-        """Return the amplitudes' columns of several forms."""
+        """Return the columns of several forms' amplitudes."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(variant.columns for variant in variants)])
 
     def known_with(self, variants: Sequence[Variant]) -> Columns:
-        """Return priors and scales of base, then of forms' amplitudes."""
+        """Return priors and scales of the base, then of amplitudes of forms."""
         return with_random(self.base, np.concatenate([np.zeros(0), *(variant.plausible for variant in variants)]))
 
     def whole(self, name: str, variant: Variant) -> Variant:
-        """Return a cause's form with all amplitudes at its point, without slack."""
+        """Return a cause's form with all amplitudes at the same nonlinear parameters, without slack."""
         if not len(variant.whole):
             return replace(variant, slack=variant.slack[:0], slack_sd=variant.slack_sd[:0])
         sizes = [p.plausible for p in self.source_of(name, variant).parameters(self.machine) if not p.grid]
@@ -129,11 +129,11 @@ class CircleChannel:
             yield from ((variant, self.sources[name, law].form_uncertainty) for variant in variants)
 
     def happens_once(self, name: str) -> bool:
-        """Return whether a cause acts once in a session."""
+        """Return whether a cause is a single event in a session."""
         return any(source.happens_once for own, source in self.sources.items() if own[0] == name)
 
     def to_whole(self, variant: Variant) -> Floats:
-        """Return the matrix from a form's amplitudes to the cause's, shape (p, q)."""
+        """Return the matrix from a form's to the cause's amplitudes, shape (p, q)."""
         if not len(variant.whole):
             return np.eye(len(variant.columns))
         same = (variant.whole[:, None] == variant.columns).astype(np.float64)
@@ -146,18 +146,18 @@ class CircleChannel:
         but_for: Flags | None = None,
         only: Integers | None = None,
     ) -> BesideBase:
-        """Return causes beside the base; ball scatter is `scatter` times as stated.
+        """Return causes with the base projected out; balls scatter `scatter` times as much as stated.
 
-        Held-back rows, shape (n,), need zero targets; `only` are the needed columns, None: all.
+        Held-out rows, shape (n,), need zero targets. `only` are the needed columns, None for all.
         """
         columns = self.columns if but_for is None else self.columns.but_for(but_for, only)
         return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> Floats:
-        """Return the target of base and causes about a fit, (n,)."""
+        """Return the target for base and causes, linearised about a fit, (n,)."""
         base = len(self.base.prior)
         known = fit.x[:base] - fit.layout.nominal[:base]
-        # What the fitted columns make of the target is projected out; leaving it out keeps digits.
+        # The part explained by fitted columns is projected out anyway; omitting it reduces rounding.
         known = np.where(self.base.random, known, 0.0)
         target = np.concatenate(fit.residual_mm) + self.columns.base @ known
         for key, variants in self._refined.items():
@@ -167,7 +167,7 @@ class CircleChannel:
         return np.asarray(target, dtype=np.float64)
 
     def noise(self, target: Floats, others: Sequence[Cause], noise_mm: float) -> Spectrum:
-        """Return noise from the residual of base and all causes."""
+        """Estimate noise from the residual of base and all causes."""
         sd = np.zeros(self.columns.count)
         for cause in (*self.named, *self.set_up, *others):
             for variant in cause.variants:
@@ -180,18 +180,18 @@ class CircleChannel:
         return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])
 
     def blocks(self, columns: Integers, target: Floats) -> list[Block]:
-        """Return compressed runs of base, then causes' columns, a block each."""
+        """Return one information block per run, over base columns, then causes' columns."""
         every = np.arange(self.columns.base.shape[1] + len(columns))
         found = []
         for rows in self.runs:
-            # One run at a time: many columns of all of them would take as much memory again.
+            # Runs are processed one by one to save memory.
             samples = np.hstack([self.columns.base[rows], self.columns.samples[rows, columns]])
             touched = np.flatnonzero(samples.any(axis=0))
             found.append(compress(every[touched], samples[:, touched], target[rows]))
         return found
 
     def unconcealed(self, effect: Floats) -> Floats:
-        """Return what identifiable machine parameters leave of an effect, unweighted, shape (n,)."""
+        """Return the part of an effect that identifiable machine parameters do not absorb, unweighted, shape (n,)."""
         return np.asarray(effect - self._of_parameters @ (self._of_parameters.T @ effect))
 
     @cached_property
@@ -200,7 +200,7 @@ class CircleChannel:
         return axes_of(self.columns.base[:, machine] @ free_directions(self.base, machine, self.held), SEEN)
 
     def refine(self, name: str, law: str, values: Mapping[str, Floats], fit: Calibration) -> None:
-        """Lay out a cause at parameter values, with tangents and slack."""
+        """Add columns of a cause at parameter values, with tangents and slack."""
         source = self.sources[name, law]
         readings = self._readings_about(fit)
         parameters = source.parameters(self.machine)
@@ -227,7 +227,7 @@ class CircleChannel:
         sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1], source.form_uncertainty)])
         size = [values[own][amplitudes] / np.array([parameters[k].plausible for k in amplitudes]) for own in values]
         at = max(float(np.sqrt(np.mean(np.square(size)))), 1e-12)
-        # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
+        # A tangent covers about 2.5 grid points of a nonlinear parameter.
         covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
         self._former += self._refined.get((name, law), ())
@@ -247,7 +247,7 @@ class CircleChannel:
         return [variables(motion, self.machine) for motion in self.motions]
 
     def give_back(self) -> None:
-        """Free columns of replaced forms, unused from now on."""
+        """Free the columns of replaced forms."""
         former, self._former = self._former, []
         if former:
             columns = [part for one in former for part in (one.columns, one.slack, one.whole)]
@@ -289,9 +289,9 @@ class CircleChannel:
         return replace(self.base, prior=prior)
 
     def _outsize(self) -> tuple[Cause, ...]:
-        """Return random effects that may exceed their stated size, with visible parameters.
+        """Return the random effects that may exceed their stated size, with the parameters that circles show.
 
-        Level bars cannot measure ball heights. A ball mounted once equals its mounting; a freed ball is already free.
+        Level bars do not measure ball heights. For a ball mounted once, ball and mounting are one effect. Freed balls are omitted.
         """
         setups = [observation.setup for observation in self.observations]
         put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}

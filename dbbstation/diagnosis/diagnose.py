@@ -1,4 +1,4 @@
-"""The diagnosis: which physics is missing, and its consequences."""
+"""Find missing physics and its consequences."""
 
 from __future__ import annotations
 
@@ -53,16 +53,16 @@ def diagnose(
     hold_out: bool = True,
     until_interrupted: bool = False,
 ) -> Diagnosis:
-    """Find what a kinematic calibration leaves out; see docs/decisions.md, 19.
+    """Find the physics that a kinematic calibration lacks; see docs/decisions.md, 19.
 
     Args:
-        sources: candidates with their needs, forms of one cause under one name.
-        hold_out: choose anew without each group of tests.
-        until_interrupted: an interruption ends the work; findings so far are returned.
+        sources: candidates whose inputs are provided; forms of one cause share a name.
+        hold_out: whether to repeat the selection without each group of tests.
+        until_interrupted: whether an interruption ends the work and returns findings so far.
 
     Raises:
         CalibrationError: the base model cannot be fitted.
-        ModelError: a source needs data that runs or machine file lack.
+        ModelError: runs or machine file lack an input.
     """
     most = sectors_for(len(observations))
     runs = [thinned(observation, most) for observation in observations]
@@ -72,7 +72,7 @@ def diagnose(
     except KeyboardInterrupt:
         if not until_interrupted:
             raise
-    # What was found is judged without the tests of it that take time.
+    # After an interruption, findings are judged without the long tests.
     return _answered(replace(explained, settled=replace(explained.settled, stopped=True)), progress, hold_out=False)
 
 
@@ -126,7 +126,7 @@ def _widened(explained: Explained) -> Explained:
 
 
 def without_doubtful(explained: Explained) -> Explained:
-    """Remove improbable named causes from the joint model until stable."""
+    """Remove improbable named causes from the joint model until none remains."""
     given_up: set[str] = set()
     while rather_not := doubtful(explained):
         given_up |= rather_not
@@ -185,7 +185,7 @@ def _quick(settled: SettledCircles) -> Unexplained:
 
 
 def rough_formulas(settled: SettledCircles) -> list[str]:
-    """Return named causes whose slack is needed, but absent from the joint fit."""
+    """Return the named causes that need slack, which the joint fit lacks."""
     evidence = settled.comparison.log_evidence(settled.best.members)
     found = []
     for member in settled.members:
@@ -198,7 +198,7 @@ def rough_formulas(settled: SettledCircles) -> list[str]:
 def usable_sources(
     machine: Machine, observations: Sequence[Observation], sources: Sequence[ErrorSource]
 ) -> tuple[list[ErrorSource], dict[str, str]]:
-    """Return usable forms of sources, and reasons against others, by name."""
+    """Return the usable forms of sources, and the reasons against others, by name."""
     usable: list[ErrorSource] = []
     lacking = {}
     motions = [observation.motion() for observation in observations]

@@ -1,7 +1,7 @@
-"""Formula slack of causes: the effect modulated along its variable.
+"""Inaccuracy of causes' formulas, as effects modulated along a variable.
 
-Effects may vary with strut length or direction, and growth may follow another law. Smooth modulations represent this
-[Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+Effects may vary with strut length or direction, and growth may follow another law. Smooth modulations represent these
+departures [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource, Motion
 
 BY_DIRECTION = ("strut-speed-sign", "joint-angle-speed-sign")
-"""Variables that are a direction."""
+"""Variables that are directions."""
 
 STAGES_APART = 2
-"""Points of the grid of time constants from one further stage of a warm-up to the next: a factor of two."""
+"""Grid points between the time constants of further warm-up stages: a factor of two."""
 
 
 @dataclass(frozen=True, eq=False)
 class Effects:
-    """What a source does to one run.
+    """Effects of a source on one run.
 
     Attributes:
         derivative: of the reading, shape (n, p).
@@ -58,7 +58,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     signs: list[Floats] = []
     for run in runs:
         motion = run.motion
-        # What an instrument does wrong it does to the whole reading, though a model may write it as errors of struts.
+        # An instrument's error concerns the whole reading, even if the model expresses it by strut errors.
         of_struts = source.belongs_to is not Owner.INSTRUMENT
         by_strut = _strut_contributions(source, motion, machine, run.values, run.reading) if of_struts else None
         known = run.known
@@ -73,19 +73,19 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
         if source.varies_with in BY_DIRECTION:
             signs.append(known["strut-speed-sign"][motion.kept])
     by_variable = [modulated(effects, one, signs or None) for one in zip(*along, strict=True)]
-    # Each variable takes its part of what a formula may be off by.
+    # The variables share the formula's inaccuracy.
     columns = np.hstack(by_variable) / np.sqrt(len(by_variable))
     return np.hstack([columns, _other_stages(source, machine, runs), _left_open(source, machine, runs)])
 
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
-    """Return changes by other constants, shape (n, q), with share one relative to the others."""
+    """Return changes by other constants, shape (n, q), scaled to the standard deviation of the others."""
     changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
     return np.vstack(changes) / source.form_uncertainty
 
 
 def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
-    """Return growth with other time constants, shape (n, q)."""
+    """Return effects of growth with other time constants, shape (n, q)."""
     parameters = source.parameters(machine)
     amplitude = np.array([not p.grid for p in parameters])
     if source.varies_with != "time" or amplitude.all():
@@ -105,7 +105,7 @@ def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]
 def _strut_contributions(
     source: ErrorSource, motion: Motion, machine: Machine, values: Floats, reading: BarReading
 ) -> Floats | None:
-    """Return a source's reading through each strut, shape (n, 6) [mm]; None if it also acts elsewhere."""
+    """Return a source's effect on the reading through each strut, shape (n, 6) [mm]; None if it also acts elsewhere."""
     model = MachineModel(machine, (Fitted(source, values, source.shared_by(motion)),))
     effect = model.effect(motion, reading.actual)
     others = (
@@ -124,7 +124,7 @@ def _strut_contributions(
 def _followed_by_strut(
     source: ErrorSource, known: Mapping[str, Floats], motion: Motion, machine: Machine
 ) -> list[Floats]:
-    """Return variables of a strut source's slack, shape (n, 6) each."""
+    """Return the variables for a strut source's slack, shape (n, 6) each."""
     if source.varies_with in {"time", "temperature"}:
         return [np.broadcast_to(known["time"][:, None], (len(motion), STRUTS))]
     found = [known["strut-length"]]
@@ -136,8 +136,7 @@ def _followed_by_strut(
 
 
 OF_STRUTS_SMOOTH = ("strut-force", "strut-speed")
-"""Variables of struts along which an effect may be off its formula gradually: a contact that stiffens under its load, a lag
-that is another at speed."""
+"""Variables of struts along which a formula may err gradually: contacts stiffen under load, lags change with speed."""
 
 
 def _swing_rad(motion: Motion, machine: Machine) -> Floats:
@@ -150,7 +149,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> Floats:
 
 
 def _followed(source: ErrorSource, known: Mapping[str, Floats], motion: Motion) -> Floats:
-    """Return variables of another source's slack, shape (n, q)."""
+    """Return the variables for another source's slack, shape (n, q)."""
     name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:
         return known[name][:, None]

@@ -1,4 +1,4 @@
-"""Curves of causes and gains of tests, for the figure of a diagnosis."""
+"""Curves and gains for the figure of a diagnosis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One run by rising angle, shape (s,) each.
+    """One run's deviations in ascending order of angle, shape (s,) each.
 
     Attributes:
         theta_deg: from +X towards +Y.
@@ -27,7 +27,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class GainOfTest:
-    """One test, all its runs together."""
+    """One test with all its runs."""
 
     name: str
     residual_um: tuple[float, float]
@@ -42,13 +42,13 @@ class GainOfTest:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One curve over pieces, shape (b,) each.
+    """One curve over bins, shape (b,) each.
 
     Attributes:
         sense: `lengthening` or `shortening`, or empty.
         model_um: mean error by the source.
-        before_um: strut error that explains the base residual; NaN if hardly measured.
-        after_um: the model's plus the joint residual's; NaN if hardly measured.
+        before_um: strut error that would explain the base residual; NaN if hardly determined.
+        after_um: the model's error plus the error that would explain the joint residual; NaN if hardly determined.
     """
 
     sense: str
@@ -61,12 +61,12 @@ class Branch:
 
 @dataclass(frozen=True)
 class SourceCurves:
-    """One source.
+    """Curves of one source.
 
     Attributes:
         source: empty for the unmodelled residual.
-        fine: may change between pieces, as a wave.
-        reading: if no strut moves.
+        fine: whether the error may change between bins, as a wave.
+        reading: whether it acts on the reading, not on struts.
     """
 
     source: str

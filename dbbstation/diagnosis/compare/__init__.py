@@ -1,1 +1,1 @@
-"""Compare two sessions: one is the simulation of the other."""
+"""Compare two sessions, using one as simulation of the other."""

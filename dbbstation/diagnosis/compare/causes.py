@@ -1,4 +1,4 @@
-"""Error sources as causes of a difference: changed, or acting in one session."""
+"""Error sources that changed, or act in one session only, as causes of a difference."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource, Parameter
 
 HARDLY_DIFFERENT = sqrt(1.0 - EQUIVALENT**2)
-"""Share of an effect by which it differs between the sessions up to which nothing tells what acts in B from what no longer acts as
-it did in A: the sine of the angle whose cosine is `EQUIVALENT`, 4.5 %."""
+"""Relative difference of an effect between both sessions, below which an effect in B equals the missing effect of A:
+the sine of the angle with cosine `EQUIVALENT`, 4.5 %."""
 
 
 @dataclass(frozen=True)
 class When:
-    """A way of acting; differences are B minus A.
+    """A combination of sessions in which a source acts; differences are B minus A.
 
     Attributes:
         label: empty for a change common to both.
@@ -46,7 +46,7 @@ IN_B = When("in B", 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """One error source over both sessions."""
+    """One error source in both sessions."""
 
     source: ErrorSource
     sides: Sides
@@ -57,7 +57,7 @@ class Change:
         return self.source.name if usual else f"{self.source.name} by {self.source.law}"
 
     def law(self, log_odds: float) -> Law:
-        """Return columns and forms by part and way."""
+        """Return the source as a law, with forms by part and combination."""
         amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.grid]
         parts = parts_of(amplitudes, self._sets)
         count = len(amplitudes) * self._sets
@@ -100,7 +100,7 @@ class Change:
         )
 
     def columns(self, point: tuple[float, ...]) -> Floats:
-        """Return reading B minus A by amplitude and way, shape (n, p)."""
+        """Return the derivatives of readings B minus A by amplitudes, for each combination, shape (n, p)."""
         of_a = self._of(0, point) if len(self._whens) > 1 else None
         of_b = self._of(1, point)
         found = []

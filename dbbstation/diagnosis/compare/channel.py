@@ -1,4 +1,4 @@
-"""Two sessions as a channel: readings of A simulate B, circle by circle."""
+"""Two sessions as a channel: readings of A simulate B for each circle."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 CHANGE = 0.1
-"""Share of how wrong a machine's geometry may be that a change between two sessions usually is: what was made badly stays so; a
-knock, a new reference run or a joint set anew is a tenth of it."""
+"""Usual change of geometry between sessions, relative to its usual error: manufacturing errors stay; collisions, new
+reference runs or adjusted joints are a tenth."""
 
 GEOMETRY = (*KINEMATIC_SOURCES, "platform-joints", "tool-ball-offset")
-"""Sources of what a machine is made like."""
+"""Sources of the machine's geometry."""
 
 RESOLUTION_MM = 1e-5
-"""Noise that every difference has at the least, per row: no bar shows less, and simulations have none [mm]."""
+"""Least noise per row of a difference [mm]: no bar has less, but simulations have zero."""
 
 
 def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
-    """Put two sessions on a channel."""
+    """Make the channel of two sessions."""
     variables, runs = variables_of(sides), samples_of_b(sides)
-    # A run is travelled at one speed: its rows are its clock.
+    # Runs have constant speed, so rows are a clock.
     time = np.concatenate([np.arange(rows.stop - rows.start, dtype=np.float64) for rows in sides.blocks])
     return Channel(
         residual=sides.rows(lambda pair: pair.difference_mm),

@@ -1,4 +1,4 @@
-"""Compare two sessions: whether, where, in what form and by which cause they differ."""
+"""Compare two sessions: whether they differ, where, how and why."""
 
 from __future__ import annotations
 
@@ -47,22 +47,22 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 CENTRED_SIGMA = 4.0
-"""Standard uncertainties by noise within which a centre lies, in every run, where it was removed; or within `CENTRED_MM`."""
+"""Centres were removed if all are within so many standard uncertainties of noise, or within `CENTRED_MM`."""
 
 CENTRED_SHAPE = 25.0
-"""... if its form about that centre is this many times the smallest centre that would have been noticed."""
+"""... and if the form is this many times the smallest detectable centre."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Everything found.
+    """Results of a comparison.
 
     Attributes:
-        trial: evidence of groups of tests; without predictions if nothing was found or groups are few.
-        held_out: predictions with the stated set-up, and with findings [mm].
-        effects: of the best set, largest first, by name.
+        trial: evidence of groups of tests; without predictions if nothing was found or there are few groups.
+        held_out: prediction errors with the stated set-up alone, and with findings [mm].
+        effects: of the best set, by name, largest first.
         noticed_mm: detectable change of any strut's length.
-        levels: existence, variables and cause of a difference [µm].
+        levels: existence, variables and law of a difference [µm].
     """
 
     matching: Matching
@@ -79,9 +79,9 @@ class Comparison:
 
     @property
     def probability(self) -> float:
-        """Return the probability of any difference beyond noise and set-up, at even prior."""
+        """Return the probability of a difference beyond noise and set-up, with even prior odds."""
         odds = np.array([cause.log_prior_odds for cause in self.settled.causes])
-        nothing = float(-np.logaddexp(0.0, odds).sum())  # log prior probability of none of them
+        nothing = float(-np.logaddexp(0.0, odds).sum())  # log prior probability that all are absent
         before = float(np.log(-np.expm1(nothing))) - nothing
         weights = self.settled.posterior.weights
         something = [weight for names, weight in weights.items() if names]
@@ -89,7 +89,7 @@ class Comparison:
 
     @property
     def differ(self) -> bool:
-        """Return whether the sessions differ: a sure cause or structured residual."""
+        """Return whether the sessions differ, by a sure cause or a structured residual."""
         return self.probability >= SURE or not self.left.is_noise
 
     @property
@@ -111,12 +111,12 @@ class Comparison:
 
     @property
     def found_rms_mm(self) -> float:
-        """Return the rms of findings over all runs [mm]."""
+        """Return the rms effect of findings over all runs [mm]."""
         return rms(np.concatenate([run.found_mm for run in self.runs]))
 
     @property
     def directions(self) -> DirectionHalves | None:
-        """Return findings common and opposite to both directions, or None."""
+        """Return the findings' parts equal and opposite in both directions, or None."""
         both = np.array(
             [[self.runs[k].found_mm for k in runs] for runs in both_directions([run.pair for run in self.runs])]
         )
@@ -139,11 +139,11 @@ def compare(
     """Compare two sessions.
 
     Args:
-        sources: candidates whose needs both sessions meet.
-        hold_out: choose anew without each group of tests.
+        sources: candidates whose inputs both sessions provide.
+        hold_out: whether to repeat the selection without each group of tests.
 
     Raises:
-        TraceError: no run in common; circles of one of them had their centres removed.
+        TraceError: no common run, or removed centres in one session.
     """
     for name, session in (("A", a), ("B", b)):
         _refuse_centred(name, session)
@@ -200,7 +200,7 @@ def _run(pair: Pair, settled: Settled, rows: slice, order: Integers, found: Floa
     shape[first] = 0.0
     noise = settled.noise.effective
     sigma = np.sqrt(_stated(settled, rows, order, columns[:, first]) + noise**2)
-    # Of a raised bar the radius on the level is seen along the bar: less by the cosine of its elevation.
+    # A raised bar measures a radius change times the cosine of its elevation.
     per_mm = np.sqrt(count / 2.0) * float(np.cos(np.radians(pair.circle.elevation_deg)))
     smooth = np.asarray(columns @ row, dtype=np.float64)
     at = int(np.argmax(np.abs(smooth)))
@@ -230,7 +230,7 @@ def _run(pair: Pair, settled: Settled, rows: slice, order: Integers, found: Floa
 
 
 def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> Floats:
-    """Return the variances of stated balls, bars and starts in a run's constant, first cosine and first sine [mm²]."""
+    """Return the variances of a run's constant, first cosine and first sine by stated balls, bars and starts [mm²]."""
     base = settled.channel.base
     by_angle = np.empty((len(columns), len(base.prior)))
     by_angle[order] = base.samples[rows] * base.prior
@@ -238,18 +238,18 @@ def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> 
 
 
 def _by_angle_um(theta_deg: Floats, smooth_mm: Floats) -> tuple[float, ...]:
-    """Return means over ten degrees from +X, 36 of them [µm]."""
+    """Return 36 means over ten degrees from +X [µm]."""
     sector = (theta_deg * (BOUNDS.arcs_told / 360.0)).astype(np.int64)
     count = np.bincount(sector, minlength=BOUNDS.arcs_told)
     return tuple((1e3 * np.bincount(sector, smooth_mm, minlength=BOUNDS.arcs_told) / np.maximum(count, 1)).tolist())
 
 
 def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
-    if len(runs) < 2:  # noqa: PLR2004 - one centre may be where it belongs
+    if len(runs) < 2:  # noqa: PLR2004 - a single centre may be exact
         return
     for run in runs:
         found = figures(run.raw)
-        rough = np.diff(run.raw.length_mm, 2) / np.sqrt(6.0)  # noise alone: second differences of what is smooth vanish
+        rough = np.diff(run.raw.length_mm, 2) / np.sqrt(6.0)  # noise alone, because second differences of smooth values vanish
         limit = max(CENTRED_SIGMA * float(np.sqrt(2.0 * np.mean(rough**2) / len(run.raw))), CENTRED_MM)
         if 1e-3 * found.centre_deviation_um > limit or 1e-3 * found.circularity_um < CENTRED_SHAPE * limit:
             return

@@ -1,4 +1,4 @@
-"""Details of a comparison: place of causes, absorption by calibration."""
+"""Details of found effects: place, and absorption by calibration."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
-    """Return effects of the best set by name, most valuable first."""
+    """Return the effects of the best set by name, largest evidence first."""
     comparison, best = settled.comparison, settled.best
     kinematic = _kinematic(sides)
     found = {}
@@ -42,7 +42,7 @@ def _placed(sides: Sides, rows: Floats, share: float, taken_up: float) -> Effect
     pair, values = sides.pairs[worst], by_run[worst]
     at, count = int(np.argmax(np.abs(values))), len(values)
     inside = values * np.sign(values[at]) >= HALF * abs(values[at])
-    # The arc about the peak, round the turn: no further than to where it ends on either side.
+    # The contiguous arc about the peak, across the turn's start.
     rolled = np.roll(inside, -at)
     ahead = count if rolled.all() else int(np.argmin(rolled))
     back = 0 if rolled.all() else int(np.argmin(rolled[::-1]))
@@ -55,7 +55,7 @@ def _placed(sides: Sides, rows: Floats, share: float, taken_up: float) -> Effect
 
 
 def opposite_share(sides: Sides, by_run: list[Floats]) -> float:
-    """Return the share of squares odd in direction."""
+    """Return the share of squares that change sign with direction."""
     same, opposite = 0.0, 0.0
     for one, other in both_directions(sides.pairs):
         same += float(np.sum((by_run[one] + by_run[other]) ** 2))
@@ -64,7 +64,7 @@ def opposite_share(sides: Sides, by_run: list[Floats]) -> float:
 
 
 def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
-    """Return the runs of tests in both directions."""
+    """Return the runs of tests measured in both directions."""
     by_test: dict[tuple[str, int], list[int]] = {}
     for k, pair in enumerate(pairs):
         by_test.setdefault((pair.test, pair.number), []).append(k)
@@ -72,7 +72,7 @@ def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
 
 
 def _kinematic(sides: Sides) -> Floats:
-    """Return orthonormal kinematic columns of B's readings, shape (n, k)."""
+    """Return an orthonormal basis of kinematic effects on B's readings, shape (n, k)."""
     sources = sources_named(KINEMATIC_SOURCES)
     columns = [
         np.hstack([reading.by_source(s, sides.machine, np.zeros(len(s.parameters(sides.machine)))) for s in sources])
@@ -83,7 +83,7 @@ def _kinematic(sides: Sides) -> Floats:
 
 
 def noticed_mm(settled: Settled) -> float:
-    """Return the detectable change of the worst-seen strut's length [mm]."""
+    """Return the detectable change of length for the least visible strut [mm]."""
     cause = next(cause for cause in settled.causes if cause.name == "strut-reference-length")
     single = [v.columns for v in cause.variants if len(v.columns) == 1 and v.label.startswith("strut")]
     products = [float(settled.comparison.beside((), columns)[0, 0]) for columns in single]

@@ -1,4 +1,4 @@
-"""What a comparison finds, B minus A; fields are JSON keys."""
+"""Findings of a comparison, B minus A; fields are JSON keys."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from dbbstation.facts.serialise import AsItIs, Kept
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunDifference:
-    """A run of B minus that of A.
+    """The difference of one run, B minus A.
 
     Attributes:
         differs: whether the found effects are certain in this run.
-        found_rms_um: by found causes.
+        found_rms_um: rms effect of found causes.
         rms_um: of the smooth difference, up to its highest harmonic.
         noise_rms_um: of the smooth difference.
-        centre_shift_uncertainty_um: by noise and stated balls.
-        mean_radial_change_uncertainty_um: by noise, stated bars, and balls of raised bars.
+        centre_shift_uncertainty_um: from noise and stated balls.
+        mean_radial_change_uncertainty_um: from noise, stated bars, and balls of raised bars.
         circularity_um: range of the difference about its centre.
         peak_um: with sign.
         by_angle_um: means over ten degrees from +X.
-        smooth_mm: shape (s,).
-        found_mm: by found causes, shape (s,).
+        smooth_mm: smoothed difference, shape (s,).
+        found_mm: effect of found causes, shape (s,).
     """
 
     test: str
@@ -53,7 +53,7 @@ class RunDifference:
 
 @dataclass(frozen=True)
 class DirectionHalves:
-    """Parts of the difference that are equal or opposite in both directions.
+    """Parts of the difference equal and opposite in both directions.
 
     Attributes:
         opposite_um: rms of the part with changing sign.
@@ -83,9 +83,9 @@ class EffectOfCause:
     """A cause's effect on the difference.
 
     Attributes:
-        share: of the total chi-square reduction, alone.
+        share: of the total chi-square reduction, for this cause alone.
         taken_up: share of squares that a kinematic calibration of B absorbs.
-        opposite: share of squares odd in direction, over tests run both ways.
+        opposite: share of squares that change sign with direction, over tests run in both.
     """
 
     rms_um: float

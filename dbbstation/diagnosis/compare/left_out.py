@@ -1,4 +1,4 @@
-"""Held-out tests of a comparison."""
+"""Predict held-out tests of a comparison."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
-    """Hold back groups of tests; empty without findings or below `LEAST_PARTS` groups."""
+    """Predict groups of tests; empty without findings or with fewer than `LEAST_PARTS` groups."""
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
     parts = rows_of_groups(groups, sides.blocks)
     if len(parts) < LEAST_PARTS or not settled.best.members:
@@ -42,12 +42,12 @@ def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[Flags]) -> Know
 
 
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:
-    """Return predictions of held-out tests by set-ups as stated and some causes."""
+    """Return prediction errors of held-out tests with stated set-ups and some causes."""
     bank = settled.bank
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     base = settled.channel.known
     prior = np.concatenate([base.prior, *(member.sd for member in members)])
-    # Amplitudes of causes come from the tests that are kept; only the set-up of a held-out test may settle there.
+    # Kept tests give the amplitudes of causes; only the set-up of a held-out test is fitted to it.
     known = Columns(prior, prior, np.arange(len(prior)) < len(base.prior))
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS_OF_AN_ERROR)
     every = np.arange(len(prior))

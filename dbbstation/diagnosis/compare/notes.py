@@ -1,4 +1,4 @@
-"""Other differences of two sessions."""
+"""Notes on differing conditions of two sessions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 SAME_TEMPERATURE_K = 0.5
-"""Mean temperatures that differ by less are not worth a note; a bar of 150 mm grows by less than a µm."""
+"""Smaller differences of mean temperature are not reported: a bar of 150 mm grows by less than 1 µm."""
 
 
 def notes_of(machine_a: Machine, machine_b: Machine, pairs: Sequence[Pair]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Two sessions run by run, at common angles."""
+"""Pair the runs of two sessions, at common angles."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 SAME_PLACE_MM = 0.5
-"""Centres of one circle may lie so far apart: CMM sheets of one plate, or the sheet and the drawing of it."""
+"""Largest distance between centres of one circle, from two CMM sheets of one plate, or sheet and drawing."""
 
 SAME_LENGTH_MM = 1e-6
 SAME_ANGLE_DEG = 1e-6
@@ -32,10 +32,10 @@ SAME_ANGLE_DEG = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A run of both sessions.
+    """One run in both sessions.
 
     Attributes:
-        number: in its test and direction, from 1.
+        number: of the run in its test and direction, from 1.
         a_mm: raw less commanded length of A at sector middles from +X, shape (s,).
     """
 
@@ -57,7 +57,7 @@ class Pair:
 
     @property
     def direction(self) -> Direction:
-        """Return the sense of travel."""
+        """Return the direction of travel."""
         return self.circle.direction
 
     @property
@@ -80,7 +80,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class NotComparable:
-    """A test of both sessions that cannot be compared."""
+    """A test that both sessions contain, but with different circles."""
 
     test: str
     text: str
@@ -92,7 +92,7 @@ class Matching:
 
     Attributes:
         pairs: in session A's order.
-        not_comparable: equal names, different circles, with differences.
+        not_comparable: tests of equal name but different circles, with their differences.
         averaged: repeats that were averaged, with reasons.
     """
 
@@ -107,7 +107,7 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
     """Match runs of a test and direction.
 
     Raises:
-        TraceError: nothing belongs together.
+        TraceError: no runs match.
     """
     of_a, of_b = _by_run(a), _by_run(b)
     unlike = {key[0]: what for key in of_a if key in of_b and (what := _unlike(of_a[key] + of_b[key]))}
@@ -142,15 +142,15 @@ def common_sectors(raws: Sequence[RawCircle]) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Sectors:
-    """Moves samples of a turn to sector middles.
+    """Averages samples of a turn at sector middles.
 
-    Samples move along the run's smooth curve before averaging, since 0.1 mm off centre changes 0.4 µm in a quarter
-    degree. Noise is unchanged.
+    Samples are shifted along the run's smooth curve before averaging, because 0.1 mm off centre changes 0.4 µm per
+    quarter degree. Noise is unchanged.
 
     Attributes:
         there: filled sectors, shape (q,).
-        group: of each sample among these, shape (n,).
-        moved: change of sector means, shape (q,), to the middles, shape (q, q).
+        group: index of each sample's sector in `there`, shape (n,).
+        moved: matrix from sector means to their change at the middles, shape (q, q).
     """
 
     count: int
@@ -160,7 +160,7 @@ class Sectors:
 
     @classmethod
     def of(cls, theta_deg: Floats, count: int) -> Sectors:
-        """Return sectors of samples at angles from +X, shape (n,)."""
+        """Return the sectors for samples at angles from +X, shape (n,)."""
         sector = np.minimum((theta_deg * (count / FULL_TURN_DEG)).astype(np.int64), count - 1)
         there, group = np.unique(sector, return_inverse=True)
         highest, _ = bands(len(there))
@@ -170,7 +170,7 @@ class Sectors:
         return cls(count, there, group, away @ np.linalg.pinv(curve))
 
     def at_middles(self, values: Floats) -> Floats:
-        """Return samples, shape (n,) or (n, p), at sector middles, (count,) or (count, p); NaN if empty."""
+        """Return values at sector middles, (count,) or (count, p), from samples, (n,) or (n, p); NaN for empty sectors."""
         found = np.full((self.count, *values.shape[1:]), np.nan)
         averages = means(values, self.group)
         found[self.there] = averages + self.moved @ averages
@@ -178,7 +178,7 @@ class Sectors:
 
 
 def at_common_angles(raw: RawCircle, sectors: int) -> Floats:
-    """Return raw less commanded length at sector middles, shape (sectors,) [mm]; NaN if empty."""
+    """Return raw less commanded length at sector middles, shape (sectors,) [mm]; NaN for empty sectors."""
     poses = raw.circle.poses(raw.theta_deg)
     deviation = raw.length_mm - np.linalg.norm(poses[:, :3] - np.array(raw.circle.ball_mm), axis=1)
     return Sectors.of(raw.theta_deg, sectors).at_middles(deviation)

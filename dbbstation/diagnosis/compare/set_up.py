@@ -1,4 +1,4 @@
-"""Set-ups of two sessions: stated sizes, and outliers."""
+"""Set-up errors of two sessions, of stated size and beyond."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource, Motion
 
 JIG = "jig-position"
-"""Name of all balls moved as one body."""
+"""Name of a common displacement of all balls."""
 
 JIG_MM = 0.05
-"""How far a jig that was put down again lies from where it lay, one standard deviation per axis, and at 100 mm by its turn [mm]."""
+"""Standard deviation per axis of a re-installed jig's displacement, and of its rotation at 100 mm [mm]."""
 
 OF_THE_READING = frozenset({BALL, BAR, JIG, "angle", "reading", "commanded distance"})
-"""Variables of a difference that follow neither a strut nor a direction of travel: a ball, a bar or a holder has them too."""
+"""Variables independent of struts and directions of travel, which effects of a ball, bar or holder may also follow."""
 
 ALIKE = "alike in all tests: the set-up's"
 
 NOTHING = 1e-9
-"""Answer of a reading to a shift of a ball below which it does not see it: a level bar, and the height."""
+"""Negligible sensitivity to a ball's shift, as of a level bar to height."""
 
 ANYWHERE_MM = 1.0
 """Scatter of a ball of unknown place [mm]."""
 
 
 def base_of(sides: Sides) -> Base:
-    """Return set-up effects of both sessions at stated sizes."""
+    """Return the set-up effects of both sessions, with stated sizes."""
     names: list[str] = []
     columns: list[Floats] = []
     prior: list[Floats] = []
@@ -66,7 +66,7 @@ def base_of(sides: Sides) -> Base:
 
 
 def _per_degree(pair: Pair) -> Floats:
-    """Return A's smooth slope by angle, for shifted begins, shape (s,) [mm/deg]."""
+    """Return the slope of A's smooth curve over angle, for shifted starts, shape (s,) [mm/deg]."""
     theta, there = np.radians(pair.theta_deg), np.isfinite(pair.a_mm)
     low, _ = bands(len(theta))
     found, *_ = np.linalg.lstsq(basis(theta[there], low), pair.a_mm[there], rcond=None)
@@ -76,9 +76,9 @@ def _per_degree(pair: Pair) -> Floats:
 
 
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, Floats, Floats]]:
-    """Return a source's sharing tests, columns, shape (n, p), and stated sizes, shape (p,) [mm].
+    """Yield the tests that share a source's values, its columns, shape (n, p), and stated sizes, shape (p,) [mm].
 
-    If runs share the error in both sessions, their variances add.
+    If runs share the error in both sessions, the variances add.
     """
     shared = [[source.shared_by(motion) for motion in motions] for motions in sides.motions]
     together = list(zip(*shared, strict=True))
@@ -106,13 +106,13 @@ def _sd(source: ErrorSource, motion: Motion) -> Floats:
 
 
 def set_up_laws(sides: Sides) -> list[Law]:
-    """Return balls and bars with errors beyond their stated size, singly or all."""
+    """Return laws for balls and bars with errors beyond their stated size, single or all."""
     found: list[Law] = []
     named: set[tuple[str, ...]] = set()
     for source in sources_named(SET_UP):
         sets = _stated(sides, source)
         names = tuple(name for name, _, _ in sets)
-        # A ball that was put up once only is no other matter than its mounting.
+        # For a ball mounted once, ball and mounting are one effect.
         once = source.name == "ball-coordinate" and names in named
         named.add(names)
         if not once and all(sd.max(initial=0.0) < ANYWHERE_MM for _, _, sd in sets):
@@ -121,7 +121,7 @@ def set_up_laws(sides: Sides) -> list[Law]:
 
 
 def _outsize(source: ErrorSource, parameters: Sequence[str], sets: Sequence[tuple[str, Floats, Floats]]) -> list[Law]:
-    """Return one source's effects beyond stated size; may be empty."""
+    """Return laws for one source's errors beyond stated size; may be empty."""
     names: list[str] = []
     choices: list[tuple[tuple[int, ...], float, str]] = []
     columns, plausible = [], []
@@ -154,12 +154,12 @@ def _outsize(source: ErrorSource, parameters: Sequence[str], sets: Sequence[tupl
 
 
 def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
-    """Return shift and rotations common to all balls."""
+    """Return laws for a shift and rotations common to all balls."""
     samples = sides.averaged(1, [run.gain[TABLE] for run in runs])
     seen = np.flatnonzero(np.abs(samples).max(axis=0) > NOTHING)
     names = [f"{name}_mm" for name in "xyz"] + [f"turn_{name}_rad" for name in "xyz"]
     per = np.array([1.0] * 3 + [LEVER_MM] * 3)
-    if len({pair.test for pair in sides.pairs}) < 2:  # noqa: PLR2004 - of one ball it is that ball's place
+    if len({pair.test for pair in sides.pairs}) < 2:  # noqa: PLR2004 - a single ball's displacement is its own
         return []
     return [
         Law(
@@ -174,7 +174,7 @@ def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
 
 
 def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
-    """Return whether a class of no strut or direction is one curve over the angle in all runs of several tests."""
+    """Return whether a class without strut or direction is one common curve over the angle in several tests."""
     several = len({pair.test for pair in sides.pairs}) > 1
     if not several or not OF_THE_READING.issuperset(name for names in one.variables for name in names):
         return False
@@ -184,5 +184,5 @@ def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
 
 
 def with_set_up(follows: Sequence[Followed], sides: Sides, settled: Settled) -> tuple[Followed, ...]:
-    """Return classes; a class that is alike in all tests is attributed to the set-up."""
+    """Return the classes; classes equal in all tests are attributed to the set-up."""
     return tuple(replace(one, where=ALIKE) if alike_in_all(one, sides, settled) else one for one in follows)

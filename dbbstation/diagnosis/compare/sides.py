@@ -1,4 +1,4 @@
-"""Both sessions for a channel: equal circles and angles, own times and conditions."""
+"""Both sessions with equal circles and angles, but separate times and conditions."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Rows by pair in B's order of travel; motions have own samples.
+    """Rows are ordered by pair, then B's travel; motions keep their own samples.
 
     Attributes:
-        runs: of A and of B per pair; the first of averaged repeats.
+        runs: of A and B per pair; the first one of averaged repeats.
     """
 
     machine: Machine
@@ -39,7 +39,7 @@ class Sides:
 
     @classmethod
     def of(cls, machine: Machine, pairs: Sequence[Pair]) -> Sides:
-        """Take paired runs."""
+        """Return the sides for paired runs."""
         a = tuple(_thinned(pair.a[0], pair) for pair in pairs)
         b = tuple(_thinned(pair.b[0], pair) for pair in pairs)
         return cls(machine, tuple(pairs), (a, b))
@@ -52,12 +52,12 @@ class Sides:
 
     @cached_property
     def orders(self) -> tuple[Integers, ...]:
-        """Return each pair's rows among its common angles."""
+        """Return the indices of each pair's rows among common angles."""
         return tuple(np.argsort(pair.b[0].raw.circle.phi_deg(pair.theta_deg)) for pair in self.pairs)
 
     @cached_property
     def readings(self) -> tuple[tuple[BarReading, ...], tuple[BarReading, ...]]:
-        """Return nominal readings on the ways of A and B."""
+        """Return nominal readings along the paths of A and B."""
         model = MachineModel(self.machine)
         a, b = ([model.bar(motion) for motion in motions] for motions in self.motions)
         return tuple(a), tuple(b)
@@ -77,7 +77,7 @@ class Sides:
         found = []
         for sectors, order, one in zip(self._sectors[side], self.orders, values, strict=True):
             middles = sectors.at_middles(one.reshape(len(one), -1))
-            # A sector without a sample has what the one before it has.
+            # A sector without samples has the previous sector's value.
             last = np.maximum(np.searchsorted(sectors.there, order, side="right") - 1, 0)
             found.append(middles[sectors.there[last]].reshape(len(order), *one.shape[1:]))
         return np.concatenate(found)
@@ -104,7 +104,7 @@ class Sides:
         return found
 
     def groups(self, source: ErrorSource) -> Integers:
-        """Return each pair's sharing set in both sessions, shape (r,)."""
+        """Return the groups in which each pair's runs share values, in both sessions, shape (r,)."""
         names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
         order = list(dict.fromkeys(names))
         return np.array([order.index(name) for name in names], dtype=np.int64)

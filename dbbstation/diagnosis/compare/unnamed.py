@@ -1,4 +1,4 @@
-"""Unmodelled effects between sessions: reading, struts, balls, table, own curves."""
+"""Unmodelled differences between sessions: of reading, struts, balls, table, or single tests."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.shapes import Samples, Shape
 
 OWN_LOBES = (2, 3, 4, 5)
-"""Undulations per turn of a curve that every test or run has of its own: what a machine does to a circle is mostly there."""
+"""Undulations per turn of separate curves for tests or runs, where most machine errors are."""
 
 
 def variables_of(sides: Sides) -> tuple[Variable, ...]:
-    """Return variables for unmodelled effects: angle, place, tilt, time."""
+    """Return the variables of unmodelled effects: angle, place, tilt, time."""
     circles = [pair.circle for pair in sides.pairs]
     per_run = [
         ("place in X", "mm", Kind.LENGTH, [circle.centre_mm[0] for circle in circles]),
@@ -52,13 +52,13 @@ def _times(sides: Sides) -> list[Variable]:
 
 
 def of_readings(variables: Sequence[Variable], sides: Sides, time: Floats) -> list[Pattern]:
-    """Return effects on the reading; speed appears only as direction."""
+    """Return effects on the reading; speed matters only by its direction."""
     every = patterns(variables, sides.blocks, time, None)
     return [pattern for pattern in every if pattern.family is not Family.SPEED]
 
 
 def samples_of_b(sides: Sides) -> list[Samples]:
-    """Return B's runs for shapes, with A's balls."""
+    """Return samples of B's runs with A's balls, for shapes."""
     pivot = np.mean([pair.circle.ball_mm for pair in sides.pairs], axis=0)
     return [
         samples_of(motion, sides.machine, reading, pivot)
@@ -85,7 +85,7 @@ def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
     if shape.moves == SIGNED:
         family = Family.BY_DIRECTION
     followed = values if values.ndim == 1 else values[:, 0]
-    # What changes its sign with a strut's direction is hysteresis of its length.
+    # An effect that changes sign with a strut's direction is hysteresis of its length.
     name = "strut-length" if family is Family.HYSTERESIS else shape.variable
     variable = Variable(name, UNITS[shape.variable], Kind.ANY, followed)
     which = f"strut {shape.strut}" if shape.strut else "all struts" if shape.follows.moves_struts else ""
@@ -98,7 +98,7 @@ def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
 
 
 def of_each_test(sides: Sides) -> Pattern:
-    """Return separate curves over the angle, for every test or run, or for one."""
+    """Return separate curves over the angle, for all tests or runs, or for one."""
     angle = sides.rows(lambda pair: pair.theta_deg)
     waves = Lobes(OWN_LOBES).columns(angle)
     tests = list(dict.fromkeys(pair.test for pair in sides.pairs))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def label_of(finding: CauseFinding) -> str:
-    """Return a cause's name with form: strut, test, session."""
+    """Return a cause's name with its form, such as strut, test or session."""
     return f"{finding.name}, {finding.label}" if finding.label else finding.name
 
 
@@ -45,7 +45,7 @@ def verdict_text(found: Comparison) -> str:
 
 
 def organised_text(found: Comparison) -> str:
-    """Return the findings in short."""
+    """Return a summary of the findings."""
     if not found.there:
         return "nothing to organise"
     parts = []

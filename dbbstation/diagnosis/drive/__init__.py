@@ -1,1 +1,1 @@
-"""One drive: mass, friction, missing physics, without hexapod."""
+"""Identify one drive: mass, friction, missing physics."""

@@ -1,4 +1,4 @@
-"""A drive's recordings as a channel: band force, base, causes, curves."""
+"""A drive's recordings as a channel of low-passed force."""
 
 from __future__ import annotations
 
@@ -34,27 +34,28 @@ BASE_UNITS = {MASS: "kg", VISCOUS: "N·s/m"}
 """Parameters of the base model, F = M a + F_v v, and their units."""
 
 METHOD_SHARE = 0.002
-"""Of the force's root mean square: low-pass and differences leave so much of a simulated drive that follows its model exactly, most
-of it beside stops. It is noise that every recording has."""
+"""Least noise, relative to the force's rms: low-pass and differences leave so much of an exactly simulated drive,
+mostly beside stops."""
 
 PERIODS_IN_TRAVEL = 3.0
-"""Longest wave that is looked for, as a share of the travel: what repeats less often is a curve."""
+"""Fewest periods of a searched wave in the travel; longer ones are curves."""
 
 WAVE_STEP = 0.25
-"""Of the waves that are looked for, in periods over the travel."""
+"""Step between searched waves, in periods over the travel."""
 
 TIGHT, LOOPS = 28, 14
-"""Functions of a curve over the position, and by direction of travel: tight spots and loops of friction turn sharper than others."""
+"""Numbers of functions of curves over position, and by direction of travel: tight spots and friction loops are sharper
+than other effects."""
 
 NEAR_STANDSTILL = 0.28
-"""Share of the greatest speed below which friction may be anything that follows the speed, the greatest Stribeck speed that is tried:
-a curve of low speed has its rivals there, and above it Coulomb and viscous friction are what they are."""
+"""Share of the greatest speed, the greatest tried Stribeck speed, below which friction may be any function of speed.
+Above it Coulomb and viscous friction apply."""
 
 STRONGEST = 6
-"""Waves that the comparison looks at."""
+"""Number of waves in the comparison."""
 
 SAME = 1e-6
-"""Singular value, relative, below which columns say the same."""
+"""Relative singular value below which columns are equal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +63,8 @@ class DriveChannel:
     """A channel and the sources of its laws.
 
     Attributes:
-        scale: with waves found by a first search.
-        shortest_wave_mm: searched; infinite without search.
+        scale: sizes, with waves of a first search.
+        shortest_wave_mm: shortest searched wave; infinite without a search.
     """
 
     recordings: Recordings
@@ -120,15 +121,15 @@ def drive_channel(
 
 
 def _beyond(straight: Floats, patterns: Iterator[Pattern]) -> Iterator[Pattern]:
-    """Return curves orthogonal to base and single-parameter causes, which they contain.
+    """Return curves made orthogonal to base and single-parameter causes, which they contain.
 
     Curves near standstill are not orthogonalised, because friction would extend them to full speed. Over position the
-    whole curve also competes with a named law plus remainder.
+    whole curve also competes with a named law plus its remainder.
     """
     axes = axes_of(straight, SAME)
     for pattern in patterns:
         if isinstance(pattern.form, Spline) and pattern.form.falls:
-            yield pattern  # zero at speed, where causes of one number are known by
+            yield pattern  # zero at speed, where single-parameter causes are determined
             continue
         samples = pattern.samples - axes @ (axes.T @ pattern.samples)
         norms = np.linalg.norm(samples, axis=0)
@@ -172,7 +173,7 @@ def _law(
     positive = [p.name for p in form.amplitudes if p.positive]
 
     def possible(values: Mapping[str, float]) -> bool:
-        # A negative value is probably zero.
+        # negative values are probably zero
         return min((values[name] for name in positive), default=0.0) >= 0.0 and source.possible(
             values, recordings.scale
         )
@@ -195,7 +196,7 @@ def _law(
 
 
 def _departure(effect: Floats, along: Floats) -> Floats:
-    """Return formula slack, shape (m, q): effect times smooth functions, and shifts by a sample for reversals."""
+    """Return formula slack, shape (m, q): the effect times smooth functions, and its shift by a sample for reversals."""
     late = np.gradient(effect)
     return np.column_stack([modulated([effect[:, None]], [along[:, None]], None), late, np.gradient(late)])
 
@@ -204,7 +205,7 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
     scale = recordings.scale
     starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
     travels = recordings.at(lambda s: s.since_reversal_m)
-    # Nearer to a reversal than any sample that is compared, a curve goes on as at its end.
+    # Nearer to a reversal than all compared samples, a curve stays constant.
     nearest = float(np.min(travels, initial=scale.travel_m, where=travels > 0.0))
 
     def time(signals: Signals) -> Floats:
@@ -278,9 +279,9 @@ def _starts(recordings: Recordings) -> list[float]:
 
 
 def _first_look(recordings: Recordings, smooth: Floats) -> tuple[Scale, float]:
-    """Return sizes with the strongest position waves, and the shortest searched [mm].
+    """Return sizes with the strongest waves over position, and the shortest searched wave [mm].
 
-    The shortest wave passes in a cut-off period at usual speed. Waves are found successively.
+    At usual speed the shortest wave takes one period of the cut-off. Waves are found successively.
     """
     scale = recordings.scale
     speed = float(np.median(np.abs(recordings.at(lambda s: s.speed_m_s))))

@@ -1,4 +1,4 @@
-"""The contract of a cause of force."""
+"""The interface of a cause of force."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from dbbstation.diagnosis.table.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
-from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the interface: sources import it from here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -21,8 +21,8 @@ class Scale:
     """Sizes over all recordings, for comparable amplitudes.
 
     Attributes:
-        mean_m: position at compared samples.
-        reverses: some recording changes direction.
+        mean_m: mean position of compared samples.
+        reverses: whether a recording changes direction.
         waves_per_m: strongest residual waves over position [1/m].
     """
 
@@ -50,10 +50,10 @@ class DriveForm:
     """One form of a cause.
 
     Attributes:
-        parameters: amplitudes, then nonlinear numbers with a rising `grid`.
-        columns: force per amplitude, shape (n, p), at values of the nonlinear numbers.
-        label: of a coexisting form; may be empty.
-        tried: independent forms of the choice.
+        parameters: amplitudes, then nonlinear parameters with an ascending `grid`.
+        columns: function from nonlinear parameters to forces per amplitude, shape (n, p).
+        label: of a form that can coexist with others; may be empty.
+        tried: number of independent forms from which it was picked.
     """
 
     parameters: tuple[Parameter, ...]
@@ -63,31 +63,31 @@ class DriveForm:
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:
-        """Return the p amplitudes."""
+        """Return the amplitudes."""
         return tuple(p for p in self.parameters if not p.grid)
 
     @property
     def shapes(self) -> tuple[Parameter, ...]:
-        """Return the nonlinear numbers."""
+        """Return the nonlinear parameters."""
         return tuple(p for p in self.parameters if p.grid)
 
 
 class DriveSource(ABC):
-    """One physical cause of force, without state."""
+    """One physical cause of force; instances have no state."""
 
     name: ClassVar[str]
     varies_with: ClassVar[str]
-    """Variable that organises its misfit, as printed."""
+    """Variable on which its force depends, as printed."""
     texts: ClassVar[Texts]
     form_uncertainty: ClassVar[float]
-    """Share of the effect by which real drives depart from the formula, one standard deviation; its reason stands beside it."""
+    """Relative standard deviation of real drives from the formula; each source states the reason."""
     prior_probability: ClassVar[float] = 0.05
-    """That a drive has it so that it matters, before anything is measured."""
+    """Prior probability that it matters in a drive."""
 
     @abstractmethod
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return forms; none if invisible in these recordings."""
+        """Return the forms; empty if these recordings cannot show it."""
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
-        """Return whether values can be this cause."""
+        """Return whether values are possible for this cause."""
         return True

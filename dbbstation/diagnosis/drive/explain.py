@@ -1,4 +1,4 @@
-"""The most probable possible set of causes of a drive."""
+"""Find the most probable set of causes with possible mass and friction."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ExplainedDrive:
 
 
 def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> ExplainedDrive:
-    """Compare sets of causes, leaving out an impossible mass or friction."""
+    """Compare sets of causes, excluding sets with impossible mass or friction."""
     dropped: dict[str, str] = {}
     for number in range(DRIVES.rounds):
         base = [name for name in (MASS, VISCOUS) if name not in dropped]
@@ -66,7 +66,7 @@ POINTS_TO = {
     VISCOUS: "the friction falls with growing speed here. It points to Stribeck friction, or to a load that changes while "
     "the drive moves. Record at several speeds.",
 }
-"""What a negative base parameter points to."""
+"""Hints for a negative base parameter."""
 
 
 def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
@@ -76,7 +76,7 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
     top = -float("inf")
     for number, hypothesis in enumerate(posterior.hypotheses[: BOUNDS.looked_at]):
         if hypothesis.log_posterior < top - LIKELY:
-            break  # none of those that follow can be probable
+            break  # all further hypotheses are improbable
         less = log_possible(fit(drive, settled, hypothesis.members))
         hypotheses[number] = replace(hypothesis, log_posterior=hypothesis.log_posterior + less)
         weights[hypothesis.names] = hypotheses[number].log_posterior

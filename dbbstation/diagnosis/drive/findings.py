@@ -21,7 +21,7 @@ class DriveValue(Value):
     """A parameter of the drive.
 
     Attributes:
-        identifiable: False: the value is meaningless.
+        identifiable: False if the value is meaningless.
     """
 
     identifiable: bool
@@ -32,7 +32,7 @@ class CausePart:
     """One wave, pulse or form.
 
     Attributes:
-        t_s: first and last time of a pulse; else None.
+        t_s: first and last times of a pulse; else None.
     """
 
     label: str
@@ -42,7 +42,7 @@ class CausePart:
 
 @dataclass(frozen=True)
 class Complement:
-    """Pulses of one size read inversely: opposite force elsewhere, plus a constant load."""
+    """Inverse description of equal pulses: the opposite force elsewhere, plus a constant load."""
 
     force_n: Value
     t_s: tuple[tuple[float, float], ...]
@@ -55,12 +55,12 @@ class DriveFinding:
 
     Attributes:
         concealed: share of squares that mass and viscous friction absorb.
-        gain: log Bayes factor beside the others.
-        parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
-        parts: waves, pulses or forms if several.
-        at_end: parameters at the end of their grid.
+        gain: log Bayes factor given the others.
+        parameters: fitted values; for an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
+        parts: its waves, pulses or forms, if several.
+        at_end: parameters at a limit of their grid.
         complement: alternative stretches to `parts`.
-        persists: a single event, such as drift, confirmed by held-out parts.
+        persists: whether held-out parts confirm a single event, such as drift.
         gains: held-out [N²]; None if not tested.
     """
 
@@ -102,11 +102,11 @@ class UnexplainedForce:
 
 @dataclass(frozen=True)
 class ForceLocation:
-    """A stretch with outstanding misfit.
+    """A stretch with significant misfit.
 
     Attributes:
         direction: `forwards` or `backwards`.
-        at_reversal: in or beside a reversal or stop.
+        at_reversal: whether it is at a reversal or stop.
         peak_n: measured minus model.
     """
 
@@ -122,7 +122,7 @@ class ForceLocation:
 
 @dataclass(frozen=True)
 class ModelStep:
-    """A step of models, and its prediction of a held-back stretch.
+    """One model of a sequence, and its prediction of a held-out stretch.
 
     Attributes:
         relative_force_error: |F - F_model| / |F| on the stretch.
@@ -136,7 +136,7 @@ class ModelStep:
 
 @dataclass(frozen=True)
 class ForceErrors:
-    """Errors with mass and viscous friction (before), and all findings (after)."""
+    """Force errors with mass and viscous friction (before), and with all findings (after)."""
 
     before: float
     after: float
@@ -144,7 +144,7 @@ class ForceErrors:
 
 @dataclass(frozen=True)
 class HeldBack:
-    """Prediction errors on a held-back stretch."""
+    """Prediction errors on a held-out stretch."""
 
     t_s: tuple[float, float]
     relative_force_error: ForceErrors
@@ -154,7 +154,7 @@ class HeldBack:
 
 @dataclass(frozen=True)
 class ParameterBias:
-    """A parameter's bias: before, after, difference, uncertainty after."""
+    """A parameter's bias: value before, value after, difference, uncertainty after."""
 
     parameter: str
     before: float
@@ -179,12 +179,12 @@ class UnexplainedForces:
 
 @dataclass(frozen=True)
 class HeldOutForce:
-    """Predictions of held-out parts, chosen anew.
+    """Prediction errors of held-out parts, with selection repeated.
 
     Attributes:
         reference: rms error with mass, viscous and Coulomb friction.
-        corrected: with everything but events in time.
-        worse: than mass and friction.
+        corrected: rms error with all findings except events in time.
+        worse: whether this exceeds `reference`.
         gains: by source [N²].
     """
 
@@ -197,10 +197,10 @@ class HeldOutForce:
 
 @dataclass(frozen=True)
 class RecordedSignals:
-    """What was recorded.
+    """Properties of the recordings.
 
     Attributes:
-        shortest_wave_mm: visible over position, or None.
+        shortest_wave_mm: shortest detectable wave over position, or None.
     """
 
     recordings: int
@@ -217,7 +217,7 @@ class RecordedSignals:
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve:
-    """Friction against speed, by all speed-dependent causes.
+    """Friction over speed, from all speed-dependent causes.
 
     Attributes:
         speed_m_s: shape (c,) [m/s].
@@ -230,16 +230,16 @@ class FrictionCurve:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveFindings:
-    """Everything found of one strut drive.
+    """All findings on one strut drive.
 
     Attributes:
-        mismatch: present beyond mass and viscous friction.
+        mismatch: whether effects beyond mass and viscous friction are present.
         parameters: base first.
         friction: Coulomb and viscous by direction; may be empty.
         held_out_rms_n: None if not tested.
         noticed: `notes` in JSON.
-        chosen: causes of the last model by force.
-        levels: existence, variables and cause of a difference [N].
+        chosen: causes of the last model, ordered by force.
+        levels: existence, variables and law of a difference [N].
     """
 
     mismatch: bool

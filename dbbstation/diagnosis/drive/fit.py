@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 METHOD_U_SHARE = 5e-4
-"""Standard uncertainty, of a value, that low-pass, differences and the moment of a reversal leave of a perfect recording;
-on simulated drives they make the mass too small by half of this."""
+"""Relative standard uncertainty of values of a perfect recording, by low-pass, differences and times of reversals; on
+simulated drives the mass is too small by half of this."""
 
 LIKELY = 0.01
-"""Probability of a hypothesis from which on it counts for the uncertainty of what all hypotheses have."""
+"""Least probability of hypotheses that contribute to the uncertainty of common parameters."""
 
 
 @dataclass(frozen=True, eq=False)
 class DriveFit:
-    """A fit: base, then amplitudes and slack by member."""
+    """A fit of base, then amplitudes and slack of members."""
 
     drive: DriveChannel
     members: tuple[Member, ...]
@@ -72,7 +72,7 @@ class DriveFit:
         return next(law for law in self.drive.channel.laws if law.name == name)
 
     def parameters(self, name: str) -> dict[str, Value]:
-        """Return a law's amplitudes and further numbers; one that is not laid out is as uncertain as its grid is long."""
+        """Return a law's amplitudes and nonlinear parameters; without tangent, a parameter's uncertainty is the length of its grid."""
         member, law, start = self.member(name), self._law(name), self.columns_of(name).start
         own = slice(start, start + len(member.columns))
         found = values_of_law(law, member, self.values[own], self.covariance[own, own], METHOD_U_SHARE)
@@ -80,7 +80,7 @@ class DriveFit:
         return {n: v if np.isfinite(v.uncertainty) else replace(v, uncertainty=ends[n]) for n, v in found.items()}
 
     def at_end(self, name: str) -> dict[str, tuple[float, float]]:
-        """Return those numbers of a law that are at an end of their grid, with these ends."""
+        """Return a law's nonlinear parameters that are at a limit of their grid, with these limits."""
         law, found = self._law(name), self.parameters(name)
         grids = zip(law.parameters[len(law.plausible) :], law.grids, strict=True)
         ends = {shape: (grid[0], grid[-1]) for shape, grid in grids if len(grid) > 1}
@@ -95,7 +95,7 @@ class DriveFit:
         return found
 
     def force_n(self, names: Container[str] | None = None) -> Floats:
-        """Return the force of base and members at compared samples, shape (m,) [N]; None: all."""
+        """Return the force of base and members at compared samples, shape (m,) [N]; None for all members."""
         used = np.zeros(len(self.values), dtype=bool)
         used[: len(self.drive.channel.base.names)] = True
         for member in self.members:
@@ -132,9 +132,9 @@ def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> Floats:
 
 
 def _solved(rows: Floats, sd: Floats, noise: float) -> tuple[Floats, Floats]:
-    rows = triangle_of(rows)  # which says the same in as many rows as columns
+    rows = triangle_of(rows)  # equivalent, with as many rows as columns
     norm = np.linalg.norm(rows[:, :-1], axis=0)
-    norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere: its prior alone says what it is
+    norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere is determined only by its prior
     stacked = np.vstack([rows[:, :-1] / norm, np.diag(noise / sd / norm)])
     target = np.concatenate([rows[:, -1], np.zeros(len(sd))])
     u, s, vt = np.linalg.svd(stacked, full_matrices=False)
@@ -144,16 +144,16 @@ def _solved(rows: Floats, sd: Floats, noise: float) -> tuple[Floats, Floats]:
 
 
 def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> DriveFit:
-    """Return the fit for reported values, with conservative uncertainties.
+    """Return the fit for reported values, with cautious uncertainties.
 
-    Whitening emphasises force changes, where friction laws are least exact. Ordinary least squares is less sensitive
-    and is taken if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251,
+    Whitening emphasises changes of force, where friction laws are least exact. Ordinary least squares is more robust
+    and is used if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251,
     sec. 2], with coloured covariance [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
     """
     bank, sd = settled.bank, _prior_sd(drive, members)
     white = fit(drive, settled, members)
     rows = np.column_stack([white.samples, drive.channel.residual])
-    # Against priors a row counts as much as its noise lets it say of anything slow.
+    # Relative to priors, rows are weighted by their noise at low frequencies.
     counted = settled.noise.effective
     values, covariance = _solved(rows, sd, counted)
     covariance = covariance @ _information(settled, white.samples, sd, counted) @ covariance
@@ -164,7 +164,7 @@ def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -
 
 
 def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
-    """Return the greatest standardised difference of estimates.
+    """Return the greatest standardised difference between both estimates.
 
     Its variance is the difference of variances [Hausman 1978, corollary 2.6].
     """
@@ -180,7 +180,7 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
 
 
 def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise: float) -> DriveFit:
-    """Return the fit with uncertainties widened by omitted stretches and half the band.
+    """Return the fit with uncertainties widened by results without stretches and with half the bandwidth.
 
     Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
     1.5].
@@ -190,11 +190,11 @@ def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise
     others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(FOLDS))
     every = np.array([_solved(one, sd, noise)[0] for one in others])
     moves = (FOLDS - 1.0) / FOLDS * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
-    # Where a stretch alone shows a pulse, leaving it out says nothing.
+    # If only one stretch shows a pulse, its omission gives no information.
     everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(FOLDS)]).all(axis=0)
     variance = np.maximum(np.diag(fitted.covariance), 1e-300)
     wider = np.sqrt(np.where(everywhere, np.maximum(moves / variance, 1.0), 1.0))
-    # A value may lie anywhere between those of the two bands, and as far on the other side.
+    # A value may be anywhere between the results of both bands, or equally far on the other side.
     slow = _in_half_the_band(settled, fitted)
     wider = np.sqrt(
         wider**2 + np.maximum((slow.values - fitted.values) ** 2 - np.diag(slow.covariance), 0.0) / 3.0 / variance
@@ -203,14 +203,14 @@ def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise
 
 
 def _information(settled: Settled, samples: Floats, sd: Floats, counted: float) -> Floats:
-    """Return the covariance of columns' coloured noise with priors, shape (k, k).
+    """Return the covariance of columns times coloured noise, with priors, shape (k, k).
 
     Rows are divided by the square of the `counted` noise.
     """
     bank = settled.bank
     taken = samples
     if bank.whitening is not None:
-        # Noise is innovation times the inverse of the whitening, of which this is the transpose.
+        # Noise is the innovation times the inverse whitening; this is its transpose.
         taken = np.asarray(spsolve_triangular(bank.whitening.T.tocsr(), samples, lower=False))
     return np.asarray((settled.noise.innovation / counted**2) ** 2 * taken.T @ taken + np.diag(1.0 / sd**2))
 
@@ -239,8 +239,8 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
     found = {}
     for name, value in best.base.items():
         between = sum(p * (base[name].value - value.value) ** 2 for p, base in fits)
-        # A force that is the mean over as long as the differences loses what they lose, one at an instant nothing; which it is, or
-        # what lies between, no recording says [rectangular distribution: JCGM 100:2008, sec. 4.3.7].
+        # A force averaged over the span of the differences is attenuated like them, an instantaneous force is not.
+        # Recordings do not show which applies [rectangular distribution: JCGM 100:2008, sec. 4.3.7].
         lost = drive.recordings.lost_share / np.sqrt(3.0) if name == MASS else 0.0
         share = np.hypot(METHOD_U_SHARE, lost)
         sigma = float(np.sqrt(value.uncertainty**2 + between + (share * value.value) ** 2))

@@ -1,4 +1,4 @@
-"""Causes' gains in unused parts of recordings."""
+"""Gains of causes in held-out parts of recordings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> tuple[HeldOutForce, ChosenWithoutParts]:
-    """Hold back whole recordings if there are five, else ten stretches without the filter's reach."""
+    """Hold out whole recordings if there are five, else ten stretches with gaps for the filter."""
     channel = drive.channel
     parts = parts_of(channel)
     gap = int(np.ceil(GAP_PERIODS / drive.scale.cutoff_hz / drive.recordings.samples_apart_s))
@@ -55,7 +55,7 @@ def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> tuple[Held
 
 
 GAP_PERIODS = 0.5
-"""Periods of the cut-off about a part that are left out beside it: the impulse response of the low-pass is a tenth beyond."""
+"""Gap on each side of a part, in cut-off periods; beyond, the low-pass's impulse response is below a tenth."""
 
 
 def _error(settled: Settled, rows: Flags, in_time: Collection[str], without: Collection[str]) -> float:

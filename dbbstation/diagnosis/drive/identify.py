@@ -1,4 +1,4 @@
-"""The diagnosis of a drive: mass, friction, missing causes."""
+"""Diagnose a drive: mass, friction, missing causes."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ if TYPE_CHECKING:
     from dbbstation.trace.drive_recording import DriveRecording
 
 HELD_BACK = 0.25
-"""Share of the recordings, their end, that prediction is judged by."""
+"""Final share of the recordings, held out to judge predictions."""
 
 
 OFFSETS = frozenset({"load_n", "coulomb_asymmetry_n"})
-"""Parameters that shift the force of both directions alike."""
+"""Parameters that shift the force equally in both directions."""
 
 GRAVITY_M_S2 = 9.81
-"""Of weights that a constant load may be; a drive knows no hexapod, whose weights have the same."""
+"""Acceleration of gravity for constant loads, kept separate from the hexapod's [m/s²]."""
 
 
 @with_one_thread
@@ -71,16 +71,16 @@ def identify(
     """Identify a drive beyond mass and viscous friction.
 
     Args:
-        cutoff_hz: of the band; None: by the data.
-        hold_out: test on unused parts; doubles the time.
+        cutoff_hz: of the low-pass; None to choose it from the data.
+        hold_out: whether to test on held-out parts, which doubles the time.
 
     Raises:
-        CalibrationError: the recordings carry no identification.
+        CalibrationError: the recordings do not suffice.
     """
     progress("speed and acceleration")
     put_together = recordings_of(recordings, cutoff_hz)
     progress("sets of causes")
-    with np.errstate(over="ignore", under="ignore"):  # sizes far out of range weigh nothing
+    with np.errstate(over="ignore", under="ignore"):  # very large or small sizes have zero weight
         explained = explain(put_together, sources, progress)
     before, after = explained.before, explained.after
     limits = limits_of(explained)
@@ -238,7 +238,7 @@ def _numbers(
     for member in after.members:
         if member.cause.name not in explained.drive.of_law:
             continue
-        # Whether it is a load or asymmetric friction, it is what the drive needs more one way than the other.
+        # Load or asymmetric friction: the additional force in one direction.
         found = after.parameters(member.cause.name)
         for parameter in OFFSETS & set(found):
             numbers["offset_n"] = _number(found[parameter], is_known=limits.reverses)
@@ -262,7 +262,7 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
                 elif parameter.name == "viscous_asymmetry_n_s_m":
                     wet[first + k] = sign
         own = fitted.weighted(wet, "N·s/m")
-        # What other hypotheses make of viscous friction they make of it in either direction.
+        # The change of viscous friction in other hypotheses applies to both directions.
         between = max(values[VISCOUS].uncertainty ** 2 - fitted.base[VISCOUS].uncertainty ** 2, 0.0)
         sides[side] = {VISCOUS: Value(own.value, float(np.sqrt(own.uncertainty**2 + between)), own.unit)}
         if dry.any():
@@ -340,4 +340,4 @@ def _curve(explained: ExplainedDrive) -> FrictionCurve:
 
 
 NEAR_ZERO = 0.01
-"""Share of the greatest speed at which the curve begins on either side of standstill."""
+"""Share of the greatest speed at which the curve starts on each side of standstill."""

@@ -1,4 +1,4 @@
-"""What recordings cannot determine: acceleration, speeds, reversals."""
+"""Find what recordings cannot determine, by their accelerations, speeds and reversals."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
 
 ACCELERATES = 5.0
-"""Root mean square of the acceleration, over its noise, from which the mass can be determined."""
+"""Least ratio of the acceleration's rms to its noise that determines the mass."""
 
 VAGUE = 0.3
-"""Relative standard uncertainty above which a value is not known."""
+"""Relative standard uncertainty above which a value counts as unknown."""
 
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """What cannot be distinguished."""
+    """Parameters that cannot be distinguished."""
 
     accelerates: bool
     several_speeds: bool
@@ -34,7 +34,7 @@ class DriveLimits:
 def limits_of(explained: ExplainedDrive) -> DriveLimits:
     """Return the limits of the motion.
 
-    Coulomb friction must be significant beside mass, viscous friction and a delay, which ramps confuse.
+    Coulomb friction must be significant given mass, viscous friction and a delay, which ramps cannot separate.
     """
     recordings, bank = explained.drive.recordings, explained.settled.bank
     acceleration = recordings.motion[:, 0]

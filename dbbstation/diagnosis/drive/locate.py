@@ -1,4 +1,4 @@
-"""Where a misfit stands out in time and travel."""
+"""Locate a misfit in time and travel."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 
 
 SMOOTHED = 5
-"""Samples that are averaged before they are looked at; so many below the limit do not end a stretch."""
+"""Samples averaged before the test; so many below the limit do not end a stretch."""
 
 SLOW = 0.1
-"""Share of the greatest speed below which a stretch lies at a reversal or stop."""
+"""Share of the greatest speed below which a stretch counts as reversal or stop."""
 
 
 def locate(
     recordings: Recordings, residual_n: Floats, noise: Coloured, variable: str | None
 ) -> tuple[ForceLocation, ...]:
-    """Return stretches of a residual, shape (m,) [N], beyond noise, largest share first, with variable."""
+    """Return the stretches of a residual, shape (m,) [N], beyond noise, largest share first, and their variable."""
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
     together = min(noise.correlation_samples, float(SMOOTHED))
     threshold = COUNTS_SIGMA * noise.sigma * np.sqrt(together / SMOOTHED)

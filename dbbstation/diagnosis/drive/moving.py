@@ -1,12 +1,12 @@
-"""Weights of a recording's samples in the comparison, and their effect on noise.
+"""Weights of samples in the comparison, and their effect on noise.
 
-Friction at standstill is a reaction that no law determines. If a sum of columns holds wherever a weight is nonzero, it
-also holds for low-passed weighted columns,
+Friction at standstill is a reaction force without a law. If F is a sum of columns wherever the weight w is nonzero, the
+equation also holds for low-passed weighted columns,
 
 h * (w F) = sum of theta_k h * (w phi_k),
 
-exactly, whatever the force at w = 0. Divided by h * w this is a local mean over moving samples. [Normalized
-convolution: Knutsson and Westin, Normalized and differential convolution, CVPR 1993, 515, eq. 4]
+for any force at w = 0. Divided by h * w, each term is a local mean over moving samples. [Normalized convolution:
+Knutsson and Westin, Normalized and differential convolution, CVPR 1993, 515, eq. 4]
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
 ORDER = 4
-"""Of the Butterworth filters; twice that after both passes."""
+"""Order of the Butterworth filters; doubled by both passes."""
 
 POSITION_BAND = 2.0
-"""Cut-off of the position's filter over that of the comparison: it must be flat where force and model are compared."""
+"""Cut-off of the position's filter over the comparison's cut-off, so it is flat in the compared band."""
 
 EDGE_PERIODS = 3.0
-"""Periods of the cut-off over which the filters ring."""
+"""Duration of the filters' ringing, in cut-off periods."""
 
 
 def low_passed(columns: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
@@ -55,7 +55,7 @@ def speed_noise_m_s(noise_m: float, rate_hz: float, half: int) -> float:
 
 
 def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -> int:
-    """Return the half-width of the shortest window with allowed slope noise, at most `most`."""
+    """Return the half-width of the shortest window with permitted slope noise, at most `most`."""
     fine = (half for half in range(1, most) if speed_noise_m_s(noise_m, rate_hz, half) <= allowed_m_s)
     return next(fine, most)
 
@@ -68,7 +68,7 @@ def within(marked: Flags, by: int) -> Flags:
 
 
 def weights(unknown: Flags, rise: int) -> Floats:
-    """Return weights, shape (n,): zero at unknown forces, rising to one."""
+    """Return weights, shape (n,): zero for unknown forces, with gradual rise to one."""
     if not unknown.any():
         return np.ones(len(unknown))
     away = np.asarray(distance_transform_edt(~unknown), dtype=np.float64)
@@ -76,12 +76,12 @@ def weights(unknown: Flags, rise: int) -> Floats:
 
 
 def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
-    """Return the rise that limits edge noise in the acceleration."""
+    """Return the length of this rise that limits edge noise in the acceleration."""
     response = impulse_response(rate_hz, cutoff_hz)
     at = np.arange(len(response)) - len(response) // 2
     own, unit = _of_second_difference(response), noise_m * rate_hz**2
     for rise in range(most):
-        # The edge lies in the middle of the band: nowhere else it matters more.
+        # The edge is assumed in the middle of the filter's response, the worst case.
         edge = weights(at <= -((rise + 1) // 2), rise)
         if unit**2 * (_of_second_difference(response * edge) - own) <= allowed_m_s2**2:
             return rise

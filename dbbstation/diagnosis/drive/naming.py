@@ -1,4 +1,4 @@
-"""Members' causes, and when they act."""
+"""The causes of members, and whether they are single events."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Pattern
 
 COULOMB, COGGING, TRANSIENT = "coulomb-friction", "cogging", "transient-force"
-"""Causes of which more is said than what their laws say: what one speed tells, waves over the position, stretches of time."""
+"""Causes with additional results: friction at one speed, waves over position, stretches of time."""
 
 DRIFT = "friction-drift"
 
 
 def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -> str:
-    """Return a member's source; empty if none."""
+    """Return a member's source; empty for patterns."""
     if name in drive.of_law:
         return drive.of_law[name][0].name
     pattern = patterns.get(name)
@@ -34,5 +34,5 @@ def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -
 
 
 def acts(source: str) -> Acts:
-    """Return whether a cause acts once: forces in time and drift."""
+    """Return whether a cause is a single event, as forces in time and drift."""
     return Acts.ONCE if source in {TRANSIENT, DRIFT} else Acts.ALWAYS

@@ -1,4 +1,4 @@
-"""Physics of a user's own, written for any table, as a cause of force."""
+"""A user's table source as a cause of force."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def drive_columns(signals: Signals) -> dict[str, Floats]:
-    """Return what physics may be computed from, shape (n,) each, at all samples of a recording.
+    """Return the columns available to a source, shape (n,) each, for all samples of a recording.
 
     `direction` is +1, -1, or 0 at standstill; `since_reversal_mm` is infinite before the first reversal.
     """
@@ -37,11 +37,11 @@ COLUMNS = {
     "direction": "speed",
     "since_reversal_mm": "travel since reversal",
 }
-"""Names of these columns, and of the variables that they stand for."""
+"""Names of these columns, and of their variables."""
 
 
 def own_force(source: TableSource) -> DriveSource:
-    """Return a source whose columns are forces [N], each a column of `COLUMNS` or computed from these."""
+    """Return a cause of force [N] from a source that uses `COLUMNS`."""
     shapes = [p.name for p in source.parameters() if p.grid]
 
     def columns(signals: Signals, values: tuple[float, ...]) -> Floats:
@@ -50,14 +50,14 @@ def own_force(source: TableSource) -> DriveSource:
         return np.asarray(source.columns(given, dict(zip(shapes, values, strict=True))), dtype=np.float64)
 
     class OwnForce(DriveSource):
-        """The same as a cause of force."""
+        """The source as a cause of force."""
 
         name = source.name
         varies_with = COLUMNS[source.follows or source.needs[0]]
         texts = source.texts
         form_uncertainty = source.form_uncertainty
 
-        def forms(self, scale: Scale) -> tuple[DriveForm, ...]:  # noqa: ARG002 - it states sizes itself
+        def forms(self, scale: Scale) -> tuple[DriveForm, ...]:  # noqa: ARG002 - the source states sizes itself
             return (DriveForm(source.parameters(), columns),)
 
     return OwnForce()

@@ -1,4 +1,4 @@
-"""Pulses and steps of a force as levels between edges."""
+"""Pulses and steps of a force, as levels between edges."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.recordings import Recordings
 
 APART = 4.0
-"""Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""
+"""Standard uncertainties by which levels must differ to be distinct: one in 15,000 by chance."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Edges:
     """Edges of stretches.
 
     Attributes:
-        at_turns: at starts, stops or reversals.
-        share: of time there, strictly between 0 and 1.
+        at_turns: number at starts, stops or reversals.
+        share: part of time at these, strictly between 0 and 1.
     """
 
     count: int
@@ -42,7 +42,7 @@ class Edges:
 
     @property
     def pushed(self) -> float:
-        """Return the probability that edges ignore the motion, against a wrong law at turns.
+        """Return the probability that edges are independent of motion, instead of errors of a law at turns.
 
         Binomial likelihood, uniform prior; prior odds of a wrong law are one in twenty.
         """
@@ -54,11 +54,11 @@ class Edges:
 
 
 def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
-    """Return where stretches of time begin and end."""
+    """Return the edges of stretches of time."""
     times = np.array([edge for part in parts for edge in part.t_s or ()])
     times = times[(times > recordings.time_s[0]) & (times < recordings.time_s[-1])]
     every = np.concatenate([one.turns[one.kept[0] : one.kept[-1]] for one in recordings.signals])
-    # What no sample shows may still be: the rule of succession [Laplace 1814].
+    # Rule of succession for events without samples [Laplace 1814].
     share = (float(every.sum()) + 1.0) / (len(every) + 2.0)
     return Edges(len(times), int(np.sum(_at_turns(recordings, times))), share)
 
@@ -89,9 +89,9 @@ def _sizes_of(parts: Sequence[CausePart]) -> list[Value]:
 
 
 def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> Complement | None:
-    """Return opposite stretches between two or more equal pulses, or None."""
+    """Return the inverse description of two or more equal pulses, or None."""
     equal = [part for part in equal_pushes(parts) if part.t_s is not None]
-    if len(equal) < 2:  # noqa: PLR2004 - one pulse and the rest of the time say nothing of each other
+    if len(equal) < 2:  # noqa: PLR2004 - one pulse has no inverse
         return None
     size = pooled([part.parameters["force_n"] for part in equal])
     edges = [first_s, *(t for part in equal for t in part.t_s or ()), last_s]
@@ -100,8 +100,8 @@ def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> 
 
 
 def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePart]:
-    """Return stretches whose force differs from their surroundings."""
-    # Neighbouring levels have most of their uncertainty in common, which factors for each of them would not know.
+    """Return the stretches whose force differs from the surrounding force."""
+    # Neighbouring levels share most of their uncertainty, so they need a common factor.
     settled, recordings = explained.settled, explained.drive.recordings
     after, apart, times = (
         fit(explained.drive, settled, settled.best.members),
@@ -153,7 +153,7 @@ def _peak(
     values: Floats,
     differ: Callable[[Floats, Floats], bool],
 ) -> tuple[float, float, Floats] | None:
-    """Return the shortest outstanding level and its height, its surroundings merged; or None."""
+    """Return the shortest significant level and its height over the merged surroundings; or None."""
     found: list[tuple[float, int]] = []
     for k in range(1, len(levels) - 1):
         before, own, behind = (level for *_, level in levels[k - 1 : k + 2])

@@ -1,4 +1,4 @@
-"""Recordings of one drive, concatenated in one band."""
+"""Recordings of one drive, concatenated with a common low-pass."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ if TYPE_CHECKING:
     from dbbstation.trace.drive_recording import DriveRecording
 
 DISSIPATES_SIGMA = 5.0
-"""Standard deviations below zero from which on it is no chance that a drive would take power out of its friction."""
+"""Standard deviations below zero at which negative dissipation is significant."""
 
 AGAINST = 0.3
-"""Correlation with the speed, less than nothing, from which on a wrong sign shows: a tenth of the force's square. Less is what a
-delay of one channel does to a drive that has hardly any friction."""
+"""Negative correlation with speed that proves a wrong sign: a tenth of the squared force. A delay in a drive with
+little friction causes less."""
 
 EACH_WAY = 0.05
-"""Share of the samples that must be travelled in each direction for what differs by direction to be said: with fewer it is said of a
-stop, an overshoot, or what filters make of these."""
+"""Least share of samples in each direction for direction-dependent results; with fewer they would describe stops,
+overshoots or filter artefacts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """One drive, recorded once or several times."""
+    """One or several recordings of one drive."""
 
     names: tuple[str, ...]
     signals: tuple[Signals, ...]
 
     def compared(self, columns: Callable[[Signals], Floats]) -> Floats:
-        """Return band columns at compared samples of all recordings, (m,) or (m, p)."""
+        """Return low-passed columns at compared samples of all recordings, (m,) or (m, p)."""
         return np.concatenate([one.compared(columns(one)) for one in self.signals])
 
     def at(self, values: Callable[[Signals], Floats]) -> Floats:
@@ -57,24 +57,24 @@ class Recordings:
 
     @cached_property
     def force_n(self) -> Floats:
-        """Return the band force, shape (m,) [N]."""
+        """Return the low-passed force, shape (m,) [N]."""
         return self.compared(lambda s: s.force_n)
 
     @cached_property
     def motion(self) -> Floats:
-        """Return band acceleration [m/s²] and speed [m/s] from the unfiltered position, shape (m, 2)."""
+        """Return low-passed acceleration [m/s²] and speed [m/s], shape (m, 2), from the unfiltered position."""
         return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
 
     @cached_property
     def lost_share(self) -> float:
-        """Return the acceleration's loss by finite differences, (w h)²/12 and (2 w h)²/12 over one and two samples."""
+        """Return the acceleration's relative loss by differences over one and two samples, (w h)²/12 and (2 w h)²/12."""
         over_one = self.motion[:, 0]
         over_two = self.compared(lambda s: acceleration_over_two(s.measured_m, s.rate_hz))
         return max(float(over_one @ (over_one - over_two)) / 3.0 / max(float(over_one @ over_one), 1e-300), 0.0)
 
     @cached_property
     def edge_noise_n(self) -> Floats:
-        """Return excess force noise at weight edges, shape (m,) [N]: acceleration noise times estimated mass."""
+        """Return the excess force noise at edges of weights, shape (m,) [N]: acceleration noise times estimated mass."""
         direction = self.compared(lambda s: s.direction)
         mass = np.linalg.lstsq(np.column_stack([self.motion, direction]), self.force_n, rcond=None)[0][0]
         return np.asarray(abs(float(mass)) * np.concatenate([one.edge_noise_m_s2 for one in self.signals]))
@@ -106,7 +106,7 @@ class Recordings:
 
     @cached_property
     def least_way(self) -> float:
-        """Return the smaller direction's share of samples."""
+        """Return the rarer direction's share of samples."""
         way = self.at(lambda s: s.direction)
         return float(min(np.mean(way > 0.0), np.mean(way < 0.0)))
 
@@ -117,12 +117,12 @@ class Recordings:
         return float(np.median(np.diff(one.kept))) / one.rate_hz
 
     def step_response(self, since: Floats) -> Floats:
-        """Return the band's step response by samples since the step."""
+        """Return the low-pass's step response, over samples since the step."""
         return np.interp(since * self.samples_apart_s, *self._response)
 
     @cached_property
     def response_reach(self) -> float:
-        """Return samples until the step response is constant."""
+        """Return the number of samples until the step response is constant."""
         since, _ = self._response
         return float(np.abs(since[[0, -1]]).max()) / self.samples_apart_s
 
@@ -141,10 +141,10 @@ class Recordings:
 
 
 def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None = None) -> Recordings:
-    """Filter all recordings to the narrowest of their bands.
+    """Filter all recordings with the lowest of their cut-offs.
 
     Raises:
-        CalibrationError: as `signals_of`; or force contradicts motion.
+        CalibrationError: as `signals_of`, or force contradicts motion.
     """
     signals = tuple(signals_of(recording, cutoff_hz) for recording in recordings)
     lowest = min(one.cutoff_hz for one in signals)
@@ -158,9 +158,9 @@ def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None 
 
 
 def _refuse_wrong_sign(one: Recordings) -> None:
-    """Refuse an inverted force.
+    """Refuse a force with wrong sign.
 
-    Without inertia, load and spring, force and speed agree on average by friction.
+    After removal of inertia, load and spring, friction makes force and speed positively correlated.
     """
     force, speed = one.force_n, one.motion[:, 1]
     if not one.scale.reverses:

@@ -1,4 +1,4 @@
-"""Even sampling of jittered, rounded or interrupted recordings."""
+"""Resample jittered, rounded or interrupted recordings evenly."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from dbbstation.trace.drive_recording import DriveRecording
 
 EVEN = 0.02
-"""Deviation of a stamp from even steps, in steps, that does not matter."""
+"""Negligible deviation of time stamps from even steps, in steps."""
 
 GAP = 3.5
-"""A step longer than so many usual ones is a gap: nothing can be said of what happened in it."""
+"""Longer steps, in usual steps, are gaps with unknown events."""
 
 FEWEST = 100
-"""Samples without a gap that a recording needs."""
+"""Fewest gapless samples of a recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +36,10 @@ class Even:
 
 
 def evenly_sampled(recording: DriveRecording) -> Even:
-    """Return the longest gapless stretch, interpolated if uneven beyond the last printed digit.
+    """Return the longest gapless stretch, interpolated if uneven beyond the rounding of times.
 
     Raises:
-        CalibrationError: fewer than a hundred samples stand together without a gap.
+        CalibrationError: fewer than a hundred gapless samples.
     """
     notes: list[str] = []
     steps = np.diff(recording.t_s)
@@ -54,7 +54,7 @@ def evenly_sampled(recording: DriveRecording) -> Even:
             where=recording.name,
             remedy="record for longer, ten strokes to and fro at several speeds",
         )
-    if len(edges) > 2:  # noqa: PLR2004 - begin and end alone are no gap
+    if len(edges) > 2:  # noqa: PLR2004 - only start and end: no gap
         notes.append(
             f"{len(edges) - 2} gaps in the time stamps; the longest stretch without one is used, "
             f"{t[0]:g} to {t[-1]:g} s, {len(t)} of {len(recording)} samples"
@@ -74,7 +74,7 @@ def evenly_sampled(recording: DriveRecording) -> Even:
 
 
 def _printed_resolution(t: Floats) -> float:
-    """Return the stamps' printed resolution down to a microsecond [s]; zero if finer."""
+    """Return the rounding step of times, down to a microsecond [s]; zero if finer."""
     for digits in range(7):
         if np.abs(t - np.round(t, digits)).max() < 1e-3 * 10.0**-digits:
             return float(10.0**-digits)

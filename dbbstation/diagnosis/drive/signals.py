@@ -1,10 +1,10 @@
-"""Speed and acceleration from position, in the band of comparison.
+"""Compute low-passed speed and acceleration from position.
 
 Inverse dynamic identification by least squares: zero-phase low-pass, central differences, and a common second low-pass
 with decimation for force and columns. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot,
 Vandanjon and Gautier, A generic instrumental variable approach for industrial robot identification, IEEE TCST 22
-(2014), sec. II-C] Force also passes the position's filter, so edges beyond the band cancel. Friction reverses at once,
-so speed is computed at full rate. Samples at standstill or with stuck force have zero weight.
+(2014), sec. II-C] The position's filter is also applied to force, so filter effects at edges cancel. Friction reverses
+suddenly, so speed is computed at full rate. Samples at standstill or with stuck force have zero weight.
 """
 
 from __future__ import annotations
@@ -39,41 +39,41 @@ if TYPE_CHECKING:
     from dbbstation.trace.drive_recording import DriveRecording
 
 PER_CUTOFF = 2.5
-"""Samples that are kept per period of the cut-off."""
+"""Samples kept per period of the cut-off."""
 
 WIDEST = 1 / 20
-"""Widest band that is chosen, of the sampling rate: the differences lose a hundredth of the acceleration there."""
+"""Highest chosen cut-off over the sampling rate; there the differences lose a hundredth of the acceleration."""
 
 HIGHEST_HZ = 100.0
-"""Widest band that is chosen however fast the sampling: above it a drive is no rigid mass any more."""
+"""Highest chosen cut-off at any sampling rate: above, a drive is not a rigid mass."""
 
 NOISE_SHARE = 0.03
-"""Noise of the acceleration over the acceleration itself, in the band that is chosen. Noise in it makes the mass too
-small by the square of this, a thousandth."""
+"""Ratio of acceleration noise to acceleration in the chosen band. Noise makes the mass too small by its square, a
+thousandth."""
 
 MOVING_SHARE = 0.005
-"""Speed, of the greatest, below which the drive counts as standing: friction has no known value there. Noise of the speed is kept
-below a third of it, or it is raised to three times that noise."""
+"""Speed over the greatest below which the drive counts as stationary, with unknown friction. Speed noise is kept below
+a third of it, or it is raised to three times the noise."""
 
 SURE_SIGMA = 3.0
-"""Standard deviations of its noise by which a speed that counts is above zero: one sample in 700 of a standing drive moves by chance."""
+"""Standard deviations of noise above zero of a moving speed: one sample in 700 of a stationary drive moves by chance."""
 
 ACCELERATING_SHARE = 0.1
-"""Acceleration, of the greatest, above which the drive counts as accelerating."""
+"""Acceleration over the greatest above which the drive counts as accelerating."""
 
 LEAST_SHARE = 0.5
-"""Share of the band about a sample that has weight, from which on it is compared: below it the mean is of less than half, and noise of
-the force is more than half as large again."""
+"""Least weighted share about a compared sample; with less the mean covers less than half, and force noise is more than
+half as large again."""
 
 SLOW_HZ = 5.0
-"""Band that strokes of a second need, for friction if not for the mass: slow recordings get up to it."""
+"""Cut-off that strokes of a second need at least for friction; slow recordings receive at most this."""
 
 MOST = 4000
-"""Samples that are compared, at the most: a long recording says more of slow things, not of faster ones. What looks for pulses and
-waves takes grows with the square of them; half a minute keeps the widest band of 1000 samples a second."""
+"""Most compared samples. Longer recordings add information on slow effects only, and searches for pulses and waves need
+time with their square. Half a minute keeps the widest band of 1000 samples per second."""
 
 FEWEST = 60
-"""Samples in the band that an identification needs."""
+"""Fewest compared samples of an identification."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +81,11 @@ class Signals:
     """An evenly sampled recording with derivatives and compared samples.
 
     Attributes:
-        position_m: by a local parabola.
+        position_m: smoothed by local parabolas.
         acceleration_m_s2: of the low-passed position.
         cutoff_hz: of the band.
-        standing_m_s: speed of standstill.
-        way: direction between turning points, +1 or -1, shape (n,).
+        standing_m_s: limit of standstill.
+        way: direction of travel between turning points, +1 or -1, shape (n,).
         weight: zero for unknown forces, shape (n,).
         kept: compared samples, shape (m,).
     """
@@ -124,7 +124,7 @@ class Signals:
 
     @cached_property
     def direction(self) -> Floats:
-        """Return direction of travel, shape (n,); zero at standstill and for contrary noise."""
+        """Return the direction of travel, shape (n,); zero at standstill and if noise contradicts it."""
         return np.where(self.speed_m_s * self.way > self.standing_m_s, self.way, 0.0)
 
     @cached_property
@@ -145,7 +145,7 @@ class Signals:
 
     @cached_property
     def turns(self) -> Flags:
-        """Return starts, stops and reversals with half a band period around, shape (n,)."""
+        """Mark starts, stops and reversals, with half a cut-off period on each side, shape (n,)."""
         acceleration = np.abs(self.acceleration_m_s2)
         changing = (self.direction == 0.0) | (acceleration > ACCELERATING_SHARE * acceleration.max())
         stretch, _ = label(changing)
@@ -157,7 +157,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     """Prepare a recording.
 
     Args:
-        cutoff_hz: None: by the data.
+        cutoff_hz: None to choose it from the data.
 
     Raises:
         CalibrationError: too short, no motion, dead or saturated force, or unsuitable cut-off.
@@ -187,7 +187,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     step = max(int(rate / (PER_CUTOFF * cutoff)), 1)
     smooth = sosfiltfilt(butter(ORDER, POSITION_BAND * cutoff, fs=rate, output="sos"), position)
     slow, acceleration = derivatives(smooth, rate)
-    # White noise of a power per hertz, up to half of the sampling rate.
+    # White noise: power per hertz up to half the sampling rate.
     noise_m, standing_m_s = float(np.sqrt(0.5 * floor * rate)), MOVING_SHARE * float(np.abs(slow).max())
     half = half_window(noise_m, rate, standing_m_s / SURE_SIGMA, max(step // 2, 1))
     standing_m_s = max(standing_m_s, SURE_SIGMA * speed_noise_m_s(noise_m, rate, half))
@@ -201,7 +201,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     turned = speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
     standing[1:] |= turned
     standing[:-1] |= turned
-    # As far as the speed was read from a standing drive its size and sign are not those of one that moves.
+    # Near standstill, the smoothed speed is not the speed of a moving drive.
     allowed = NOISE_SHARE * float(np.sqrt(np.mean(acceleration**2)))
     weight = weights(within(standing, half) | stuck, rise_of_weights(noise_m, rate, cutoff, allowed, step))
     kept = np.arange(edge, len(position) - edge, step)
@@ -246,11 +246,11 @@ def _rests(standing: Flags, force_n: Floats, rate_hz: float, step: int) -> list[
 
 
 RESTS = 10
-"""Samples of the comparison from which on a standstill is a rest and no reversal."""
+"""Fewest compared samples of a rest; a shorter standstill is a reversal."""
 
 
 def derivatives(position_m: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Return speed [m/s] and acceleration [m/s²] by central differences, shape (n,) each, the latter zero at ends."""
+    """Return speed [m/s] and acceleration [m/s²] by central differences, shape (n,) each; acceleration is zero at ends."""
     acceleration = np.zeros_like(position_m)
     acceleration[1:-1] = (position_m[2:] - 2.0 * position_m[1:-1] + position_m[:-2]) * rate_hz**2
     return np.gradient(position_m, 1.0 / rate_hz), acceleration
@@ -279,7 +279,7 @@ def _acceleration_noise(floor: float, cutoff_hz: float | Floats) -> float | Floa
 
 
 def _chosen_cutoff(position_m: Floats, rate_hz: float, floor: float) -> float:
-    """Return the widest band with significant acceleration [Hz], else that of a hundred samples."""
+    """Return the highest cut-off with significant acceleration [Hz], else the cut-off of a hundred samples."""
     frequency, power = _spectrum(position_m, rate_hz)
     widest = min(rate_hz * WIDEST, HIGHEST_HZ)
     tried = np.geomspace(min(2.0, 0.5 * widest), widest, 40)
@@ -292,6 +292,6 @@ def _chosen_cutoff(position_m: Floats, rate_hz: float, floor: float) -> float:
     seconds = np.count_nonzero(moving > MOVING_SHARE * moving.max()) / rate_hz
     needed = (2.0 * FEWEST / PER_CUTOFF + 2.0 * EDGE_PERIODS) / max(seconds, 1.0 / rate_hz)
     chosen = float(tried[good[-1]]) if len(good) else min(widest, max(needed, SLOW_HZ))
-    # A slow recording would leave too few samples in a band that its differences follow to a hundredth, a long one too many.
+    # With exact differences, slow recordings would have too few samples, long ones too many.
     most = max(MOST / (PER_CUTOFF * seconds), min(needed, SLOW_HZ)) if seconds > 0.0 else chosen
     return float(min(max(min(chosen, most), min(needed, SLOW_HZ)), rate_hz / (2.5 * POSITION_BAND)))

@@ -249,7 +249,9 @@ def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
         return
     for run in runs:
         found = figures(run.raw)
-        rough = np.diff(run.raw.length_mm, 2) / np.sqrt(6.0)  # noise alone, because second differences of smooth values vanish
+        rough = np.diff(run.raw.length_mm, 2) / np.sqrt(
+            6.0
+        )  # noise alone, because second differences of smooth values vanish
         limit = max(CENTRED_SIGMA * float(np.sqrt(2.0 * np.mean(rough**2) / len(run.raw))), CENTRED_MM)
         if 1e-3 * found.centre_deviation_um > limit or 1e-3 * found.circularity_um < CENTRED_SHAPE * limit:
             return

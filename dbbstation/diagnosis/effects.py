@@ -1,4 +1,4 @@
-"""Each cause's effect on circles and workspace, and cured circles."""
+"""Effects of causes on circles and workspace, and circles after their correction."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Fitted
 
 GEOMETRY = "geometry"
-"""Name of the kinematic parameters as one cause: one calibration finds them, one compensation cures them."""
+"""Name of all kinematic parameters as one cause, because one calibration corrects them together."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,10 +40,10 @@ class CuredCircle(OfRun):
 
     Attributes:
         g_um: circular deviation of the cause alone.
-        centre_um: shift, X and Y, shape (2,).
-        measured_centre_um: less commanded, shape (2,).
-        cured_centre_um: without the cause, shape (2,).
-        effect_mm: on readings, shape (n,).
+        centre_um: shift of the centre, X and Y, shape (2,).
+        measured_centre_um: measured less commanded centre, shape (2,).
+        cured_centre_um: the same without the cause, shape (2,).
+        effect_mm: effect on readings, shape (n,).
     """
 
     g_um: float
@@ -65,7 +65,7 @@ class CauseEffect:
         verdict: empty for geometry or without diagnosis.
         g_u_um: standard uncertainty; None if unknown.
         centre_u_um: standard uncertainty; None if unknown.
-        workspace_um: rms tool shift over the workspace about a common shift; None if it follows more than the pose.
+        workspace_um: rms tool shift over the workspace, less the common shift; None if the cause depends on more than the pose.
         workspace_u_um: standard uncertainty; None if unknown.
     """
 
@@ -100,15 +100,15 @@ def effects_of(
     unseen: Floats | None = None,
     formula_variance: Floats | None = None,
 ) -> tuple[CauseEffect, ...]:
-    """Return causes' contributions, the greatest circular deviation first.
+    """Return the contributions of causes, the greatest circular deviation first.
 
     An effect is the reading with minus without the cause. Effects add to first order; circular deviations need not.
 
     Args:
         covariance: in products of units, shape (k, k); None if unknown.
-        unseen: undetermined combinations at plausible size, shape (h, k). If they dominate, the workspace uncertainty
+        unseen: undetermined combinations at plausible sizes, shape (h, k); if they dominate, the workspace uncertainty
             is unknown.
-        formula_variance: part by formulas, common to a source's amplitudes, shape (k,); or None.
+        formula_variance: part of the variances due to formulas, common to a source's amplitudes, shape (k,); or None.
 
     Raises:
         ModelError: a source needs missing data.
@@ -156,7 +156,7 @@ def effects_of(
 
 
 ROUNDING_MM = 1e-9
-"""Effects that are rounding [mm]."""
+"""Effects below this are rounding [mm]."""
 
 
 def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
@@ -171,7 +171,7 @@ def _groups(model: MachineModel) -> Iterator[tuple[str, tuple[Fitted, ...]]]:
     for name in names:
         own = tuple(f for f in model.sources if f.source.name == name)
         if any(f.source.found_compliance(model.machine, f.values) is not None for f in own):
-            # Without elastic struts nothing that loads them bends them.
+            # Without elastic struts, loads have no effect.
             own = (*own, *(f for f in model.sources if f.source.loads_struts and f not in own))
         yield name, own
 
@@ -200,7 +200,7 @@ def _of_formulas(group: Sequence[Fitted], variance: Floats) -> Floats:
 
 
 def _parted(group: Sequence[Fitted], changes: Floats) -> tuple[Floats, ...]:
-    """Return parameter changes, shape (p, r), by source."""
+    """Return parameter changes, shape (p, r), separated by source."""
     ends = np.cumsum([len(f.values) for f in group])
     return tuple(np.split(changes, ends[:-1]))
 
@@ -211,7 +211,7 @@ def _answers(
     group: Sequence[Fitted],
     roots: tuple[Floats, ...] | None,
 ) -> Floats | None:
-    """Return reading changes per independent direction of one standard deviation, shape (n, r) [mm]."""
+    """Return changes of the readings by independent parameter changes of one standard deviation, shape (n, r) [mm]."""
     if roots is None:
         return None
     total = np.zeros((len(reading.length_mm), roots[0].shape[1] if roots else 0))
@@ -251,7 +251,7 @@ def _u_of_mean(
     spread: Sequence[Floats | None],
     changed_um: Callable[[CuredCircle, list[Floats]], Floats],
 ) -> float | None:
-    """Return the standard uncertainty of a figure's mean over all runs, from what some lengths change of it; None if unknown."""
+    """Return the standard uncertainty of a figure's mean over all runs, from its changes by lengths; None if unknown."""
     found = []
     for circle, answers in zip(circles, spread, strict=True):
         if answers is None:
@@ -279,7 +279,7 @@ def _over_the_workspace(
     group: Sequence[Fitted],
     changes: tuple[tuple[Floats, ...] | None, tuple[Floats, ...] | None],
 ) -> tuple[float | None, float | None]:
-    """Return a cause's rms tool shift about a common one, with standard uncertainty [µm]; None: unknown."""
+    """Return a cause's rms tool shift less the common shift, with standard uncertainty [µm]; None if unknown."""
     if any(f.source.belongs_to is not Owner.MACHINE or not f.source.needs <= {Need.POSE} for f in group):
         return None, None
     motion = Motion(workspace(model.machine))

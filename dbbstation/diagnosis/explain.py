@@ -1,4 +1,4 @@
-"""Which sets of causes explain the recordings, refitted about the best."""
+"""Find the sets of causes that explain the recordings, relinearised about the best."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 GRID = 0.3
-"""Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
+"""Relative prior standard deviation of nonlinear parameters in a second try, about their grid spacing."""
 
 IDLE = 0.9
-"""Share of its prior standard deviation above which a nonlinear parameter is not determined: the runs say less than a quarter of what
-was known before."""
+"""A nonlinear parameter is undetermined if its uncertainty exceeds this share of the prior: the runs then contain less
+than a quarter of the prior's information."""
 
 
 def explain(
@@ -53,7 +53,7 @@ def explain(
     *,
     until_interrupted: bool = False,
 ) -> Explained:
-    """Compare sets of causes, freeing balls and bars that are certainly off."""
+    """Compare sets of causes; certainly displaced balls and wrong bars are freed."""
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
     before, outliers = calibrate_robust(fit, runs, balls=False)
@@ -67,13 +67,13 @@ def explain(
     if explained.settled.members and outliers and not explained.settled.stopped:
         belonging, staying = in_place_after_all(explained.settled.after, runs, outliers)
         if len(staying) < len(outliers):
-            del explained  # its columns fill as much memory as the next ones will
+            del explained  # free its columns before the next ones need as much memory
             return _with_set_up(fit, fit(belonging), staying, settle)
     return explained
 
 
 def without(explained: Explained, names: Collection[str]) -> Explained:
-    """Return the best hypothesis without these causes, with its joint fit."""
+    """Return the result with the best hypothesis without these causes, jointly fitted."""
     settled = explained.settled
     posterior = settled.posterior
     best = next((h for h in posterior.hypotheses if not h.names.intersection(names)), Hypothesis((), 0.0))
@@ -98,11 +98,11 @@ def _with_set_up(
         if step is None:
             return explained
         outliers, before = (*outliers, step[0]), step[2]
-        del channel, settled, explained  # their columns fill as much memory as the next ones will
+        del channel, settled, explained  # free their columns before the next ones need as much memory
 
 
 class _Settling:
-    """Compare, refine likely causes, fit jointly, until stable."""
+    """Compares sets, refines likely causes and fits jointly, until the result is stable."""
 
     def __init__(self, channel: CircleChannel, progress: Callable[[str], None]) -> None:
         self._channel, self._progress = channel, progress
@@ -113,10 +113,10 @@ class _Settling:
         self._tried: set[frozenset[tuple[str, str]]] = set()
         self._seeds: dict[frozenset[str], tuple[Member, ...]] = {}
         self._given_up: set[tuple[str, str]] = set()
-        self._likely = CLOSE  # the most probable set alone is wanted, until nothing changes
+        self._likely = CLOSE  # until the result is stable only the most probable set is needed
 
     def run(self, *, until_interrupted: bool) -> SettledCircles:
-        """Run until stable, or until interrupted.
+        """Run until the result is stable or an interruption comes.
 
         Raises:
             KeyboardInterrupt: in the first round, and in any if not `until_interrupted`.
@@ -128,12 +128,12 @@ class _Settling:
                 if self._is_done(settled):
                     break
                 self._likely = self._likely if left else LIKELY
-                del settled  # its products fill as much memory as the next ones will
+                del settled  # free its products before the next ones need as much memory
                 settled = self._compared()
         except KeyboardInterrupt:
             if not until_interrupted:
                 raise
-            # Columns that the round before had may have been given back: about the last fit the sets are compared once more.
+            # Columns of the previous round may be freed, so the sets are compared again about the last fit.
             stopped, settled = True, self._compared()
         return replace(_fitted_as_named(self._channel, settled), stopped=stopped)
 
@@ -208,13 +208,13 @@ def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
 
 
 def _by_other_laws(settled: SettledCircles, member: Member) -> list[Member]:
-    """Return a member by each other law of its cause: on its grid a law cannot stand up to one that is laid out."""
+    """Return a member with each other law of its cause, because a law on its grid cannot compete with a refined one."""
     scan = settled.comparison.scan(_lawful(settled.best, member.cause.name), other_laws(member))
     return [replace(one, cause=member.cause) for one in scan.best]
 
 
 def _lawful(best: Hypothesis, *but_for: str) -> tuple[Member, ...]:
-    """Return the members that a joint fit has. Unnamed effects are none: they fit a law's error at its start, and hold it there."""
+    """Return the members of a joint fit, without unnamed effects: these would fit a law's error at its start and preserve it."""
     return tuple(one for one in best.without(*but_for) if one.cause.named or one.cause.setup)
 
 
@@ -224,7 +224,7 @@ def _listed(
     comparison: ModelComparison,
     given_up: Collection[tuple[str, str]],
 ) -> tuple[Cause, ...]:
-    """Return the compared causes: named causes, set-up faults and unnamed effects. Abandoned laws are left out."""
+    """Return the causes to compare: named causes without abandoned laws, set-up faults and unnamed effects."""
     forms = [variant for cause in unmodelled.causes for variant in cause.variants]
     known = dict(zip(map(id, forms), named_already(comparison, forms, channel.forms()), strict=True))
     nameless = [cause for cause in map(partial(_but_for, known=known), unmodelled.causes) if cause.variants]
@@ -244,8 +244,8 @@ def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
 def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:
     """Return laws with undetermined nonlinear parameters and a simpler alternative.
 
-    Undetermined means at the range end or as uncertain as before. If no parameter of an unsettled fit is, all laws are
-    simplified.
+    Undetermined means at a limit, or as uncertain as the prior. If a fit without convergence has no such parameter, all
+    laws are simplified.
     """
     sigma, prior = np.sqrt(fit.solution.variance), fit.layout.known.prior
     idle, all_of_them = set(), set()
@@ -262,7 +262,7 @@ def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]
 
 
 def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> SettledCircles:
-    """Return the result with a joint fit of its own named causes, if rounds alternated."""
+    """Return the result with a joint fit of exactly its named causes, if rounds alternated."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     fitted = {term.source.name for term in settled.after.layout.terms} - base
     if fitted == {m.cause.name for m in settled.members}:
@@ -286,7 +286,7 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
     top = posterior.best.log_posterior
     for hypothesis in posterior.hypotheses:
-        if hypothesis.log_posterior < top - CLOSE:  # the exact fits of both would say the same of it
+        if hypothesis.log_posterior < top - CLOSE:  # exact fits would not change the decision
             break
         if frozenset((m.cause.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
             return hypothesis
@@ -305,7 +305,7 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
     }
     every = [*default_sources(), *(channel.source_of(m.cause.name, m.variant) for m in members)]
     for within in (None, GRID):
-        # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
+        # A hardly determined shape, such as a decay shorter than the sampling, diverges together with its amplitude.
         try:
             return calibrate(
                 channel.machine,

@@ -1,4 +1,4 @@
-"""The outcome of comparing circles."""
+"""Results of comparing causes of circles."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class SettledCircles:
 
     Attributes:
         after: joint fit of base and named causes.
-        posterior: about that fit.
-        target: of the comparison, shape (n,).
-        noise: beside all causes.
-        scatter: of balls in stated sizes.
-        stopped: interrupted.
+        posterior: relinearised about this fit.
+        target: target of the comparison, shape (n,).
+        noise: estimated with all causes.
+        scatter: of balls, in stated standard deviations.
+        stopped: whether interrupted.
     """
 
     after: Calibration
@@ -47,7 +47,7 @@ class SettledCircles:
     stopped: bool = False
 
     def second_start_agrees(self) -> bool:
-        """Return whether a search from nothing agrees."""
+        """Return whether a search without seeds agrees."""
         anew = search(self.comparison, self.causes, most_members=BOUNDS.members, likely=CLOSE)
         return anew.best.names == self.posterior.best.names
 
@@ -58,13 +58,13 @@ class SettledCircles:
 
     @property
     def noise_mm(self) -> float:
-        """Return white noise per sample of equal effect on smooth quantities [mm]."""
+        """Return the white noise per sample that affects smooth quantities equally [mm]."""
         return float(np.sqrt(self.noise.power[0]))
 
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """Everything that the comparison needs and found."""
+    """Inputs and results of the comparison."""
 
     before: Calibration
     outliers: tuple[Outlier, ...]

@@ -1,4 +1,4 @@
-"""Answers of a diagnosis: verdicts, places, values with uncertainty."""
+"""Results of a diagnosis: verdicts, places, values with uncertainty."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ class SourceFinding:
     Attributes:
         verdict: see docs/verdicts.md.
         concealed: share of squares absorbed by machine parameters.
-        stability: selection frequency over seven tenths of tests; None if not tried.
-        probability: given the catalogue; of its class if any.
-        equivalent: with itself; `class` in JSON.
-        log_evidence: the gain under its older name.
-        persists: a single event, confirmed by held-out tests.
+        stability: selection frequency in draws of seven tenths of tests; None if not computed.
+        probability: given the catalogue; for its class if it has one.
+        equivalent: equivalent causes, this one included; `class` in JSON.
+        log_evidence: the gain under its old name.
+        persists: whether held-out tests confirm a single event.
         sigmas: norm over standard deviation; 0 if outside the best set.
-        gains: held-out; None if not tested.
-        parameters: fitted; of an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
+        gains: held-out gains; None if not tested.
+        parameters: fitted values; for an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
     """
 
     name: str
@@ -76,11 +76,11 @@ class SourceFinding:
 
 @dataclass(frozen=True, kw_only=True)
 class Location:
-    """Where the misfit is large.
+    """A place of large misfit.
 
     Attributes:
-        theta_deg: from, to: from +X towards +Y.
-        strut: 1 to 6; None if no strut stands out.
+        theta_deg: first and last angle, from +X towards +Y.
+        strut: 1 to 6; None if no strut is significant.
         variable: None in JSON if it is empty.
         peak_um: greatest smoothed deviation.
     """
@@ -96,7 +96,7 @@ class Location:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def text(self) -> str:
-        """Return it in words."""
+        """Return the place in words."""
         first, last = self.theta_deg
         by = f", by {self.variable}" if self.variable else ""
         strut = f", strut {self.strut} most" if self.strut else ""
@@ -120,10 +120,10 @@ class Curve:
     Attributes:
         strut: 1 to 6; None for all struts or none.
         period: of a wave, in the variable's unit; else None.
-        direction: of strongest motion, 3 to 6 numbers by `convention`; empty for a scalar.
-        convention: removed part that fitted parameters can make.
-        unconcealed_um: beyond fitted machine parameters.
-        points: rising; straight or a wave between.
+        direction: of the strongest motion, 3 to 6 numbers by `convention`; empty for a scalar.
+        convention: removed part that fitted parameters can explain.
+        unconcealed_um: part that fitted machine parameters do not absorb.
+        points: ascending; linear or a wave in between.
     """
 
     follows: Follows
@@ -173,7 +173,7 @@ class Shift:
     """Bias of a kinematic parameter in the earlier calibration.
 
     Attributes:
-        before_um: without found sources.
+        before_um: value without found sources.
     """
 
     parameter: str
@@ -188,8 +188,8 @@ class NextTest:
     """A circle worth measuring next.
 
     Attributes:
-        source: to reveal or distinguish.
-        sigma_before: of its amplitude or most improved combination, with earlier tests.
+        source: cause to reveal or distinguish.
+        sigma_before: standard uncertainty of its amplitude, or most improved combination, with earlier tests.
     """
 
     text: str
@@ -209,16 +209,16 @@ class NextTest:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """Everything found.
+    """All results of a diagnosis.
 
     Attributes:
-        before: base fit.
+        before: fit of the base.
         held_out: prediction errors before and after [mm].
-        chosen_anew: without each group; None without causes or for few tests.
-        levels: existence, variables and cause of a difference [µm].
-        workspace: the calibration's error away from the tests; None without findings.
+        chosen_anew: gains with selection repeated without each group; None without causes or for few tests.
+        levels: existence, variables and law of a difference [µm].
+        workspace: the calibration's error over the workspace; None without findings.
         second_start_agrees: None if interrupted.
-        cancelling: [mm], or None.
+        cancelling: cancelling effects [mm], or None.
     """
 
     mismatch: bool

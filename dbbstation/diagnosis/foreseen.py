@@ -1,4 +1,4 @@
-"""Possible tests, and their information on base and causes."""
+"""Possible tests, with their information on base and causes."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
 WAITS_S = (0.0, 3600.0)
 FEEDS = (0.5, 2.0)
-"""Of what was measured, for sources that act while the machine moves; tried on upright circles with a level bar."""
+"""Tried feeds over the measured feed, for sources that depend on motion; only on upright circles with a level bar."""
 
 SPACING_S = 200.0
-"""From the start of a run to that of the next one [s]."""
+"""Time between the starts of successive runs [s]."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A proposed circle and its time after the last run."""
+    """A proposed circle, with its time after the last run."""
 
     circle: Circle
     wait_s: float
@@ -45,7 +45,7 @@ class Proposal:
 
     @property
     def text(self) -> str:
-        """Return what to do, in words."""
+        """Return the proposal in words."""
         x, y, z = (round(value) for value in self.circle.ball_mm)
         a, b, _ = self.circle.tilt_deg
         parts = [f"a circle about the ball at X {x} Y {y} Z {z} mm, tilted A {a:g} B {b:g} degrees"]
@@ -60,18 +60,18 @@ class Proposal:
 
 
 _Form: TypeAlias = tuple[str, str, tuple[float, ...], float]
-"""Name of a source, law that it follows, nonlinear parameters, wait before the run where it follows time [s]."""
+"""Name of a source, its law, nonlinear parameters, and waiting time before the run if it depends on time [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One direction of a proposal, its mounting removed.
+    """One direction of a proposal, with its mounting eliminated.
 
     Attributes:
         ball: orthonormal effects of ball shifts, shape (n, 3).
-        weight: of samples represented.
-        base: their rows, shape (n, t).
-        of_sources: amplitude rows by form and wait, shape (n, p).
+        weight: number of samples represented by a row.
+        base: rows over base columns, shape (n, t).
+        of_sources: rows over amplitudes, by form and waiting time, shape (n, p).
     """
 
     ball: Floats
@@ -92,7 +92,7 @@ class ForeseenTests:
         self._runs: dict[tuple[Circle, float, str], _Run] = {}
 
     def that_show(self, needs: Collection[Need]) -> list[Proposal]:
-        """Return circles about the plan's balls within reach."""
+        """Return reachable circles about the plan's balls that can show sources with these inputs."""
         seen: dict[str, Observation] = {}
         for observation in self.channel.observations:
             seen.setdefault(observation.setup.ball, observation)
@@ -127,7 +127,7 @@ class ForeseenTests:
         direction: Direction,
         asked: Sequence[tuple[ErrorSource, Variant]],
     ) -> Floats:
-        """Return a run's compressed rows on base and sources, shape (r, k), its new mounting removed."""
+        """Return a run's compressed rows over base and sources, shape (r, k), with its new mounting eliminated."""
         run = self._run(proposal, direction, asked)
         place = len(self.channel.base.prior)
         touched, parts = [run.touched], [run.base]
@@ -136,7 +136,7 @@ class ForeseenTests:
             seen = np.flatnonzero(np.any(own != 0.0, axis=0))
             touched.append(place + seen)
             parts.append(own[:, seen])
-            # A source of the measurement has further sets, of other sessions and mountings, which this run does not touch.
+            # Values of other sessions and mountings do not affect this run.
             place += len(variant.columns)
         triangle = np.linalg.qr(np.hstack(parts), mode="r")
         compressed = np.zeros((len(triangle), place))

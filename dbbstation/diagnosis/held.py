@@ -1,4 +1,4 @@
-"""Errors along directions that the fit keeps at nominal."""
+"""Uncertainty along directions that the fit holds at nominal."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def uncertainties(calibration: Calibration, held: Floats) -> Floats:
 def held_variance(calibration: Calibration, held: Floats) -> Floats:
     """Return every column's variance along held directions, shape (k,).
 
-    A source there may be as large as found or plausible, whichever is greater: a ball 70 µm off in visible directions
-    may be 20 µm off in others.
+    A source may have its found or plausible size there, whichever is greater: a ball displaced by 70 µm in determined
+    directions may be displaced by 20 µm in others.
     """
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
@@ -41,13 +41,13 @@ def held_variance(calibration: Calibration, held: Floats) -> Floats:
 
 
 def unseen(calibration: Calibration) -> Floats:
-    """Return undetermined orthonormal rows for the model file, shape (h, f)."""
+    """Return undetermined directions as orthonormal rows for the model file, shape (h, f)."""
     fitted = np.flatnonzero(~calibration.layout.known.random)
     return calibration.null_space[:, fitted] / calibration.layout.known.scale[fitted]
 
 
 def held_beside(before: Calibration, after: Calibration) -> Floats:
-    """Return directions held by the joint fit only, shape (h, f); the base's own are convention."""
+    """Return the directions that only the joint fit holds, shape (h, f); the base's directions are conventions."""
     wide = np.zeros((len(before.solution.held), after.solution.held.shape[1]))
     wide[:, : before.solution.held.shape[1]] = before.solution.held
     beyond = after.solution.held - (after.solution.held @ wide.T) @ wide
@@ -56,5 +56,5 @@ def held_beside(before: Calibration, after: Calibration) -> Floats:
 
 
 HALF = float(np.sqrt(0.5))
-"""Length that a direction must keep beside those of the base to be one of its own, and amplitudes of a source that must be seen
-for them to say how large the others are."""
+"""Least length of a separate direction after projecting out the base's directions, and least determined share of a
+source's amplitudes that gives the size of the others."""

@@ -1,4 +1,4 @@
-"""A law of stated physics as a candidate of a comparison."""
+"""Make a law of a comparison from stated physics."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def law_of(
     """Return a law.
 
     Args:
-        parameters: amplitudes, and nonlinear numbers with a `grid`.
-        columns: of each amplitude over all rows, shape (n, p), at values of the nonlinear numbers.
-        further: fields of `Law`.
+        parameters: amplitudes, and nonlinear parameters with a `grid`.
+        columns: function from nonlinear parameters to columns of amplitudes, shape (n, p).
+        further: other fields of `Law`.
     """
     amplitudes, shapes = [p for p in parameters if not p.grid], [p for p in parameters if p.grid]
     return Law(

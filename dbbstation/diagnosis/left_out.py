@@ -1,4 +1,4 @@
-"""Held-out tests: predictions, gains, and causes found again."""
+"""Held-out tests: prediction errors, gains, and selection frequencies."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
-    """Return predictions of held-out tests without and with named causes [mm]."""
+    """Return prediction errors of held-out tests without and with named causes [mm]."""
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
@@ -54,7 +54,7 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
 
 
 def predicted_without(explained: Explained, left_out: Sequence[Collection[str]]) -> list[float]:
-    """Return rms errors of held-out tests by base and causes, each time without some [mm]; a ball that is off stays so in its test."""
+    """Return rms errors of held-out tests with base and causes, once without each set [mm]; a displaced ball stays in its test."""
     channel, settled = explained.channel, explained.settled
     members = [m for m in settled.best.members if not m.cause.setup]
     variants = [member.variant for member in members]
@@ -76,7 +76,7 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
 
 
 def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
-    """Return gains of named causes and classes in groups of tests; None for too few, or without causes.
+    """Return the gains of named causes and classes in groups of tests; None for few tests or without causes.
 
     The reference is the kinematic calibration of the same tests.
     """
@@ -95,7 +95,7 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
 
 
 def found_again(explained: Explained, outcome: Settled, names: Sequence[str]) -> dict[str, float]:
-    """Return causes' shares of selections in seven tenths of tests; may be empty."""
+    """Return selection frequencies of causes in draws of seven tenths of tests; may be empty."""
     channel, settled = explained.channel, explained.settled
     if not settled.members:
         return {}
@@ -112,10 +112,10 @@ def found_again(explained: Explained, outcome: Settled, names: Sequence[str]) ->
 
 
 def widened_by_tests(calibration: Calibration) -> Calibration:
-    """Return the fit with the larger of own and jackknife uncertainty by tests.
+    """Return the fit with the larger of its uncertainties and jackknife uncertainties over tests.
 
-    Nothing is chosen anew; correlations [`widening`] and stated sizes of random effects are kept. Below `LEAST_PARTS`
-    groups nothing changes.
+    The selection, correlations [`widening`] and stated sizes of random effects do not change. With fewer than
+    `LEAST_PARTS` groups the fit does not change.
     """
     groups = groups_of(calibration.observations)
     if groups is None:
@@ -136,13 +136,13 @@ def widened_by_tests(calibration: Calibration) -> Calibration:
 
 
 def groups_of(observations: Sequence[Observation]) -> list[int] | None:
-    """Return each run's held-back group by test; None for too few."""
+    """Return each run's group of tests; None for too few tests."""
     groups = in_turn([o.test for o in observations], FOLDS)
     return groups if len(np.unique(groups)) >= LEAST_PARTS else None
 
 
 def _single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:
-    """Return a single sample's noise if low harmonics carry more than fine ones [mm]."""
+    """Return a single sample's noise if low harmonics have more noise than high ones [mm]."""
     samples = float(np.mean([len(o.raw) for o in observations]))
     low = min((2 * LOW + 1) / samples, 1.0)
     return float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))

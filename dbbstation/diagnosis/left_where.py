@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def where_left(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:
-    """Return size [µm] and place, in a sentence, of the largest residual."""
+    """Return a sentence on size [µm] and place of the largest residual."""
     worst = min((found.harmonic, found.run, found.pulse), key=lambda one: one.probability)
     size_um = 1e3 * worst.rms
     if worst is found.harmonic:

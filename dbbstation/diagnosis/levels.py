@@ -1,4 +1,4 @@
-"""Circles as an outcome of the generic channel, for levels and verdicts."""
+"""Present the circles' results as results of a generic channel, for answers and verdicts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class CircleBank(Bank):
-    """Columns of circles in white noise, already laid out."""
+    """Existing columns of circles, in white noise."""
 
     def __init__(self, rows: Channel, circles: CircleChannel, settled: SettledCircles) -> None:
         self.channel, self.patterns, self.laws = rows, {}, {law.name: law for law in rows.laws}
@@ -46,12 +46,12 @@ class CircleBank(Bank):
         return self._columns.of(columns)
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
-        """Return causes beside the base."""
+        """Return the causes with the base projected out."""
         return self._circles.beside_base(self.noise.sigma, self._scatter, but_for, only)
 
 
 def outcome_of(explained: Explained) -> Settled:
-    """Return the outcome of the circle comparison [mm]."""
+    """Return the circles' results as a generic outcome [mm]."""
     circles, settled = explained.channel, explained.settled
     base = circles.base
     rows = Channel(
@@ -113,10 +113,10 @@ def _law(explained: Explained, cause: Cause) -> Law:
 
 
 def circle_levels(explained: Explained, outcome: Settled, gains: KnownGains | None) -> Levels:
-    """Return the three levels of circles [µm]."""
+    """Return the three answers for circles [µm]."""
     found = levels_by_tests(outcome, _left(explained), gains).times(1e3)
     unmodelled = explained.settled.unmodelled.follows
-    # Of what moves no strut, all amplitudes together are no place.
+    # An effect on no strut has no strut as place, even with all amplitudes.
     nowhere = {name for name, follows in unmodelled.items() if not follows.moves_struts}
     follows = (replace(one, where=None) if nowhere.intersection(one.members) else one for one in found.follows)
     found = replace(found, follows=tuple(follows))
@@ -127,7 +127,7 @@ def circle_levels(explained: Explained, outcome: Settled, gains: KnownGains | No
 
 
 def _happened(outlier: Outlier) -> Followed:
-    """Return the class of a ball, bar or run kept out of the fit [µm]."""
+    """Return the class for a ball, bar or run excluded from the fit [µm]."""
     variable = {OutlierKind.RUN: RUN, OutlierKind.BAR: BAR}.get(outlier.kind, BALL)
     return Followed(
         ((variable,),), (), FollowsAnswer.HAPPENED, 1.0, {}, outlier.size_um, (), where=outlier.runs or outlier.test

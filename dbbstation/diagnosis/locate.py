@@ -1,4 +1,4 @@
-"""Where a misfit is: test, direction, angle, strut."""
+"""Locate a misfit by test, direction, angle and strut."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, levels: Levels) -> tuple[Location, ...]:
-    """Return the largest base misfits, the largest class's variable, and the struts of all classes."""
+    """Return the largest misfits of the base, the variable of the largest class, and the struts of all classes."""
     names = {member.cause.name for member in settled.members}
     fitted = [f for f in settled.after.model.sources if f.source.name in names]
     largest = max(levels.follows, key=lambda one: one.rms, default=None)
@@ -60,12 +60,12 @@ def locate(
     struts: Sequence[Floats | None],
     variable: str,
 ) -> tuple[Location, ...]:
-    """Return stretches beyond noise, largest share first."""
+    """Return the stretches beyond noise, largest share first."""
     smoothed = [smooth(r, np.radians(o.raw.phi_deg)) for o, r in zip(observations, residual_mm, strict=True)]
     total = sum(float(s @ s) for s in smoothed)
     found: list[Location] = []
     for observation, curve, strut in zip(observations, smoothed, struts, strict=True):
-        # Low-passing at harmonic 30 leaves 61 of n degrees of freedom in n samples.
+        # A low-pass at harmonic 30 leaves 61 degrees of freedom.
         threshold = COUNTS_SIGMA * noise_mm * np.sqrt(61.0 / len(curve))
         for start, stop in _stretches(np.abs(curve) > threshold):
             rows = np.arange(start, stop) % len(curve)
@@ -113,7 +113,7 @@ def _strut(contribution: Floats | None, rows: Integers) -> int | None:
 
 
 def _stretches(marked: Flags) -> list[tuple[int, int]]:
-    """Return begin and end of marked stretches of a ring; ends may exceed its length."""
+    """Return start and end of marked stretches on a closed turn; ends may exceed its length."""
     if marked.all():
         return [(0, len(marked))]
     if not marked.any():

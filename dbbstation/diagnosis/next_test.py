@@ -1,4 +1,4 @@
-"""The fewest tests that change an open verdict or halve an uncertainty."""
+"""Propose the fewest tests that change an open verdict or halve an uncertainty."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 PROPOSED = frozenset({Need.POSE, Need.PATH, Need.TIME})
-"""What is known of a test before it is measured."""
+"""Inputs known before a test is measured."""
 
 HALVED = 0.5
-"""Share of an uncertainty that tests must come down to where they change no verdict. Repeating every test once gives 0.7."""
+"""If tests cannot change a verdict, they must reduce an uncertainty to this share; repeating every test once gives 0.7."""
 
 
 @with_one_thread
 def next_tests(
     explained: Explained, findings: Sequence[SourceFinding], elsewhere: WorkspaceError | None
 ) -> tuple[NextTest, ...]:
-    """Return the best tests for the first open cause, against its rivals.
+    """Return the best tests for the first open cause and its rivals.
 
     An identified cause is open if the workspace remains more uncertain than corrected.
     """
@@ -59,7 +59,7 @@ def next_tests(
         others = [causes[name] for name in dict.fromkeys(asked) if name not in found]
         scan = settled.comparison.scan(settled.best.members, others)
         forms = found | {m.cause.name: channel.whole(m.cause.name, m.variant) for m in scan.best}
-        # Nobody knows what a thermometer would show in a test to come: what follows one is taken as known.
+        # Future temperatures are unknown, so effects by thermometers are assumed known.
         beside = [(channel.source_of(name, forms[name]), forms[name]) for name in dict.fromkeys(asked)]
         foreseen = [(source, variant) for source, variant in beside if Need.TEMPERATURE not in source.needs]
         if not foreseen or foreseen[0][0].name != finding.name:
@@ -76,11 +76,11 @@ def propose(
     """Return the fewest tests that change a source's verdict or halve its uncertainty.
 
     Tests are added greedily by rms amplitude uncertainty. A verdict changes if half of the plausible combinations reach
-    five standard deviations; the uncertainty is the best combination's. Empty if the limit of tests does not suffice,
-    none is within reach, or the need cannot be predicted.
+    five standard deviations. The halved uncertainty is of the best combination. The result is empty if the permitted
+    number of tests does not suffice, no circle is reachable, or inputs are unpredictable.
 
     Args:
-        asked: the source with columns, then its rivals.
+        asked: the source with its columns, then rivals.
     """
     if not all(source.needs <= PROPOSED for source, _ in asked):
         return ()
@@ -102,7 +102,7 @@ def propose(
         return _size(_told(covariance, rows, noise_mm, own), variant)
 
     proposals = could_be.that_show(frozenset[Need]().union(*(s.needs for s, _ in asked)))
-    # One direction tells well enough which tests are worth a closer look beside those already chosen.
+    # One direction suffices to select the tests for closer evaluation.
     one_way = {k: seen(proposal, slice(1)) for k, proposal in enumerate(proposals)}
     both_ways: dict[int, Floats] = {}
     chosen: list[Proposal] = []

@@ -1,4 +1,4 @@
-"""Forms of a cause by parts: all, one, or common."""
+"""Forms of a cause: all parts, one part, or a common amplitude."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Part:
 
     Attributes:
         label: strut or part; empty for all.
-        amplitudes: over all sets; summed if `alike`.
+        amplitudes: indices over all sets; summed if `alike`.
     """
 
     label: str
@@ -38,7 +38,7 @@ class Part:
 
 
 def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
-    """Return forms with log weights: kinds equally likely, members within."""
+    """Return the forms with log weights: equal for kinds, and for forms within a kind."""
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets
     kinds = [[("", every)]]

@@ -1,4 +1,4 @@
-"""Each test's gain by named causes."""
+"""Gain of each test by named causes."""
 
 from __future__ import annotations
 

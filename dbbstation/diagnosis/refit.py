@@ -1,4 +1,4 @@
-"""Refits with other runs or more sources."""
+"""Refit with other runs or more sources."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def refitted(
     more: Sequence[ErrorSource] = (),
     start: Mapping[str, Floats] | None = None,
 ) -> Calibration:
-    """Fit runs with another fit's sources and values, and more from `start`."""
+    """Fit runs with another fit's sources and values, and with further sources of `start`."""
     layout = like.layout
     sources = list({term.source.name: term.source for term in layout.terms}.values())
     begin = {

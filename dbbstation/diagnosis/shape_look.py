@@ -1,4 +1,4 @@
-"""Search for waves, bumps and steps beside a refitted base."""
+"""Search the residual for waves, bumps and steps, refitting the base."""
 
 from __future__ import annotations
 
@@ -38,32 +38,32 @@ if TYPE_CHECKING:
     from dbbstation.inference.blocks import Columns
 
 PIECE_MM = 0.5
-"""Of strut length, for waves down to 4 mm [mm]."""
+"""Bins of strut length, for waves down to 4 mm [mm]."""
 
 SHORTEST_MM = 4.0
-"""Shortest wave of strut length that is looked for [mm]."""
+"""Shortest searched wave of strut length [mm]."""
 
 SHORTEST_S = 3.0
-"""Shortest wave of time that is looked for; four pieces where the recordings last longer than that allows [s]."""
+"""Shortest searched wave of time [s]; four bins in recordings too long for it."""
 
 WIDTHS_MM = (3.0, 5.0, 8.0, 13.0, 20.0)
 """Standard deviations of bumps of strut length: dents and bent covers [mm]."""
 
 LOBES_ALONE = tuple(range(2, 31))
-"""Numbers of lobes that are looked for one at a time."""
+"""Numbers of lobes searched separately."""
 
 WAVES_PER_TURN = np.arange(0.2, 20.0, 0.05)
-"""Waves of the angle since the start: they need not close."""
+"""Waves per turn of the angle since the start; they need not be integers."""
 
 ACROSS_DEG = np.arange(0.0, 180.0, 15.0)
 LINE_WIDTHS_MM = (5.0, 20.0)
-"""Lines in the plane that a table may tip over at: their directions [deg] and widths [mm]."""
+"""Lines at which a table may tip: directions [deg] and widths [mm]."""
 
 RINGING_PERIODS_S = np.geomspace(0.2, 2.5, 40)
-"""What a drive's position loop or its mounting oscillates with, in steps of 7 %: a ringing of three periods is then found but for a tenth."""
+"""Periods of a drive's position loop or mounting, in steps of 7 %, which finds nine tenths of a ringing over three periods."""
 
 RINGING_DECAYS_S = (0.4, 0.8, 1.6, 3.2)
-"""Times over which it fades, a period at the least: what is gone before it has swung back once is a spike, which has a name."""
+"""Decay times of a ringing, at least one period; faster decay is a spike, a named cause."""
 
 RINGS = tuple(
     Ringing(float(period_s), decay_s)
@@ -76,15 +76,15 @@ RINGING_PIECE_S = 0.02
 """A tenth of the shortest period."""
 
 RINGING_S = 12.0
-"""Time since a reversal beyond which nothing rings any more."""
+"""Longest time of a ringing after a reversal."""
 
 PLACE_MM = 5.0
-"""Of the platform's position, either way [mm]."""
+"""Bins of the platform's position in each coordinate [mm]."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Over:
-    """Sums over a variable of one mover, whose best forms are shapes."""
+    """Sums over one strut's variable, to find its best forms."""
 
     sums: Sums
     variable: str
@@ -92,12 +92,12 @@ class _Over:
     moves: str
 
     def best(self, kind: str, forms: Sequence[Form], apart: float = 1.0) -> list[Shape]:
-        """Return the best forms of a list of which every so many-th counts as a try."""
+        """Return the best forms of a list; neighbouring forms count as fewer trials."""
         tried = max(len(forms) / apart, 1.0)
         return self._shapes(kind, self.sums.best(forms, BOUNDS.strongest), tried)
 
     def waves(self, grid: Floats, explained: Floats) -> list[Shape]:
-        """Return the best waves about the best of a grid."""
+        """Return the best waves, refined from a grid."""
         begun = [float(grid[k]) for k in peaks(explained, BOUNDS.made_finer)]
         found = self.sums.finer(begun, float(np.ptp(self.sums.at)))
         return self._shapes("wave", found[: BOUNDS.strongest], len(grid) / 2.0)
@@ -108,7 +108,7 @@ class _Over:
 
 
 class TemplateScan:
-    """A fit's residual and base directions, in noise.
+    """A fit's residual and base directions, over noise.
 
     Args:
         jacobian: shape (n, k) each, used once.
@@ -127,14 +127,13 @@ class TemplateScan:
         random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
         free = free_directions(base, fitted, held)
         ends = np.cumsum([0, *(len(own) for own in residual)])
-        # Filled run by run and made orthonormal in place: copies of all columns would need more memory than all else here.
+        # Filled per run and orthonormalised in place, because copies would dominate memory.
         columns = np.zeros((ends[-1] + len(random), free.shape[1] + len(random)), order="F")
         for own, start, stop in zip(jacobian, ends[:-1], ends[1:], strict=True):
             columns[start:stop, : free.shape[1]] = own[:, fitted] @ (free / noise_mm)
             columns[start:stop, free.shape[1] :] = own[:, random] / noise_mm
         np.fill_diagonal(columns[ends[-1] :, free.shape[1] :], 1.0 / base.prior[random])
-        # Readings only: what the rows of the priors take part in is no reading.
-        # Row by row in memory, as sums over rows ask for them.
+        # Readings only, without rows of priors. Contiguous rows, for sums over rows.
         self._base = np.ascontiguousarray(
             qr(columns, overwrite_a=True, mode="economic", check_finite=False)[0][: ends[-1]]
         )
@@ -143,12 +142,12 @@ class TemplateScan:
     def over(
         self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], Integers] | tuple[float, float]
     ) -> _Over:
-        """Sum over pieces of a variable, or over even ones from a place on of some width."""
+        """Return sums over bins of a variable, or over equal bins of given start and width."""
         own = partial(_piece, low=pieces[0], width=pieces[1]) if isinstance(pieces, tuple) else pieces
         return _Over(self.sums(variable, strut, moves, own), variable, strut, moves)
 
     def sums(self, variable: str, strut: int | None, moves: str, pieces: Callable[[Floats], Integers]) -> Sums:
-        """Sum over pieces of a variable."""
+        """Return sums over bins of a variable."""
         values = np.concatenate([run.values[variable] for run in self._runs])
         gain = np.vstack([run.gain[moves] for run in self._runs])
         if strut is not None:
@@ -161,7 +160,7 @@ class TemplateScan:
         ends = np.concatenate([[0], np.cumsum(number)])
 
         def added(samples: NDArray[np.floating], times: Floats | None = None) -> Floats:
-            """Return samples summed over pieces with factors."""
+            """Return samples times factors, summed over bins."""
             weights = np.ones(many) if times is None else times[rows]
             return np.asarray(csr_array((weights, rows, ends), shape=(len(number), many)) @ samples, dtype=np.float64)
 
@@ -177,7 +176,7 @@ class TemplateScan:
 
 
 def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
-    """Return the best shapes of every visible kind."""
+    """Return the best shapes of each kind that the runs can show."""
     found: list[Shape] = []
     for strut in range(1, STRUTS + 1):
         low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
@@ -215,7 +214,7 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
 
 
 def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
-    """Return one strut's waves and ringing on all struts, since forms of two may be indistinguishable."""
+    """Return one strut's waves and ringing for all struts, because two struts' forms may be indistinguishable."""
     kept: list[Shape] = []
     for shape in sorted(found, key=lambda one: -one.explained):
         if shape.strut is None or shape.kind not in {"wave", "ringing"}:
@@ -226,7 +225,7 @@ def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
 
 
 def _is_one(one: Shape, other: Shape, extent: Ranges) -> bool:
-    """Return whether two forms differ by less than half a wave or a few scan steps."""
+    """Return whether two forms differ by less than half a wave, or by few steps of the search."""
     if other.strut is None or one.follows != other.follows:
         return False
     if isinstance(one.form, Wave) and isinstance(other.form, Wave):
@@ -239,14 +238,14 @@ def _is_one(one: Shape, other: Shape, extent: Ranges) -> bool:
 
 
 HALF = 0.5
-"""Of a wave over the extent, and of the neighbours that are about the same: two forms that differ by less lie between the same two
-independent ones."""
+"""Half a wave over the extent, or half of the correlated neighbours: closer forms are between the same two independent
+forms."""
 
 
 _FORCES, _TIMES, _STEPS = 200, 100, 40
 _TURN = 1.0 / 360.0
 _BUMPS_APART, _TURNS_APART, _LINES_APART, _RINGS_APART = 3.0, 4.0, 6.0, 4.0
-"""How many neighbours in a list of forms are about the same: only every so many-th counts as another try."""
+"""Numbers of correlated neighbours in lists of forms, which count as one trial."""
 
 
 def _piece(values: Floats, low: float, width: float) -> Integers:

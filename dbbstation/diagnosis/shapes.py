@@ -1,4 +1,4 @@
-"""Unmodelled effects of struts, readings or balls over variables."""
+"""Curves of unmodelled effects on struts, readings or balls."""
 
 from __future__ import annotations
 
@@ -40,30 +40,30 @@ PLAUSIBLE_MM = 0.004
 """Usual size of an unnamed error, one standard deviation [mm]."""
 
 LOBES = tuple(range(2, 11))
-"""Undulations per turn of an error of the reading that follows the angle in any way."""
+"""Undulations per turn of an arbitrary reading error over the angle."""
 
 LEVER_MM = 100.0
-"""Turns and moments count by what they do at this distance [mm]."""
+"""Lever arm that converts rotations and moments [mm]."""
 
 EVERY, SIGNED = "every strut", "every strut by direction of travel"
 READING, BALL, TABLE, TOOL = "reading", "ball on the table", "table", "ball on the tool"
 PULL, TOWARDS = "pull", "pull towards a place"
-"""What moves: struts, or struts one way while they lengthen and the other way while they shorten; what the bar reads; a
-ball; the table as a body with the ball on it; struts by a pull on the platform, of any direction or towards a place."""
+"""Parts that an effect moves: struts; struts with a sign by direction; the reading; a ball; the table with the ball;
+struts through a pull on the platform, in any direction or towards a place."""
 
 WAYS_DEG = tuple(30.0 * k for k in range(12))
-"""Where the place may be that pulls. Its height, its distance and where on the platform it pulls are not searched: the nearest
-form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions.md, 20)."""
+"""Tried directions of the pulling place. Height, distance and point of attack are not searched: the nearest form leaves
+14 to 40 % of a hose's effect that joints do not absorb (rms, seven hoses of 0.7 to 2 m; docs/decisions.md, 20)."""
 
 STICKING_MM = 0.04
-"""Travel over which friction that turns round sticks, in one jerk or several: presliding and stick-slip take micrometres to tens of
-them [Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, sec. 2.2] [mm]."""
+"""Travel of sticking after a reversal, in one or several jerks: presliding and stick-slip take micrometres to tens of
+micrometres [Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083, sec. 2.2] [mm]."""
 
 STICKING_HALVES = 5
-"""Points of that curve: a circle has two or three samples on that way."""
+"""Points of this curve; a circle has two or three samples on this travel."""
 
 AWAY_MM = 1000.0
-"""How far it is from the Z axis: beyond the machine's frame."""
+"""Distance of the pulling place from the Z axis, beyond the machine's frame."""
 
 UNITS = {
     "strut-length": "mm",
@@ -87,7 +87,7 @@ UNITS = {
 """Variables that an error may follow, and their units."""
 
 TEMPERATURES = tuple(name for name, unit in UNITS.items() if unit == "degC")
-"""Those that thermometers log."""
+"""Variables logged by thermometers."""
 
 OF_STRUTS = (
     "strut-length",
@@ -99,10 +99,10 @@ OF_STRUTS = (
     "travel since its reversal",
     "strut-temperature",
 )
-"""Those that each strut has its own of."""
+"""Variables with separate values for each strut."""
 
 THERMOMETERS = ("machine", "jig", "bar")
-"""Those that are on no strut, by the name of their column."""
+"""Thermometers not on struts, by column name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class Samples:
 
     Attributes:
         values: by variable, shape (n,), (n, 6) by strut, or (n, c).
-        gain: of the reading by what moves, shape (n, d); struts (n, 6).
+        gain: sensitivity of the reading to each moved part, shape (n, d); (n, 6) for struts.
     """
 
     values: dict[str, Floats]
@@ -120,7 +120,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Follows:
-    """The variable of an unmodelled error and the part that it moves.
+    """The variable of an unmodelled error, and the part that it moves.
 
     Attributes:
         kind: such as `wave`; empty for the usual one.
@@ -131,14 +131,14 @@ class Follows:
     moves: str = EVERY
 
     def __str__(self) -> str:
-        """Return variable, kind and moved part as printed."""
+        """Return variable, kind and moved part, as printed."""
         kind = f" {self.kind}" if self.kind else ""
         own = (self.variable, self.moves) in ITS_OWN
         return f"{self.variable}{kind}{'' if own else BEHIND.get(self.moves, '')}"
 
     @property
     def moves_struts(self) -> bool:
-        """Return whether strut lengths err."""
+        """Return whether it moves struts."""
         return self.moves in {EVERY, SIGNED}
 
 
@@ -149,8 +149,8 @@ class Shape:
     Attributes:
         kind: such as `wave`; empty for the usual one.
         strut: 1 to 6; None for all or none.
-        moves: what moves; a given strut restricts it.
-        tried: independent forms of the choice.
+        moves: moved part; a strut restricts it.
+        tried: number of independent forms from which it was picked.
     """
 
     variable: str
@@ -163,7 +163,7 @@ class Shape:
 
     @property
     def follows(self) -> Follows:
-        """Return what it follows and moves."""
+        """Return its variable and moved part."""
         return Follows(self.variable, self.kind, self.moves)
 
     @property
@@ -172,7 +172,7 @@ class Shape:
         return 1.0 / self.form.frequency if isinstance(self.form, Wave) else None
 
     def columns(self, samples: Samples) -> Floats:
-        """Return amplitudes' effects on readings: directions times curves, shape (n, d p)."""
+        """Return the effects of amplitudes on readings: directions times curves, shape (n, d p)."""
         values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
             curve = self.form.columns(values)
@@ -212,19 +212,19 @@ BEHIND = {
     PULL: " with a pull on it",
     TOWARDS: " that pulls on it",
 }
-"""How a printed name ends, by what moves; nothing for struts."""
+"""Endings of printed names, by moved part; empty for struts."""
 
 ITS_OWN = {
     ("angle", READING),
     ("position of the platform", BALL),
     ("tilt of the platform", TOOL),
 }
-"""Variables that say by themselves what moves."""
+"""Variables that imply the moved part."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ranges:
-    """Variables' extents over all runs."""
+    """Extents of variables over all runs."""
 
     low: dict[str, Floats]
     high: dict[str, Floats]
@@ -235,7 +235,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, Floats]:
     struts = motion.struts(machine)
     found = {"strut-length": struts.length_mm}
     if motion.is_path:
-        # Over the last step, as play has it: a row beside a turn that has another sign would be an effect of its own.
+        # Speed over the last step, as in play; a row with wrong sign near a turn would look like an effect.
         steps = np.diff(struts.length_mm, axis=0)
         found["strut-speed-sign"] = np.sign(np.concatenate([steps[:1], steps]))
         found["travel since its reversal"] = since_turning(struts.length_mm)
@@ -244,7 +244,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, Floats]:
     if motion.time_s is not None:
         found["time"] = motion.time_s
         if motion.is_path and np.all(np.diff(motion.time_s) > 0.0):
-            # A spline, since differences are worst at the end of a run, and joints hide all of a smooth error but that.
+            # A spline, because differences are worst at the ends of a run, the only part that joints do not absorb.
             path = CubicSpline(motion.time_s, struts.length_mm)
             found["strut-speed"], found["strut-acceleration"] = path(motion.time_s, 1), path(motion.time_s, 2)
             found["time since its reversal"] = _since_reversal_s(motion.time_s, found["strut-speed"])
@@ -263,7 +263,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, Floats]:
 def _since_reversal_s(time_s: Floats, speed_mm_s: Floats) -> Floats:
     """Return time since each strut's reversal with its new sign; zero before, shape (n, 6) [s].
 
-    The instant is interpolated at zero speed.
+    The time of reversal is interpolated at zero speed.
     """
     since = np.zeros_like(speed_mm_s)
     for strut in range(speed_mm_s.shape[1]):
@@ -288,7 +288,7 @@ def samples_of(motion: Motion, machine: Machine, reading: BarReading, pivot_mm: 
     """Return variables and gains of a run.
 
     Args:
-        pivot_mm: of table rotation, shape (3,); None: none.
+        pivot_mm: of table rotation, shape (3,); None for no rotation.
     """
     known = {name: values[motion.kept] for name, values in variables(motion, machine).items()}
     gain = {
@@ -302,7 +302,7 @@ def samples_of(motion: Motion, machine: Machine, reading: BarReading, pivot_mm: 
     if motion.is_path:
         gain[SIGNED] = gain[EVERY] * known["strut-speed-sign"]
     if motion.setup is not None and pivot_mm is not None:
-        # A small turn w moves the ball by w x arm.
+        # A small rotation w moves the ball by w x arm.
         turns = np.cross(np.eye(3), (motion.setup.fixed_ball_mm - pivot_mm) / LEVER_MM).T
         gain[TABLE] = np.hstack([gain[BALL], gain[BALL] @ turns])
     return Samples(known, gain)
@@ -318,7 +318,7 @@ def _pulled(struts: Struts) -> Floats:
 
 
 def _hoses(frames: Frames, machine: Machine) -> Floats:
-    """Return vectors from the platform's middle to far places, shape (n, 12, 3) [mm]."""
+    """Return vectors from the platform's middle to the pulling places, shape (n, 12, 3) [mm]."""
     middle = frames.position_mm + frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)
     angles = np.radians(WAYS_DEG)
     places = AWAY_MM * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
@@ -327,9 +327,9 @@ def _hoses(frames: Frames, machine: Machine) -> Floats:
 
 
 def _pulled_towards(motion: Motion, machine: Machine) -> Floats:
-    """Return struts' stretch by a unit pull, shape (n, 6, 60): five numbers per place.
+    """Return the struts' stretch by unit pulls, shape (n, 6, 60): five parameters per place.
 
-    The numbers are the pull at the platform's middle, moments at `LEVER_MM` along its axes, and a downward force for
+    The parameters are the pull at the platform's middle, moments at `LEVER_MM` about its axes, and a downward force for
     unknown height.
     """
     struts, frames = motion.struts(machine), motion.frames(machine)
@@ -347,7 +347,7 @@ def _pulled_towards(motion: Motion, machine: Machine) -> Floats:
 
 
 def ranges(runs: Sequence[Samples]) -> Ranges:
-    """Return extents of common variables."""
+    """Return the extents of variables that all runs have."""
     names = [name for name in runs[0].values if all(name in run.values for run in runs)]
     low = {name: np.min([run.values[name].min(axis=0) for run in runs], axis=0) for name in names}
     high = {name: np.max([run.values[name].max(axis=0) for run in runs], axis=0) for name in names}
@@ -355,7 +355,7 @@ def ranges(runs: Sequence[Samples]) -> Ranges:
 
 
 def shapes(extent: Ranges) -> list[Shape]:
-    """Return families that need no search, in column order."""
+    """Return the families that need no search, in order of columns."""
     found: list[Shape] = []
     warmed = [n for n in extent.low if n in TEMPERATURES and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K]
     usual = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time")
@@ -396,7 +396,7 @@ def shapes(extent: Ranges) -> list[Shape]:
 
 
 def wander(runs: Sequence[Samples]) -> list[Shape]:
-    """Return a random walk of the reading over time; none without times."""
+    """Return a random walk of the reading over time; empty without times."""
     times = [run.values["time"] for run in runs if "time" in run.values]
     if len(times) < len(runs):
         return []
@@ -405,7 +405,7 @@ def wander(runs: Sequence[Samples]) -> list[Shape]:
 
 
 WALK_STEPS = 6
-"""Of a wander within a run, straight between them: what it does within a sixth of a run counts as noise."""
+"""Linear pieces of a random walk per run; faster changes count as noise."""
 
 
 def _usual(name: str, extent: Ranges, strut: int | None) -> Form:
@@ -416,5 +416,5 @@ def _usual(name: str, extent: Ranges, strut: int | None) -> Form:
         return Proportional(float(np.max(np.abs([low, high]))))
     if name in OF_STRUTS and strut is not None:
         return LinearSplines(low[strut - 1], high[strut - 1])
-    # All struts alike follow one curve: the same length or force does the same to each.
+    # A common curve: equal length or force has equal effect on each strut.
     return LinearSplines(low.min(), high.max())

@@ -1,4 +1,4 @@
-"""Found sources over their variable, beside readings."""
+"""Curves of found sources over their variable, with readings."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 
 WAVE_PIECE_MM = 1.0
-"""The same of strut length where waves of it are looked at, down to periods of 4 mm [mm]."""
+"""Bins of strut length for waves, down to periods of 4 mm [mm]."""
 
 SEEN = 2.5
-"""Fine pieces that are known this many times worse than usual are left open: they would drown the others."""
+"""Fine bins with more than this multiple of the usual uncertainty are omitted, because they would dominate the figure."""
 
 UNITS = {
     "strut-length": "mm",
@@ -41,10 +41,10 @@ UNITS = {
     **dict.fromkeys(TEMPERATURES, "°C"),
     "angle": "°",
 }
-"""Of the variables that something can be drawn over."""
+"""Units of variables in figures."""
 
 SENSES = {1.0: "lengthening", -1.0: "shortening"}
-"""Names of the branches of what hangs on the direction of travel."""
+"""Names of branches of direction-dependent curves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +59,13 @@ class _Samples:
 
 @with_one_thread
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
-    """Return curves of found sources and the organised residual."""
+    """Return the curves of found sources and of the residual over its variable."""
     left = ("",) if diagnosis.unexplained.follows is not None else ()
     return tuple(_curves(diagnosis, name) for name in (*found_sources(diagnosis), *left))
 
 
 def found_sources(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return joint sources beyond the base."""
+    """Return the joint fit's sources that the base lacks."""
     base = {term.source.name for term in diagnosis.before.layout.terms}
     return tuple(dict.fromkeys(t.source.name for t in diagnosis.after.layout.terms if t.source.name not in base))
 
@@ -107,7 +107,7 @@ def _wanted(diagnosis: Diagnosis, name: str) -> Follows:
         return diagnosis.unexplained.follows or Follows("")
     source = next(t.source for t in diagnosis.after.layout.terms if t.source.name == name)
     own = source.varies_with == "temperature" and not isinstance(source, FollowsTemperature)
-    return Follows("time" if own else source.varies_with)  # only those of ours say which temperature
+    return Follows("time" if own else source.varies_with)  # only sources of this package state their thermometer
 
 
 def _drawn_over(wanted: Follows, observations: Sequence[Observation], *, moves_struts: bool) -> str:

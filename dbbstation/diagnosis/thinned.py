@@ -1,4 +1,4 @@
-"""Runs averaged over narrow sectors."""
+"""Average runs over narrow sectors."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
 
 
 MOST_SAMPLES = 30 * BOUNDS.samples_per_turn
-"""Samples of all runs that a diagnosis works on: those of thirty circles. Columns of all causes over them take most of its memory, 0.9 GB."""
+"""Most samples of all runs in a diagnosis, as for thirty circles. Columns of all causes then take 0.9 GB, most of its memory."""
 
 LEAST_SECTORS = BOUNDS.samples_per_turn // 2
-"""Samples per turn that are kept however many runs there are: with fewer, noise is not read from harmonics far above the low ones."""
+"""Least samples per turn for any number of runs; with fewer, noise cannot be estimated far above the low harmonics."""
 
 
 def sectors_for(runs: int) -> int:
-    """Return samples per turn for so many runs."""
+    """Return the number of samples per turn for a number of runs."""
     return max(min(BOUNDS.samples_per_turn, MOST_SAMPLES // max(runs, 1)), LEAST_SECTORS)
 
 
 def thinned(observation: Observation, most: int = BOUNDS.samples_per_turn) -> Observation:
-    """Return the run averaged over sectors, with its command; short runs as they are."""
+    """Return the run averaged over sectors, with its commands; short runs are returned unchanged."""
     raw = observation.raw
     if len(raw) <= most:
         return observation

@@ -1,4 +1,4 @@
-"""An unmodelled effect's curve with uncertainty."""
+"""Curves of unmodelled effects, with uncertainty."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ MEAN_OUT = {
     READING: "less its mean over the readings: the bar's offset makes that",
     BALL: "less its mean over the readings: a shift of the ball makes that",
 }
-"""What is conventional of a piecewise linear curve and taken out of it, by what moves; nothing of the others."""
+"""Conventional part that is removed from piecewise linear curves, by moved part."""
 
 SIZES = 2.0 ** np.arange(8)
-"""Sizes that curves are tried with, as multiples of the one found: a large error must not be drawn towards zero."""
+"""Tried prior sizes of curves over the found size, so large errors are not shrunk towards zero."""
 
 AXES = {
     BALL: "along ({:+.2f}, {:+.2f}, {:+.2f}) in machine axes",
@@ -47,11 +47,11 @@ AXES = {
     TOWARDS: "strut lengths change as under a pull of {:+.2f} that way on the middle of the platform's joints, of "
     f"({{:+.2f}}, {{:+.2f}}, {{:+.2f}}) at {LEVER_MM:g} mm from there along X, Y, Z of the platform, and of {{:+.2f}} down",
 }
-"""How a direction is told, by what moves."""
+"""Texts on directions, by moved part."""
 
 
 def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) -> Curve:
-    """Return an effect's curve, summed with others over the same variable."""
+    """Return an effect's curve, including other effects over the same variable."""
     unmodelled, runs, comparison = settled.unmodelled, settled.unmodelled.runs, settled.comparison
     shape = _largest(settled, member)
     together = [m for m in settled.best.members if m is member or any(_adds(shape, s) for s in unmodelled.of(m))]
@@ -121,7 +121,7 @@ def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
     names = {m.cause.name for m in together}
     others = settled.best.without(*names)
     scale = max(m.scale for m in together)
-    # Those picked from many forms would find something in noise as well: more than one for each amplitude.
+    # Forms picked from many also fit noise, by more than one for each amplitude.
     every = [
         Member(cause, variant, scale)
         for cause in unmodelled.causes
@@ -140,8 +140,8 @@ class _Piece:
     """An effect along its strongest direction.
 
     Attributes:
-        amplitudes: less convention, shape (p,).
-        to_points: shape (n, p).
+        amplitudes: without the conventional part, shape (p,).
+        to_points: matrix from amplitudes to points, shape (n, p).
     """
 
     amplitudes: Floats
@@ -159,7 +159,7 @@ def _along(runs: Sequence[Samples], shape: Shape, found: Floats) -> _Piece:
     at, curve, over = _over(runs, shape, right[0])
     way, direction, towards = np.ones(1), (), ""
     if shape.moves in AXES:
-        # Signs so that the greatest part of the direction is positive.
+        # The direction's greatest component is positive.
         way = left[:, 0] * np.sign(left[np.abs(left[:, 0]).argmax(), 0])
         direction, towards = tuple(way.tolist()), AXES[shape.moves].format(*way)
     words = ", ".join(part for part in (towards, over, convention) if part)
@@ -194,7 +194,7 @@ _AXIS = {"position of the platform": "+X", "tilt of the platform": "that of tilt
 
 
 def _line(at: Floats, weights: Floats, order: int) -> Floats:
-    """Return the matrix to the best polynomial's values, shape (p, p)."""
+    """Return the projection on polynomials, shape (p, p)."""
     basis = np.vander(at, order + 1)
     weighted = basis.T * weights
     return np.asarray(basis @ np.linalg.solve(weighted @ basis, weighted), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A model with a kept unmodelled effect, marked as of unknown cause."""
+"""Models that include an unmodelled effect, marked as of unknown cause."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ KEPT_AS = {
     Follows("strut-length", "wave"): "unexplained-wave",
     Follows("strut-force"): "unexplained-by-force",
 }
-"""Sources that carry an unnamed error into a model, by what organises it: what any program knows of itself."""
+"""Sources that represent an unmodelled error in a model, by its variable, which every program determines."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointFitWithCurve:
-    """A joint fit of names and the nameless curve.
+    """A joint fit of named causes and the unmodelled curve.
 
     Attributes:
-        to_all: from fitted to all parameters, shape (p, f).
+        to_all: matrix from fitted to all parameters, shape (p, f).
     """
 
     source: ErrorSource
@@ -49,7 +49,7 @@ class JointFitWithCurve:
     curve: Curve
 
     def identified(self, report: Mapping[str, Any], sessions: Mapping[str, str]) -> IdentifiedModel:
-        """Return the model to keep; unfitted parameters are zero."""
+        """Return the model to store; unfitted parameters are zero."""
         found = identified_model(self.fit, {**report, "unexplained": plain(self.curve)}, sessions)
         machine, name = found.model.machine, self.source.name
         names = [parameter.name for parameter in self.source.parameters(machine)]
@@ -75,10 +75,10 @@ class JointFitWithCurve:
 
 
 def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCurve:
-    """Fit names and the curve together.
+    """Fit named causes and the unmodelled curve jointly.
 
     Raises:
-        ModelError: nothing nameless remains, or it follows no pose variable.
+        ModelError: no unmodelled effect remains, or it does not depend on the pose.
         CalibrationError: the fit does not converge.
     """
     if curve is None:
@@ -98,10 +98,10 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
 
 
 def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
-    """Return the finding with an exactly fitted wave.
+    """Return the finding with its wave fitted exactly.
 
-    Joints absorb part of a long wave, which biases the scan by some per cent. A fit without convergence changes
-    nothing.
+    Joints absorb part of a long wave, which biases the search by some per cent. Without convergence the finding is
+    unchanged.
     """
     curve = rest.curve
     if curve is None or curve.period_mm is None or curve.strut is None:
@@ -123,7 +123,7 @@ def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
 
 
 def _to_all(each: int, strut: int | None) -> Floats:
-    """Return the matrix from one or shared parameters to all struts', shape (6 each, each)."""
+    """Return the matrix from one strut's or shared parameters to all struts' parameters, shape (6 each, each)."""
     chosen = np.ones(STRUTS) if strut is None else np.eye(STRUTS)[strut - 1]
     return np.kron(chosen[:, None], np.eye(each))
 

@@ -1,4 +1,4 @@
-"""Unmodelled effects as causes beside named ones."""
+"""Unmodelled effects as causes, in addition to named ones."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ class Unmodelled:
         self._add([*shapes(ranges(self.runs)), *wander(self.runs)])
 
     def look(self, fit: Calibration, best: Sequence[Member], noise_mm: float) -> None:
-        """Search for waves, bumps, steps and pulses beside base and named causes, and add them.
+        """Search the residual of base and named causes for waves, bumps, steps and pulses, and add them.
 
-        Effects of an earlier look that the best set lacks are forgotten. The new search finds these effects again, unless a named cause explains them.
+        Effects of earlier searches outside the best set are dropped; the new search finds them again unless a named cause explains them.
         """
         members = [member for member in best if member.cause.named]
         channel = self.channel
@@ -69,7 +69,7 @@ class Unmodelled:
         self._looked_for |= set(self.follows) - before
 
     def of(self, member: Member) -> tuple[Shape, ...]:
-        """Return an effect's shapes in its form; none for named causes."""
+        """Return the shapes of an effect's form; empty for named causes."""
         return self.shapes.get((member.cause.name, member.variant.label), ())
 
     def _forget(self, names: set[str]) -> None:
@@ -113,10 +113,10 @@ class Unmodelled:
 
 
 EACH = "each strut its own"
-"""Label of the form that has a curve for each strut."""
+"""Label of the form with a separate curve for each strut."""
 
 KINDS = 30
-"""Combinations of variable, kind of curve and what moves, about."""
+"""Approximate number of combinations of variable, kind of curve and moved part."""
 
 
 def _label(shapes: Sequence[Shape]) -> str:
@@ -126,7 +126,7 @@ def _label(shapes: Sequence[Shape]) -> str:
 
 
 def _name(shape: Shape) -> str:
-    """Return the name of a shape's cause; dents and steps belong to one strut."""
+    """Return the name of a shape's cause; bumps and steps belong to one strut."""
     own = f", strut {shape.strut}" if shape.strut and shape.kind in {"bump", "step"} else ""
     text = shape.form.text("")
     return f"unmodelled: {shape.follows}{own}{', ' + text if text else ''}"

@@ -1,4 +1,4 @@
-"""Variables that causes of circles follow, in words."""
+"""Names of variables that causes of circles follow."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 SESSION_TIME = "the time of the session"
-"""Variable of what warms up or drifts over a session: tests that were held back lie between others."""
+"""Variable of warm-up and drift over a session, in which held-out tests are between others."""
 
 
 def variable_of(source: ErrorSource) -> str:
-    """Return a named cause's variable; its own name if there is no single one."""
+    """Return a named cause's variable; its own name without a single variable."""
     return SESSION_TIME if source.varies_with == "time" else source.varies_with or source.name

@@ -1,4 +1,4 @@
-"""Findings on named causes of circles, from the generic channel."""
+"""Findings on named causes of circles, by the rules of generic channels."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 TESTABLE_SHARE = 0.5
-"""Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
+"""Least detectable share of a cause's amplitude combinations before it can be ruled out."""
 
 
 def judge(explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> tuple[SourceFinding, ...]:
-    """Return a finding per named cause, present ones first.
+    """Return one finding per named cause, present ones first.
 
     Args:
-        anew: results of held-out tests; None: not tested.
+        anew: results of held-out tests; None if not tested.
     """
     return _CircleJudge(explained, outcome, anew, levels).findings()
 
@@ -45,7 +45,7 @@ class _CircleJudge(CauseJudge):
     def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> None:
         self._circles, self._joint, self._found = explained.channel, explained.settled, levels
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
-        # A method of this would keep it, and all columns, alive in a ring.
+        # A bound method would keep the object and all columns alive by a reference cycle.
         super().__init__(outcome, Trial(anew), levels, partial(form_uncertainty, explained.channel.sources))
 
     def findings(self) -> tuple[SourceFinding, ...]:
@@ -110,7 +110,7 @@ class _CircleJudge(CauseJudge):
         return frozenset()
 
     def _concealed(self, shown: Member, effect: Floats, values: Floats) -> tuple[float, float, float]:
-        """Return an effect's rms, as found or plausible, its unconcealed rms [mm], and the concealed share."""
+        """Return an effect's found or plausible rms, the rms not absorbed [mm], and the absorbed share."""
         columns = shown.variant.columns
         amplitudes = values[: len(columns)] if shown.cause.name in self._members else shown.variant.plausible
         effect = self._circles.columns.of(columns) @ amplitudes
@@ -131,9 +131,9 @@ class _CircleJudge(CauseJudge):
         return bool(np.mean(standing_out(products, variant.plausible) >= OUT) >= TESTABLE_SHARE)
 
     def _unseen_points(self, cause: Cause) -> list[float]:
-        """Return values of a listed parameter, such as a bump's run, at which these tests would not show a cause.
+        """Return the values of a listed parameter, such as a bump's run, for which these tests do not show a cause.
 
-        Each value of a list is a separate case.
+        Each listed value is a separate case.
         """
         found = set()
         for variant in cause.variants:
@@ -146,7 +146,7 @@ class _CircleJudge(CauseJudge):
         return sorted(found)
 
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
-        """Return values in the joint fit; for an absent cause, amplitudes whose uncertainty bounds an undetected effect."""
+        """Return values of the joint fit; for an absent cause, amplitudes whose uncertainty bounds an undetected effect."""
         if member.cause.name in self._members:
             return self._fitted(member.cause.name)
         source = self._circles.source_of(member.cause.name, member.variant)
@@ -200,6 +200,6 @@ class _CircleJudge(CauseJudge):
 
 
 def form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
-    """Return the relative inaccuracy of a cause's formula; zero for an unnamed cause."""
+    """Return the relative inaccuracy of a cause's formula; zero for unmodelled causes."""
     source = sources.get((member.cause.name, member.variant.law))
     return 0.0 if source is None else source.form_uncertainty

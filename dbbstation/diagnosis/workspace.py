@@ -1,4 +1,4 @@
-"""Error of a missing effect over the workspace: distance between two models' tool positions."""
+"""Error over the workspace by missing effects: difference between two models' tool positions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 REACH = 0.6
-"""Share of the travel about its middle that is looked at; the corners beyond are hardly used."""
+"""Compared share of the travel about its middle; the corners are hardly used."""
 
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0))
 
@@ -31,11 +31,11 @@ class WorkspaceError:
     """Difference of tool position between the earlier calibration and the joint model, over the workspace.
 
     Attributes:
-        error_rms_um: without common shift.
+        error_rms_um: rms without the common shift.
         error_greatest_um: greatest length about the common shift.
-        at_pose: place of the greatest, X, Y, Z, A, B, C [mm, deg].
-        uncertainty_rms_um: rms standard uncertainty of the joint model about a common shift; None if unknown.
-        common_shift_um: mean along X, Y and Z; a program's zero on the part removes it.
+        at_pose: pose of the greatest error, X, Y, Z, A, B, C [mm, deg].
+        uncertainty_rms_um: rms standard uncertainty of the joint model without the common shift; None if unknown.
+        common_shift_um: mean error along X, Y and Z, which a program's zero on the part removes.
         uncertainty_with_shift_rms_um: None if unknown.
     """
 
@@ -51,7 +51,7 @@ class WorkspaceError:
 def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError | None:
     """Compare two calibrations of one machine over the workspace; None if no pose is within travel.
 
-    Only sources that need no more than the pose are compared; drift and backlash have no fixed place.
+    Only sources that depend on the pose alone are compared, because drift and backlash have no fixed place.
     """
     machine = before.layout.machine
     poses = workspace(machine)
@@ -80,7 +80,7 @@ def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError |
 
 
 def workspace(machine: Machine) -> Floats:
-    """Return poses over the inner travel that the machine can reach, shape (n, 6) [mm, deg]."""
+    """Return reachable poses over the inner travel, shape (n, 6) [mm, deg]."""
     travel = machine.travel
     middle = sum(travel.z_mm) / 2.0
     across = np.linspace(-REACH, REACH, BOUNDS.workspace_steps) * travel.xy_radius_mm

@@ -1,4 +1,4 @@
-"""Dead or saturated force channels."""
+"""Detect dead or saturated force channels."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats
 
 TOGETHER = 5
-"""Equal samples in a row, at the greatest or least value, that count as saturated."""
+"""Consecutive equal samples, at the greatest or least value, that count as saturated."""
 
 DEAD_SHARE = 0.1
-"""Share of a recording in one row of equal samples that counts as dead."""
+"""Share of a recording in one sequence of equal samples that counts as dead."""
 
 MOST_STUCK = 0.3
-"""Share of stuck samples beyond which the rest proves nothing."""
+"""Largest usable share of stuck samples."""
 
 
 def stuck_samples(force_n: Floats, t_s: Floats, moving: Flags, name: str) -> tuple[Flags, list[str]]:
-    """Return samples with a stuck force, shape (n,), and notes; standstill does not count.
+    """Return the samples with a stuck force, shape (n,), and notes; standstill does not count.
 
     Raises:
-        CalibrationError: the force never changes, or is stuck mostly.
+        CalibrationError: the force never changes, or is mostly stuck.
     """
     if not np.ptp(force_n) > 0.0:
         raise CalibrationError(
@@ -61,4 +61,4 @@ def stuck_samples(force_n: Floats, t_s: Floats, moving: Flags, name: str) -> tup
 
 
 MOVES = 0.5
-"""Share of a row of equal samples in which the drive must move for the row to be a fault of the channel."""
+"""If the drive moves in at least this share of equal samples, the channel is faulty."""

@@ -1,7 +1,7 @@
-"""A drive's direction: it turns when position retreats beyond noise, resolution and jitter.
+"""Directions and turning points of a drive; a turn is a retreat beyond noise, resolution and jitter.
 
-Turning points are zigzag extremes with a minimum return [rainflow counting with a hysteresis gate: ASTM E1049-85, sec.
-5.4.4; Amzallag et al., Int. J. Fatigue 16 (1994) 287, sec. 3.1].
+Turning points are extremes with a minimum return [rainflow counting with a hysteresis gate: ASTM E1049-85, sec. 5.4.4;
+Amzallag et al., Int. J. Fatigue 16 (1994) 287, sec. 3.1].
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 RETREAT_SIGMA = 5.0
-"""Standard deviations of the position by which it must retreat: noise does so once in ten thousand samples of a standing drive."""
+"""Least retreat in standard deviations of position: noise reaches it once in ten thousand samples at standstill."""
 
 WHOLE = 0.02
-"""Share of a step by which positions may be off whole steps to have been rounded to it: digits of a file round them again."""
+"""Largest distance of rounded positions from whole steps, in steps; files round positions again."""
 
 
 def retreat_m(noise_m: float, resolution_m: float) -> float:
-    """Return the retreat that is a turn [m].
+    """Return the retreat that counts as a turn [m].
 
     Args:
         noise_m: of position, including jitter at speed.
-        resolution_m: rounding step, zero if unknown; a step above the travel per sample is not white noise.
+        resolution_m: rounding step, zero if unknown; steps above the travel per sample are not white noise.
     """
     return RETREAT_SIGMA * noise_m + 1.5 * resolution_m
 
@@ -38,13 +38,13 @@ def resolution_of(position: Floats) -> float:
         return 0.0
     least = float(np.quantile(steps, 0.001, method="lower"))
     count = np.round(steps / least)
-    # A step of many resolutions is known as well as one: take the least one from all of them.
+    # Large and small steps are equally exact, so the resolution follows from all of them.
     size = float(count @ steps / (count @ count))
     return size if float(np.median(np.abs(steps / size - np.round(steps / size)))) < WHOLE else 0.0
 
 
 def turning_points(position_m: Floats, retreat: float) -> Integers:
-    """Return turning samples, rising, shape (t,)."""
+    """Return the turning samples, ascending, shape (t,)."""
     found: list[int] = []
     way = 0
     highest = lowest = 0
@@ -66,7 +66,7 @@ def turning_points(position_m: Floats, retreat: float) -> Integers:
 
 
 def ways(position_m: Floats, turns: Integers) -> Floats:
-    """Return direction, +1 or -1, shape (n,); zero without motion."""
+    """Return directions of travel, +1 or -1, shape (n,); zero without motion."""
     ends = np.concatenate([[0], turns, [len(position_m) - 1]])
     signs = np.sign(np.diff(position_m[ends]))
     return np.repeat(signs, np.diff(np.concatenate([[0], turns, [len(position_m)]])))

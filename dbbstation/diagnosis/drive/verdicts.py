@@ -1,4 +1,4 @@
-"""Findings on causes of force, by source, and unnamed effects."""
+"""Findings on causes of force and on unnamed effects."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ PREDICTS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED})
 
 
 class Verdicts(CauseJudge):
-    """All findings on sources, each with the best verdict of its members.
+    """Makes findings on sources, each with the best verdict of its members.
 
     Args:
-        held: held-out predictions; None: not tested.
+        held: held-out predictions; None if not tested.
     """
 
     is_catalogue = True
@@ -58,15 +58,15 @@ class Verdicts(CauseJudge):
 
     @cached_property
     def findings(self) -> tuple[DriveFinding, ...]:
-        """Return a finding per source, best first."""
+        """Return one finding per source, best first."""
         found = [self._finding(source) for source in self._drive.sources.values()]
         return tuple(sorted(found, key=lambda f: (f.verdict.rank, -f.gain)))
 
     @cached_property
     def named(self) -> list[str]:
-        """Return the best hypothesis's named members by force.
+        """Return the best hypothesis's named members, ordered by force.
 
-        Bayes factors would rank a newton of ripple above five newtons of slow force.
+        Bayes factors would rank 1 N of ripple above 5 N of slow force.
         """
         squares = {f.name: f.rms**2 for f in self._raw if f.rms >= self._least_n}
         names = [name for name in self._members if self._source_of.get(name) and name in squares]
@@ -78,9 +78,9 @@ class Verdicts(CauseJudge):
 
     @property
     def predicting(self) -> list[str]:
-        """Return members of `named` for prediction, largest first.
+        """Return the members of `named` used for prediction, largest first.
 
-        One of several equivalent causes predicts; causes ambiguous by themselves are fitted but do not predict.
+        Of equivalent causes only one predicts. Causes that are themselves ambiguous are fitted but do not predict.
         """
         sure = {f.name for f in self.findings if f.verdict in PREDICTS or f.ambiguous_with}
         return [name for name in self.named if self.source_of(name) in sure]
@@ -125,7 +125,7 @@ class Verdicts(CauseJudge):
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
-        """Return the same; stretches that begin and end with the motion are a law as likely."""
+        """Return the verdict; stretches whose edges follow the motion may equally be errors of a law."""
         verdict, others, text = super()._verdict(cause, member, probability, sigmas)
         if verdict is Verdict.AMBIGUOUS and not others:
             others = self._alternatives.ambiguity(cause.name)
@@ -146,7 +146,7 @@ class Verdicts(CauseJudge):
         return Verdict.AMBIGUOUS, (), why
 
     def _pushes(self) -> dict[str, Sequence[Value]]:
-        """Return those of pushes; stretches of several members are levels between edges, counted with the first of them."""
+        """Return sizes of pushes; stretches of all members are combined to levels between edges, counted for the first member."""
         patterns = self._settled.bank.patterns
         found = {name: own for name, own in super()._pushes().items() if patterns[name].family is Family.PULSES}
         if not self._pulses:
@@ -196,7 +196,7 @@ class Verdicts(CauseJudge):
             alike = (*alike, "viscous friction")
         first = min(there, key=lambda f: f.verdict.rank, default=None)
         if first is None:
-            # An unmodelled force that could stand for it is no reason to expect it.
+            # An equivalent unmodelled force is no evidence for a cause.
             alike = tuple(name for name in alike if name in self._drive.sources)
         if alike:
             why = f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
@@ -248,7 +248,7 @@ class Verdicts(CauseJudge):
         if source.name in looked_for:
             return looked_for[source.name]()
         for finding in own:
-            # What nothing tells from something else, were it only an unmodelled force, would not have been seen.
+            # A cause that cannot be distinguished, even from an unmodelled force, could not be detected.
             if finding.verdict in {Verdict.NOT_TESTABLE, Verdict.AMBIGUOUS}:
                 return Verdict.NOT_TESTABLE, finding.text
         refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
@@ -292,7 +292,7 @@ class Verdicts(CauseJudge):
         )
 
     def _beyond_band_n(self) -> float:
-        """Return the rms force beyond the band [N]."""
+        """Return the rms force above the cut-off [N]."""
         recordings = self._drive.recordings
         return float(np.sqrt(np.mean((recordings.at(lambda s: s.force_n) - recordings.force_n) ** 2)))
 

@@ -1,1 +1,1 @@
-"""A simulator in the loop: refitted, probed at ports, compared."""
+"""Compare a simulator with recordings: refit it, insert terms at ports."""

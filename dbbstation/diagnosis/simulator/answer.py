@@ -46,8 +46,8 @@ class RefittedOfSimulator:
     """A parameter of the simulator.
 
     Attributes:
-        shift_over_u: in standard uncertainties of the first; None if unknown.
-        confounded: R² on the found terms; zero without.
+        shift_over_u: shift in standard uncertainties of the first value; None if unknown.
+        confounded: R² on found terms; zero without terms.
     """
 
     name: str
@@ -67,10 +67,10 @@ class SimulatorComparison:
 
     Attributes:
         findings: present or possible terms, present first.
-        levels: existence, signals and ports, and term of a difference.
+        levels: existence, followed signals, and term of a difference.
         held_out: None if not tested.
-        as_simulated: measured less simulated at stated parameters, shape (n,).
-        nonlinear: departure from linearity per standard uncertainty, by term; nan without budget.
+        as_simulated: measured less simulated values at stated parameters, shape (n,).
+        nonlinear: departure from linearity in standard uncertainties, by term; nan without budget.
     """
 
     model: Model
@@ -94,23 +94,23 @@ class SimulatorComparison:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """Return inserted terms with numbers."""
+        """Return the inserted terms with values."""
         return self.found.state.terms
 
     @property
     def is_there(self) -> bool:
-        """Return whether anything is missing, including an unfinished search's next term."""
+        """Return whether the simulator lacks a term, including the next term of an unfinished search."""
         next_in = bool(self.stopped) and bool(self.found.settled.best.members)
         return bool(self.terms) or not self.left.is_noise or next_in
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
-        """Return findings that are present and predict, if tested."""
+        """Return the findings that are present and, if tested, predict."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
     @property
     def rms(self) -> tuple[float, float, float]:
-        """Return rms as simulated, refitted, corrected."""
+        """Return the rms errors as simulated, refitted and corrected."""
         every = (self.as_simulated, self.base.fitted.residual, self.found.residual)
         return tuple(float(np.sqrt(np.mean(rows**2))) for rows in every)  # type: ignore[return-value]  # three of them
 
@@ -124,14 +124,14 @@ def find(
     matters: float | None = None,
     progress: Callable[..., None] = lambda *_: None,
 ) -> SimulatorComparison:
-    """Find what a simulator lacks, and at which port.
+    """Find the terms that a simulator lacks, and their ports.
 
     Args:
-        hold_out: choose anew without each part; takes most of the time.
-        matters: size of interest, in the first output's unit; None: the refitted residual.
+        hold_out: whether to repeat the selection without each part, which takes most of the time.
+        matters: size of interest, in the first output's unit; None for the refitted residual.
 
     Raises:
-        CalibrationError: a simulation failed; with its input.
+        CalibrationError: a simulation failed; states its input.
     """
     stated = FittedState(tuple(p.value for p in model.parameters))
     work = SimulationRuns(model, run, np.ones(len(model.outputs)))
@@ -157,7 +157,7 @@ def _scales(work: SimulationRuns, stated: FittedState) -> Floats:
     residual, outputs = work.residuals([stated])[0], len(work.model.outputs)
     noise = []
     for k in range(outputs):
-        # Second differences: what is smooth falls out [variance of white noise is a sixth of theirs].
+        # Second differences remove smooth parts; the variance of white noise is a sixth of theirs.
         rows = [np.diff(residual[block], 2) for block in work.blocks[k::outputs]]
         noise.append(float(np.sqrt(np.mean(np.square(np.concatenate(rows))) / 6.0)))
     if min(noise) <= 0.0:
@@ -212,7 +212,7 @@ def _said(
 def _judged(
     one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float], open_to: Mapping[str, Challenge]
 ) -> CauseFinding:
-    """Return a finding with the term's values; not named if nonlinear or beaten by a curve."""
+    """Return a finding with the term's values; it is not named if nonlinear or worse than a curve."""
     inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
     if one.name not in inside:
         if one.verdict.rank < Verdict.AMBIGUOUS.rank:
@@ -250,8 +250,8 @@ CAME_BACK = "the search came back to where it had been"
 NOT_REACHED = "the simulations that were allowed were spent before"
 
 MOST_ASKED = 2.0
-"""Standard uncertainties by which a term may be from where the comparison about its refit has it: beyond, which is one case in twenty, what
-is put in is not what these answers are about, and no term beside it is sure."""
+"""Largest distance of a refitted term from the comparison about the refit, in standard uncertainties. Beyond, one case
+in twenty, the linear responses do not describe the refit, and no other term is sure."""
 
 
 def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Candidates at ports: every form over every signal."""
+"""Candidate terms at ports: every form over every signal."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.own import PortSource
 
 ROUNDINGS = (0.01, 0.1)
-"""Shares of a signal's greatest value within which a sign turns: an integrator steps over anything sharper, and what turns less sharply
-is a curve."""
+"""Widths of a sign's transition over the signal's greatest value; integrators step over sharper ones, and wider ones
+are curves."""
 
 REACH = 10.0
-"""Factor by which a time constant or a width may be beyond the ends of its grid."""
+"""Factor by which a time constant or width may exceed its grid."""
 
 INNER = 2
-"""Knots of a smooth curve inside the range of its signal, which then is a cubic spline of four functions beside a straight line."""
+"""Inner knots of a smooth curve: a cubic spline with four functions in addition to a straight line."""
 
 PERIODS = {"rad": 2.0 * np.pi, "deg": 360.0, "turn": 1.0}
 """One turn of an angle, by its unit."""
 
 DISTINCT = 3
-"""Different values that a signal needs for more than a constant at its port."""
+"""Fewest different values of a signal for terms other than a constant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,8 @@ class Candidate:
     """A possible missing term.
 
     Attributes:
-        term: zero amplitude, mid-grid.
-        tried: sizes for forms that replace a signal; else empty.
+        term: with zero amplitude and mid-grid parameters.
+        tried: tried sizes for forms that replace a signal; else empty.
         driven: signals that result from the simulation.
     """
 
@@ -73,8 +73,8 @@ def candidates(
     """Return every form at every port.
 
     Args:
-        signals: by port and name with `t`, of all calls, shape (calls,).
-        times: of the longest run, rising, shape (n,), for time constants.
+        signals: of all calls, with `t`, by port and name, shape (calls,).
+        times: of the longest run, ascending, shape (n,), for time constants.
     """
     found: list[Candidate] = []
     for port in ports:
@@ -103,7 +103,7 @@ def candidates(
 
 
 def _weighed(one: Candidate, members: int, results: Collection[tuple[str, str]]) -> Candidate:
-    """Return a candidate with its prior odds among others of its form; signals that result from the simulation rank lower."""
+    """Return a candidate with its prior odds among candidates of its form; signals that result from the simulation have lower odds."""
     driven = frozenset(signal for signal in one.term.signals if (one.term.port, signal) in results)
     return replace(one, log_odds=log_odds(members) + (DRIVEN_ODDS if driven else 0.0), driven=driven)
 
@@ -114,7 +114,7 @@ def _span(times: Floats) -> tuple[float, float]:
 
 
 def _at(port: SimulatorPort, signals: Mapping[str, Floats], span: tuple[float, float]) -> list[Candidate]:
-    """Return a port's forms over varying signals, shape (calls,)."""
+    """Yield a port's terms over varying signals, shape (calls,)."""
     found = [_candidate(port, TermForm.CONSTANT, (), ("value",), (port.unit,))]
     greatest = sizes(signals)
     for name, values in signals.items():
@@ -134,7 +134,7 @@ def _at(port: SimulatorPort, signals: Mapping[str, Floats], span: tuple[float, f
             hinge = _candidate(
                 port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=inside
             )
-            # Beyond what the signal reached a hinge does nothing, and its numbers could be anything.
+            # A hinge outside the signal's range has no effect, so its values are undetermined.
             reached = (float(values.min()), float(values.max()))
             found.append(replace(hinge, term=replace(hinge.term, bounds=(reached,))))
         constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), BOUNDS.answer_lengths).tolist())
@@ -169,7 +169,7 @@ def _in_place(
     span: tuple[float, float],
     widths: tuple[float, ...],
 ) -> list[Candidate]:
-    """Return forms that replace a signal, shape (calls,)."""
+    """Yield terms that replace a signal, shape (calls,)."""
     unit = port.signals[name]
     whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), BOUNDS.answer_lengths + 1).tolist())
     forms = [
@@ -208,7 +208,7 @@ def _candidate(
 
 
 def inner_quantiles(values: Floats, count: int) -> tuple[float, ...]:
-    """Return a signal's distinct inner quantiles, rising; may be empty."""
+    """Return a signal's distinct inner quantiles, ascending; may be empty."""
     every = np.unique(np.quantile(values, np.linspace(0.0, 1.0, count + 2)[1:-1]))
     return tuple(every[(every > values.min()) & (every < values.max())].tolist())
 
@@ -227,7 +227,7 @@ def _per(unit: str, other: str, power: str = "") -> str:
 
 
 def basis(term: Term, values: Floats) -> Floats:
-    """Return a curve's functions at signal values, shape (n, p)."""
+    """Return a curve's basis functions at signal values, shape (n, p)."""
     inside = np.clip(values, term.fixed[0], term.fixed[-1])
     splines = BSpline.design_matrix(inside, np.array(term.fixed), DEGREE).toarray()
     return np.asarray(splines @ bends(term.fixed))

@@ -1,4 +1,4 @@
-"""Value of refitted terms, and named laws against curves."""
+"""Evaluate refitted terms, and test named laws against curves."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 SHARES = (0.0, 0.3, 1.0)
-"""How closely an object follows its forms, in units of what is stated: exactly, or as loosely as stated at the most."""
+"""Tried inaccuracies of forms, in units of the stated one, from exact to stated."""
 
 WORTH = math.log(SURE / ABSENT)
-"""Log odds that a term must have once it is refitted, those without it being one, to stay."""
+"""Least log odds for keeping a refitted term."""
 
 
 def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
-    """Return a refitted node's negative log posterior in its own noise.
+    """Return a refitted node's negative log posterior, with its own noise.
 
-    A comparison measures noise beside linear answers. Slack of forms is averaged over.
+    Comparisons estimate noise from linear responses instead. The inaccuracy of forms is marginalised.
     """
     work, fitted, channel = nodes.work, node.fitted, settled.channel
     state, residual = fitted.state, fitted.residual
@@ -56,9 +56,9 @@ def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
 
 
 def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
-    """Return a node with one or two named laws in a curve's place, unless odds of 19 favour the curve.
+    """Return a node with one or two named laws instead of a curve, unless odds of 19 favour the curve.
 
-    A curve tests a law's form and is no cause itself.
+    A curve only tests a law's form; it is no cause.
     """
     for one in node.inside:
         if one.term.form is not TermForm.CURVE:

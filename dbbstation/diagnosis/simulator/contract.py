@@ -1,4 +1,4 @@
-"""The contract of a simulator, and one simulation."""
+"""The interface of a simulator, and a single simulation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Simulator(ABC):
-    """A simulation, without state between runs."""
+    """A simulator; instances have no state between runs."""
 
     @abstractmethod
     def simulate(
@@ -29,12 +29,12 @@ class Simulator(ABC):
     ) -> Mapping[str, Floats]:
         """Return outputs at recording times, shape (n,), in their units.
 
-        Call `ports.NAME(t, signals)` at every step and add its value, zero unless a term is tried. Steps may repeat or
-        go back.
+        Call `ports.NAME(t, signals)` at every step and add its value, which is zero unless a term is tried. Steps may
+        be repeated or reversed.
 
         Args:
-            inputs: `t` [s] and inputs by name, shape (n,).
-            parameters: with initial states, by name.
+            inputs: `t` [s] and the inputs by name, shape (n,).
+            parameters: and initial states, by name.
         """
 
 
@@ -42,8 +42,8 @@ def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> Sim
     """Run a simulator once.
 
     Raises:
-        SimulationFault: outputs differ from the model's.
-        Exception: of the simulator.
+        SimulationFault: outputs do not match the model.
+        Exception: raised by the simulator.
     """
     acting: dict[str, list[Evaluate]] = {}
     for term in ask.terms:
@@ -57,7 +57,7 @@ def simulated(simulator: Simulator, model: Model, ask: SimulationRequest) -> Sim
         except (ArithmeticError, ValueError) as error:
             if isinstance(error, ValueError) and "math" not in str(error):
                 raise
-            # Numbers beyond what arithmetic has, or functions of infinity: it ran away.
+            # Overflow, or functions of infinity: the simulation diverged.
             return SimulationOutcome(np.full((len(model.outputs), len(run)), np.nan))
     found = np.empty((len(model.outputs), len(run)))
     for k, output in enumerate(model.outputs):

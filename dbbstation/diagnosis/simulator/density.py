@@ -1,4 +1,4 @@
-"""Predictive density of unused rows after a refit, with correlated noise and parameter uncertainty."""
+"""Predictive density of held-out rows after a refit, with correlated noise and parameter uncertainty."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def log_density(
     residual: Floats,
     columns: Floats,
 ) -> float:
-    """Return log density of rows under a refit to others [Good, J. R. Stat. Soc. B 14 (1952) 107]; long-tailed noise uses Student's t.
+    """Return the log density of rows for a refit to others [Good, J. R. Stat. Soc. B 14 (1952) 107]; Student's t for long tails.
 
     Args:
-        rows: predicted, shape (n,).
-        columns: of fitted numbers, shape (n, m).
+        rows: predicted rows, shape (n,).
+        columns: derivatives by fitted parameters, shape (n, m).
     """
     bank = noise_left(work, residual, columns, rows=channel)
     noise, kinds = bank.noise, work.output[channel.kept]
@@ -50,7 +50,7 @@ def log_density(
     norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     open_ = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-10, hermitian=True)
     there = white(columns) / norm
-    # The covariance of the rows is one plus there @ open_ @ there.T; its inverse and determinant come from the small side [Woodbury].
+    # The rows' covariance is one plus there @ open_ @ there.T; Woodbury's formula gives inverse and determinant.
     inner = np.eye(len(open_)) + open_ @ (there.T @ there)
     towards = there.T @ left
     squares = float(left @ left - towards @ np.linalg.solve(inner, open_ @ towards))

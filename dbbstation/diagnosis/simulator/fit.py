@@ -1,4 +1,4 @@
-"""Bounded trust-region least squares of a simulator from several starts."""
+"""Fit a simulator by bounded trust-region least squares from several starts."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ if TYPE_CHECKING:
     Weigh = Callable[[Floats], Floats]
 
 SPREAD = 0.3
-"""Share of its value by which a parameter is started elsewhere, where neither uncertainty nor bounds are stated."""
+"""Spread of starting values, relative to the parameter, if neither uncertainty nor bounds are stated."""
 
 CLOSE = 1e-5
-"""Relative change of the sum of squares from which on a fit has ended: for a thousand rows, a tenth of a standard uncertainty."""
+"""Relative change of the sum of squares that ends a fit: for a thousand rows, a tenth of a standard uncertainty."""
 
 ALIKE = 0.999
-"""Share of what one parameter does that the others can do as well, R², from which on the recordings cannot tell it from them: its
-uncertainty is more than thirty times what it would be alone."""
+"""R² of a parameter's effect on the others' effects above which they are indistinguishable: its uncertainty is then
+over thirty times its uncertainty alone."""
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatorFit:
-    """A refit.
+    """Result of a refit.
 
     Attributes:
-        columns: per fitted number, shape (n, m).
-        curved: difference of two doses, shape (m,).
+        columns: derivatives by fitted parameters, shape (n, m).
+        curved: relative difference between responses to two doses, shape (m,).
     """
 
     state: FittedState
@@ -58,7 +58,7 @@ def plain(rows: Floats) -> Floats:
 
 
 def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedParameter]:
-    """Return a state's numbers with first doses within bounds."""
+    """Return a state's parameters with first doses within bounds."""
     low, high = bounds_of(work, state)
     numbers = state.numbers
     keys: list[tuple[str, ...]] = [(p.name,) for p in work.model.parameters]
@@ -77,7 +77,7 @@ def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedPar
 
 
 def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[Floats, Floats]:
-    """Return each number's bounds, shape (m,)."""
+    """Return the bounds of each parameter, shape (m,)."""
     low = [p.low for p in work.model.parameters]
     high = [p.high for p in work.model.parameters]
     for term in state.terms:
@@ -97,11 +97,11 @@ def fit(
     several: bool = False,
     most_steps: int = BOUNDS.fit_steps,
 ) -> SimulatorFit:
-    """Fit all numbers [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
+    """Fit all parameters [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
 
     Args:
-        weigh: such as whitening, to deviation `sigma`.
-        sigma: 0: priors are relative to the start's residual.
+        weigh: transformation of rows, such as whitening, to noise `sigma`.
+        sigma: 0 for priors relative to the starting residual.
     """
     begun = work.residuals([start])[0]
     sigma = sigma or rms(weigh(begun)) or 1.0
@@ -134,8 +134,8 @@ def _from(
         state = start.with_numbers(numbers)
         return _weighed(work, state, residual(numbers), weigh, sigma)
 
-    # Answers are asked for anew only where those that are there do not say what the last steps did.
-    about: list[tuple[Floats, Floats, Floats]] = []  # numbers, rows and columns there
+    # Derivatives are recomputed only if they do not predict the last steps.
+    about: list[tuple[Floats, Floats, Floats]] = []  # parameters, rows and derivatives at this point
 
     def columns(numbers: Floats) -> Floats:
         rows = weighed(numbers)
@@ -177,7 +177,7 @@ def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[Floats
     known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
     rows = np.zeros((len(known), max(count, len(parameters))))
     for row, (k, p) in enumerate(known):
-        rows[row, k] = 1.0 / p.uncertainty  # type: ignore[operator]  # those without are left out
+        rows[row, k] = 1.0 / p.uncertainty  # type: ignore[operator] # without bounds: omitted
     return rows, np.array([p.value / p.uncertainty for _, p in known])  # type: ignore[operator]  # the same
 
 
@@ -207,10 +207,10 @@ def _elsewhere(
 def near(
     work: SimulationRuns, fitted: SimulatorFit, weigh: Weigh, sigma: float, rounds: int = 6
 ) -> tuple[FittedState, Floats]:
-    """Refit to some rows by simulated Gauss-Newton steps.
+    """Refit to some rows by Gauss-Newton steps with simulations.
 
     Args:
-        weigh: from all rows to fitted, whitened.
+        weigh: transformation from all rows to whitened fitted rows.
     """
     low, high = bounds_of(work, fitted.state)
     state, residual = fitted.state, fitted.residual
@@ -219,7 +219,7 @@ def near(
     if not rows.shape[1]:
         return state, residual
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
-    # What these rows hardly see stays: the initial state of a recording whose first rows are held back.
+    # Parameters that these rows hardly determine stay, such as the initial state if first rows are held out.
     seen = scale / np.maximum(np.linalg.norm(fitted.columns, axis=0), 1e-300)
     scale = np.where(seen < HARDLY * seen.max(), np.inf, scale)
     for _ in range(rounds):
@@ -242,14 +242,14 @@ def near(
 
 
 HARDLY = 1e-4
-"""Share of what all rows see of a number, over the largest such share, below which some of them do not see it."""
+"""Least ratio of a parameter's information in these rows to all rows, over the largest such ratio, for a determined parameter."""
 
 SMALLEST = 0.1
-"""Share of a step below which none is tried: the answers of all rows no longer hold there, or nothing is left to gain."""
+"""Least tried share of a step; with less, derivatives are invalid or no gain remains."""
 
 
 def not_told_apart(names: Sequence[str], columns: Floats) -> list[tuple[str, tuple[str, ...]]]:
-    """Return indistinguishable parameters with their substitutes."""
+    """Return indistinguishable parameters, with the parameters that can replace them."""
     norm = np.linalg.norm(columns, axis=0)
     found: list[tuple[str, tuple[str, ...]]] = []
     for k, name in enumerate(names):

@@ -1,4 +1,4 @@
-"""Held-out error of a simulator: omit, choose anew, simulate."""
+"""Held-out error of a simulator: omit rows, repeat the selection, simulate."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PredictedPart(Fold):
-    """One part, with gains of classes of signals there.
+    """One held-out part, with gains of classes of signals.
 
     Attributes:
-        where: shape (n,).
-        of_classes: by followed signals, log density (with minus without) and rms error without; all under an empty
-            name.
+        where: its rows, shape (n,).
+        of_classes: by followed signals, gain of log density, and rms error without the class; the empty set for all
+            terms.
     """
 
     where: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -46,10 +46,10 @@ class PredictedPart(Fold):
 
 
 class PredictedPartsError(HeldOutError):
-    """Held-back parts with terms' log density gains."""
+    """Held-out parts with log density gains of terms."""
 
     def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
-        """Return terms' joint gain per part; may be empty."""
+        """Return the summed gain of terms in each part."""
         gains = super().gains_of(kinds)
         return DensityGains(gains.parts, gains.rows)
 
@@ -72,7 +72,7 @@ def gains_of(parts: Sequence[PredictedPart]) -> KnownGains:
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, Flags]]:
-    """Return parts [`part_numbers` of the runs], all outputs together."""
+    """Return the parts, by `part_numbers` of the runs, with all outputs."""
     runs, outputs = work.model.runs, len(work.model.outputs)
     number = part_numbers([len(run) for run in runs])
     of_run = np.split(number, np.cumsum([len(run) for run in runs])[:-1])
@@ -95,7 +95,7 @@ def parts(work: SimulationRuns) -> list[tuple[str, Flags]]:
 def predicted_parts(
     nodes: Nodes, base: Node, found: SearchOutcome, stated: FittedState, progress: Callable[[str, int, int], None]
 ) -> Iterator[PredictedPart]:
-    """Hold parts back in turn, limited by the simulation budget."""
+    """Predict each part, as far as the simulation budget permits."""
     work, channel = nodes.work, found.node.channel
     as_simulated = work.residuals([stated])[0]
     every = parts(work)

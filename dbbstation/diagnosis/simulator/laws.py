@@ -1,4 +1,4 @@
-"""Candidates as laws whose columns are simulated answers to small doses."""
+"""Candidate terms as laws, with simulated responses to small doses as columns."""
 
 from __future__ import annotations
 
@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     Departures = Mapping[tuple[str, TermForm, tuple[str, ...]], Floats]
 
 FORM_UNCERTAINTY = 0.02
-"""Share of its effect by which real objects depart from a form over their state, one standard deviation, as springs and geometry do in
-[`TableSource`]."""
+"""Relative standard deviation of real objects from a form, as for springs and geometry in `TableSource`."""
 
 LOOSE_FORM_UNCERTAINTY = 0.1
-"""The same of friction, plays and memories."""
+"""The same for friction, play and memory."""
 
 LOOSE = frozenset({TermForm.SIGN, TermForm.SLIP, TermForm.PLAY, TermForm.MEMORY})
 
@@ -38,10 +37,10 @@ def laws(
     size: float,
     curved_most: float,
 ) -> tuple[list[Law], dict[str, str]]:
-    """Return candidates as laws about a state, and reasons against others.
+    """Return candidates as laws linearised about a state, and the reasons against others.
 
     Args:
-        curved_most: relative difference of doses that excludes a candidate.
+        curved_most: relative difference of responses that excludes a candidate.
     """
     dosed = [one for one in found if not one.tried]
     points = [(one, point) for one in dosed for point in product(*one.grids)]
@@ -72,17 +71,17 @@ def laws(
 
 
 OFF = frozenset({TermForm.CONSTANT, TermForm.LINEAR, TermForm.CURVE, TermForm.SLIP, TermForm.MEMORY})
-"""Along what real objects depart from a form: smooth curves over the signals of its port, of which a constant and a straight line are
-parts, and what lags behind these or sticks. A spring has a little of a hysteresis, and a capacitor in place of one of a memory."""
+"""Forms by which real objects depart from a form: smooth curves over its port's signals, constant and linear parts
+included, lags, and stick-slip. A spring has a little hysteresis, a capacitor a little memory."""
 
 
 def departing(one: Candidate) -> tuple[str, TermForm, tuple[str, ...]]:
-    """Return port, form and signals of terms that may be missing."""
+    """Return port, form and signals of terms that can represent departures."""
     return one.term.port, one.term.form, one.term.signals
 
 
 def departures(work: SimulationRuns, state: FittedState, found: Sequence[Candidate], size: float) -> Departures:
-    """Return other terms' slack about a state; terms without effect are omitted."""
+    """Return the slack that other terms give at a state; terms without effect are omitted."""
     points = [(one, point) for one in found for point in product(*(grid[::EVERY] for grid in one.grids))]
     answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
     off: dict[tuple[str, TermForm, tuple[str, ...]], list[Floats]] = {}
@@ -103,7 +102,7 @@ def of_unit_size(parts: Sequence[Floats]) -> Floats:
 
 
 EVERY = 2
-"""Of the points of a grid every second is taken for what other forms may be off by: between them answers hardly differ."""
+"""Every second grid point is used for departures, because responses hardly differ in between."""
 
 
 def _off(columns: Floats) -> Floats:
@@ -118,7 +117,7 @@ def form_uncertainty(one: Candidate) -> float:
 
 
 def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
-    """Return a form's slack: curves, lags and stick-slip over its port, as large as the effect."""
+    """Return a form's slack: curves, lags and stick-slip over its port, scaled to the effect's size."""
     own = [columns for key, columns in off.items() if key[0] == one.term.port and not _is_of(one, key)]
     if not own or not form_uncertainty(one):
         return None
@@ -162,7 +161,7 @@ def _law(one: Candidate, columns: Floats, size: float, off: Departures) -> Law:
 
 
 def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: float) -> Law | None:
-    """Return a replaced signal's law by share and size; None without effect."""
+    """Return the law for replacing a signal by share and size; None without effect."""
     before = work.residuals([state])[0]
     states = [PerturbedParameter((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
     answers = [before - after for after in work.residuals(states, strict=False)]
@@ -188,24 +187,24 @@ def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: fl
 
 
 def followed(one: Candidate) -> tuple[str, ...]:
-    """Return a candidate's signals, or its port."""
+    """Return a candidate's signals, else its port."""
     return tuple(f"{signal} at {one.term.port}" for signal in one.term.signals) or (f"port {one.term.port}",)
 
 
 def way(one: Candidate) -> str:
-    """Return the way of following; empty: by value."""
+    """Return how a candidate follows its signals; empty for value."""
     if one.term.form in {TermForm.SLIP, TermForm.PLAY}:
         return "direction"
     return "late" if one.term.form in MEMORIES else ""
 
 
 SHARE = "share"
-"""What a law of something in the place of a signal calls its amplitude."""
+"""Amplitude's name in laws that replace a signal."""
 
 FEWEST_SIZES = 2
 
 MOST_ANSWER = 100.0
-"""Largest answer to something in the place of a signal, over the residual: beyond, the simulation runs away, or it would have shown."""
+"""Largest response to replacing a signal, over the residual; larger ones diverge or would be visible."""
 
 
 def _between(grids: tuple[tuple[float, ...], ...], columns: Floats) -> Callable[[tuple[float, ...]], Floats]:

@@ -1,4 +1,4 @@
-"""A simulator and its recordings: parameters, ports, outputs, runs."""
+"""A simulator with its parameters, ports, outputs and recordings."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SimulatorParameter:
-    """A number refitted with every hypothesis.
+    """A parameter that every hypothesis refits.
 
     Attributes:
-        name: unique; initial states have the run's number from 1.
-        uncertainty: prior standard uncertainty; None: unknown.
-        run: from 0; None: all.
+        name: unique; initial states end with the run's number, from 1.
+        uncertainty: prior standard uncertainty; None if unknown.
+        run: from 0; None for all runs.
     """
 
     name: str
@@ -44,8 +44,8 @@ class SimulatorPort:
     """A place in the simulator where a term may act.
 
     Attributes:
-        name: in `simulate`.
-        signals: unit by name.
+        name: as called in `simulate`.
+        signals: units by name.
         results: signals that result from the simulation.
     """
 
@@ -58,10 +58,10 @@ class SimulatorPort:
 
 @dataclass(frozen=True)
 class Output:
-    """What is measured of the simulated object.
+    """One measured output of the simulated object.
 
     Attributes:
-        filter_s: first-order sensor filter of simulated values; 0: none.
+        filter_s: time constant of a first-order sensor filter of simulated values; 0 for none.
     """
 
     name: str
@@ -97,14 +97,14 @@ class Model:
     runs: tuple[SimulatorRecording, ...]
 
     def of_run(self, run: int, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
-        """Return one run's arguments of `simulate` from values, shape (k,)."""
+        """Return the arguments of `simulate` for one run and parameter values, shape (k,)."""
         pairs = zip(self.parameters, values, strict=True)
         return tuple((p.key, float(value)) for p, value in pairs if p.run is None or p.run == run)
 
 
 @dataclass(frozen=True, eq=False)
 class TrialInput:
-    """Inputs that were not recorded yet.
+    """Inputs that are not yet recorded.
 
     Attributes:
         inputs: `t` [s] and inputs, shape (n,).
@@ -117,7 +117,7 @@ class TrialInput:
 
 @dataclass(frozen=True)
 class SimulationRequest:
-    """One simulation.
+    """Request of one simulation.
 
     Attributes:
         trial: other inputs, or None.
@@ -135,7 +135,7 @@ class SimulationOutcome:
     """The outcome of one simulation.
 
     Attributes:
-        outputs: in model order, shape (o, n); not finite if it ran away.
+        outputs: in the model's order, shape (o, n); not finite if it diverged.
         signals: by port and name with `t`, if requested, shape (calls,).
     """
 

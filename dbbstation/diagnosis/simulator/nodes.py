@@ -1,4 +1,4 @@
-"""Refitted simulators with terms, and channels about them."""
+"""Refitted simulators with terms, and channels linearised about them."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A simulator with some terms, refitted.
+    """A simulator with some terms, after a refit.
 
     Attributes:
-        size: rms without terms, a bound of explanation.
+        size: rms without terms, an upper bound of effects.
     """
 
     work: SimulationRuns
@@ -63,7 +63,7 @@ class Node:
 
     @cached_property
     def outside(self) -> tuple[Candidate, ...]:
-        """Return candidates not inserted."""
+        """Return the candidates that are not inserted."""
         work = self.work
         longest = max(work.model.runs, key=len).inputs["t"]
         found = candidates(work.model.ports, work.signals(self.fitted.state), self.own, longest)
@@ -77,12 +77,12 @@ class Node:
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Return laws that are not inserted yet, and reasons against the rest."""
+        """Return the laws of candidates that are not inserted, and the reasons against others."""
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property
     def off(self) -> Departures:
-        """Return inserted terms' slack: curves, lags, stick-slip."""
+        """Return the slack of inserted terms: curves, lags, stick-slip."""
         found = {
             departing(one): of_unit_size([self.answers_of(one.name)]) for one in self.inside if one.term.form in OFF
         }
@@ -91,7 +91,7 @@ class Node:
         return {**found, **departures(self.work, self.fitted.state, others, self.size)}
 
     def answers_of(self, name: str) -> Floats:
-        """Return a term's answers, shape (n, p)."""
+        """Return the responses to a term, shape (n, p)."""
         first = len(self.work.model.parameters)
         for one, term in zip(self.inside, self.fitted.state.terms, strict=True):
             if one.name == name:
@@ -106,7 +106,7 @@ class Node:
 
     @cached_property
     def alone(self) -> Channel:
-        """Return the channel of inserted terms without rivals and slack; needs no simulation."""
+        """Return the channel of inserted terms without rivals and slack, which needs no simulation."""
         return self._channel({}, ())
 
     def _channel(self, off: Departures, others: Sequence[Law]) -> Channel:
@@ -129,7 +129,7 @@ class Node:
         return channel_of(work, residual, base, (*mine, *others))
 
     def but_for(self, refuted: Collection[str]) -> Channel:
-        """Return the channel without some outside terms."""
+        """Return the channel without some candidates."""
         laws_left = tuple(law for law in self.channel.laws if law.name not in refuted)
         return replace(self.channel, laws=laws_left)
 
@@ -151,10 +151,10 @@ class Node:
         )
 
     def numbers_of(self, settled: Settled, one: Candidate, beside: Sequence[Member] | None = None) -> tuple[float, ...]:
-        """Return a comparison's numbers for a candidate.
+        """Return a comparison's estimates for a candidate.
 
         Args:
-            beside: members; None: the best hypothesis.
+            beside: other members; None for the best hypothesis.
         """
         beside = settled.best.members if beside is None else beside
         others = [m for m in beside if m.cause.name != one.name]
@@ -172,21 +172,21 @@ class Node:
 
 
 SHARES = (1.0, 0.3, 0.1)
-"""Shares of what the linear comparison proposes at which a refit may be begun: that which leaves least, the next where it fails."""
+"""Starting values of a refit over the linear estimates: first the share with the least residual, then the others if it fails."""
 
 MOST_SHARE = 2.0
-"""Share of the largest size tried that a fit may begin at: beyond, the answer was not taken."""
+"""Largest starting value over the largest simulated size; beyond, the response is unknown."""
 
 CURVED_MOST = 3.0 * AGREE
-"""Difference of the answers to two doses, over the answer, beyond which a candidate is not asked: its answer is no column."""
+"""Relative difference between responses to two doses that excludes a candidate as too nonlinear."""
 
 
 @dataclass(frozen=True)
 class Challenge:
-    """Named laws against a curve.
+    """A test of named laws against a curve.
 
     Attributes:
-        log_odds: for the curve, with all costs.
+        log_odds: in favour of the curve, with all costs.
     """
 
     curve: str
@@ -196,10 +196,10 @@ class Challenge:
 
 @dataclass(eq=False)
 class Nodes:
-    """Visited nodes by terms.
+    """Refitted nodes, by terms.
 
     Attributes:
-        bettered: terms with a later better minimum.
+        bettered: terms for which a better minimum was found later.
     """
 
     work: SimulationRuns
@@ -211,7 +211,7 @@ class Nodes:
     challenges: list[Challenge] = field(default_factory=list)
 
     def withstood(self, node: Node) -> list[Challenge]:
-        """Return challenges in which a node has the names."""
+        """Return the challenges whose named laws are in a node."""
         return [one for one in self.challenges if one.names <= node.names and one.curve not in node.names]
 
     def base(self, start: FittedState) -> Node:
@@ -224,7 +224,7 @@ class Nodes:
         return node
 
     def with_more(self, node: Node, one: Candidate, settled: Settled) -> Node | None:
-        """Return a node with one more term; None if it runs away."""
+        """Return a node with one more term; None if it diverges."""
         names = node.names | {one.name}
         if names not in self.known:
             self.progress(f"refit with {one.name}")
@@ -251,10 +251,10 @@ class Nodes:
     def instead(
         self, node: Node, more: Sequence[Candidate], settled: Settled, beside: Sequence[Member] | None = None
     ) -> Node | None:
-        """Return a node with other terms; None if it runs away.
+        """Return a node with other terms; None if it diverges.
 
         Args:
-            beside: inserted members; None: the best hypothesis's.
+            beside: inserted members; None for the best hypothesis's.
         """
         beside = settled.best.members if beside is None else beside
         names = frozenset(member.cause.name for member in beside) & node.names | {one.name for one in more}
@@ -272,7 +272,7 @@ class Nodes:
         return self._known_or_begun(node, state, tuple(one for one, _ in kept)) or node
 
     def _known_or_begun(self, node: Node, state: FittedState, inside: tuple[Candidate, ...]) -> Node | None:
-        """Return the better of a known node and a new start; None if it runs away."""
+        """Return the better of a known node and a new start; None if it diverges."""
         names = frozenset(one.name for one in inside)
         place = node.names, names
         known = self.known.get(names)
@@ -291,16 +291,16 @@ class Nodes:
         return self.known.get(names)
 
     def again(self, node: Node, weigh: Weigh, sigma: float) -> Node:
-        """Return the node refitted in other noise."""
+        """Return the node refitted with other noise."""
         self.known[node.names] = replace(node, fitted=fit(self.work, node.fitted.state, weigh, sigma=sigma))
         return self.known[node.names]
 
     def _fitted(
         self, node: Node, state: FittedState, inside: tuple[Candidate, ...], most: float = np.inf
     ) -> Node | None:
-        """Refit plainly, then in own noise until stable.
+        """Refit unweighted, then repeatedly with its own noise until stable.
 
-        None if the residual exceeds `most`: a wrong minimum.
+        A residual above `most`, a wrong minimum, returns None.
         """
         fitted, before = fit(self.work, state), None
         if _rms(fitted.residual) > most:
@@ -315,8 +315,8 @@ class Nodes:
 
 
 BETTER = 0.9
-"""What another minimum must leave of the residual, over what the one that is known leaves, to be another: the same refit in other noise
-leaves about as much."""
+"""Largest ratio of residuals of a different, better minimum to the known one; other noise alone gives about equal
+residuals."""
 
 
 def _left(node: Node) -> float:
@@ -337,7 +337,7 @@ def _inside(one: Candidate, numbers: Sequence[float]) -> list[float]:
 
 
 def noise_of(settled: Settled) -> tuple[Weigh, float]:
-    """Return a comparison's whitening and standard deviation."""
+    """Return the whitening and standard deviation of a comparison's noise."""
     return settled.bank.whitened, settled.noise.innovation
 
 

@@ -1,4 +1,4 @@
-"""A refit's noise and probability."""
+"""Noise and probability of a refit."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def noise_left(
     off: Floats | None = None,
     rows: Channel | None = None,
 ) -> Bank:
-    """Return a refit's noise, measured beside all fitted columns.
+    """Estimate a refit's noise, accounting for all fitted columns.
 
     Args:
-        off: slack of unit size, shape (n, q); None: none.
-        rows: channel of kept rows; None: all.
+        off: slack of unit size, shape (n, q); or None.
+        rows: channel of kept rows; None for all.
     """
     off = np.zeros((len(residual), 0)) if off is None else off
     fitted, free = columns.shape[1], off.shape[1]
@@ -68,10 +68,10 @@ def noise_left(
 
 
 def log_probability_of(bank: Bank, residual: Floats, off: Floats, numbers: int) -> float:
-    """Return rows' log probability with parameter cost [Schwarz's criterion], up to a constant.
+    """Return the log probability of rows with cost of parameters [Schwarz's criterion], up to a constant.
 
     Args:
-        off: slack of unit size, averaged over, shape (n, q).
+        off: slack of unit size, marginalised, shape (n, q).
     """
     rows = bank.whitened(residual) / bank.noise.innovation
     beside = bank.whitened(off) / bank.noise.innovation

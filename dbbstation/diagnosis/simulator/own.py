@@ -1,18 +1,18 @@
-"""The contract of own physics at a port."""
+"""The interface of a user's physics at a port."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
-from dbbstation.sources.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
+from dbbstation.sources.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the interface
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
 class PortSource(ABC):
-    """A physical cause at a port, without state."""
+    """A physical cause at a port; instances have no state."""
 
     name: ClassVar[str]
     """Unique, in small letters with hyphens."""
@@ -22,8 +22,8 @@ class PortSource(ABC):
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return amplitudes, then numbers with a `grid`."""
+        """Return amplitudes, then nonlinear parameters with a `grid`."""
 
     @abstractmethod
     def value(self, t: float, signals: Mapping[str, float], parameters: Mapping[str, float]) -> float:
-        """Return what acts at the port, in its unit."""
+        """Return the value at the port, in its unit."""

@@ -1,4 +1,4 @@
-"""Ports for a simulator."""
+"""Ports through which terms act in a simulator."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.terms import Evaluate
 
 
-class SimulationFault(Exception):  # noqa: N818 - a fault of the user's simulator, told as a refusal
+class SimulationFault(Exception):  # noqa: N818 - a fault of the user's simulator
     """Invalid outputs of a simulator."""
 
 
 class Ports:
-    """`ports.NAME(t, signals)` returns the terms' value, for numbers or arrays of rows."""
+    """`ports.NAME(t, signals)` returns the sum of its terms, for numbers or arrays."""
 
     def __init__(
         self, ports: Sequence[SimulatorPort], acting: Mapping[str, Sequence[Evaluate]], *, records: bool
@@ -69,7 +69,7 @@ class Ports:
 
 
 PortCall: TypeAlias = "Callable[[float, Mapping[str, float]], float | Floats]"
-"""What a simulator calls: time and signals to what acts there."""
+"""Function that a simulator calls with time and signals; it returns the terms' value."""
 
 
 def _quickly(acting: Sequence[Evaluate], called: PortCall) -> PortCall:

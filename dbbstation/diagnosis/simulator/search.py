@@ -1,4 +1,4 @@
-"""Find missing terms: compare, insert, refit, probe, until stable."""
+"""Find missing terms: compare, insert, refit, simulate, until stable."""
 
 from __future__ import annotations
 
@@ -31,11 +31,10 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
 
 RIVAL_SHARE = 0.5
-"""Log posterior of a rival by the linear comparison, over that of the best, from which on it is put in: linear answers to a term that
-is not small may be off by about as much."""
+"""Least log posterior of an inserted rival, over the best one's: linear responses to large terms may err by so much."""
 
 STILL = 0.1
-"""Move, over its standard uncertainty, from which on a value has settled."""
+"""Largest move of a converged value, in standard uncertainties."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +42,8 @@ class SearchOutcome:
     """The end of a search.
 
     Attributes:
-        is_settled: all moves are below a tenth of the uncertainty, and no further term is wanted.
-        withstood: curves replaced by names.
+        is_settled: whether all moves are below a tenth of the uncertainty, and no further term is needed.
+        withstood: tests in which named laws replaced a curve.
     """
 
     node: Node
@@ -58,23 +57,23 @@ class SearchOutcome:
 
 
 def compared(channel: Channel, progress: Callable[[str], None] = lambda _: None) -> Settled:
-    """Compare everything in all noises."""
+    """Compare all candidates, with all initial noise models."""
     return settle(channel, look=False, static=False, progress=progress)
 
 
 def compared_quickly(channel: Channel, beginning: Beginning) -> Settled:
-    """Compare quickly from one start; large effects may be missed."""
+    """Compare quickly from one start, which may miss large effects."""
     beginnings = tuple(dict.fromkeys((beginning, Beginning.EVERYTHING)))
     return settle(channel, look=False, static=False, most_expanded=0, thorough=False, beginnings=beginnings)
 
 
 def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, refits: bool = True) -> SearchOutcome:
-    """Insert missing terms one by one, and reject unneeded terms.
+    """Insert missing terms one by one, and remove unnecessary terms.
 
     Args:
-        refits: refit in own noise until stable; False for held-back rows.
+        refits: whether to refit with own noise until stable; False for held-out rows.
     """
-    nodes.challenges.clear()  # those of other rows say nothing here
+    nodes.challenges.clear()  # results from other rows do not apply
     node, been, refuted, refitted, stopped = base, {base.names}, dict[str, str](), 0, ""
     settled, still, put_in = compare(node.channel), False, node
     try:
@@ -105,7 +104,7 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
             raise
         stopped = error.what
         if put_in is not node:
-            # What was put in last is said beside nothing else: its rivals have not been asked about it.
+            # Rivals of the last inserted term are not yet compared.
             node, settled = put_in, compare(put_in.alone)
     if refits:
         still = still and not stopped and node.names <= settled.best.names
@@ -118,28 +117,28 @@ def search(nodes: Nodes, base: Node, compare: Callable[[Channel], Settled], *, r
 REFUTED = "it was put in and refitted, and is not worth it there"
 BEATEN = "named terms are in its place, and it does not refute them"
 WITHIN = "it is less than what the terms at its port may be off by"
-"""Why a term that linear answers asked for is not compared in the end."""
+"""Why a term favoured by linear responses is not compared in the end."""
 
 
 def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Mapping[str, str]]:
     outside = {one.name: one for one in node.outside}
     more = [member.cause.name for member in settled.best.members if member.cause.name in outside]
     if settled.averaged(settled.posterior.probability(outside), outside) < SURE:
-        more = []  # the recordings do not want anything more for sure
+        more = []  # no further term is sure
     small = within_forms(node, settled, more)
     if small and len(small) == len(more):
         return None, dict.fromkeys(small, WITHIN)
     more = [name for name in more if name not in small]
     if more:
         first = max(more, key=settled.best.log_factor)
-        # Linear answers about a good fit are right: what is better than some of its terms stands in their place.
+        # Near a good fit linear responses are correct, so a better term replaces some of its terms.
         displaced = not node.names <= settled.best.names
         together = [nodes.instead(node, [outside[name] for name in more], settled)] if displaced else []
         rivals = (nodes.with_more(node, one, settled) for one in _rivals(node, settled, outside[first]))
         tried = [one for one in (*together, *rivals) if one is not None and not _within_forms_refitted(one, node.names)]
         costs = [cost(nodes, one, settled) for one in tried]
         if not tried or cost(nodes, node, settled) - min(costs) < WORTH:
-            return None, dict.fromkeys(more, REFUTED)  # by linear answers only, or the simulation runs away with them
+            return None, dict.fromkeys(more, REFUTED)  # by linear responses only, or the simulation diverges
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")
         return best, {}
@@ -148,9 +147,10 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
 
 
 def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
-    """Return members smaller than the slack of others at their port.
+    """Return the members smaller than the slack of other terms at their port.
 
-    Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, since similar effects may cancel.
+    Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, because
+    similar effects may cancel.
     """
     every = {one.name: one for one in (*node.inside, *node.outside)}
     members = [every[member.cause.name] for member in settled.best.members]
@@ -202,7 +202,7 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
 
 
 def moves(node: Node, settled: Settled) -> dict[str, float]:
-    """Return each term's greatest move in standard uncertainties."""
+    """Return the greatest move of each term, in standard uncertainties."""
     terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
     largest = dict.fromkeys((name for name, _ in _said(node, settled)), 0.0)
     for (name, number), (value, uncertainty) in _said(node, settled).items():
@@ -224,7 +224,7 @@ def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, fl
         one, term = terms[member.cause.name]
         values = named_values(settled, member, found.values[own], found.covariance[own, own])
         for k, name in enumerate(one.names):
-            # Answers to shapes are about the shape that was fitted.
+            # Responses to shapes are linearised about the fitted shape.
             about = term.numbers[k] if k >= len(term.amplitudes) else 0.0
             if values[name].uncertainty > 0.0:
                 said[(one.name, name)] = about + values[name].value, values[name].uncertainty

@@ -1,4 +1,4 @@
-"""The input that best separates indistinguishable terms."""
+"""Find the input that best distinguishes two terms."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class SeparatingInput:
     """A recording that would distinguish two terms.
 
     Attributes:
-        repeats: of that stretch until distinguished.
-        input: best input in words; None if no tried input beats the recorded one.
-        input_sigmas: difference under it, for equal length.
+        repeats: of the recorded input until the terms are distinguished.
+        input: best input in words; None if no tried input is better than the recorded one.
+        input_sigmas: standardised difference with this input, for equal length.
     """
 
     text: str
@@ -97,7 +97,7 @@ def _tried(nodes: Nodes, found: SearchOutcome, pair: tuple[str, str]) -> tuple[T
     try:
         terms = [_term(found, name) for name in pair]
         sigmas = [apart(nodes.work, trial, found.state, terms, noise) for trial in trials]
-    except CalibrationError:  # no simulations are left, or the simulator does not bear inputs that nobody recorded
+    except CalibrationError:  # the budget is spent, or the simulator fails with other inputs
         return None, 0.0, 0.0
     best = int(np.argmax(sigmas))
     return (trials[best] if best else None), sigmas[best], sigmas[0]

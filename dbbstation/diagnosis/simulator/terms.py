@@ -1,6 +1,6 @@
 """Terms at a port: forms over its signals.
 
-Terms with memory depend only on earlier times, so every integrator gets equal answers.
+Terms with memory depend only on earlier times, so every integrator receives equal values.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ class TermForm(StrEnum):
     CUBIC = "cubic"  # a x³
     SIGN = "sign"  # a x / sqrt(x² + rounding²)
     HINGE = "hinge"  # a max(x - place, 0)
-    LIMIT = "limited"  # a x within half width, a half width beyond
+    LIMIT = "limited"  # a x within half width, constant beyond
     PRODUCT = "product"  # a x z
     CURVE = "curve"  # a_k B_k(x), splines without a straight line
     MEMORY = "memory"  # a times x through a first-order lag
     SLIP = "stick-slip"  # a times a spring of x that slides beyond a half width, 1 where it slides
     PERIODIC = "periodic"  # a cos x + b sin x, x in turns
-    DELAY = "delay"  # x a while ago, less x; a is that while
+    DELAY = "delay"  # delayed x, less x; a is the delay
     LAG = "lag"  # x through a first-order lag, less x; a is its time constant
     PLAY = "play"  # x through a play, less x; a is its half width
-    GAP = "dead zone"  # x beyond a half width, and nothing within, less x; a is the half width
-    OWN = "own"  # physics of the user's own
+    GAP = "dead zone"  # x beyond a half width, zero within, less x; a is the half width
+    OWN = "own"  # physics of the user
 
 
 IN_PLACE = frozenset({TermForm.DELAY, TermForm.LAG, TermForm.PLAY, TermForm.GAP})
-"""Forms that put something else in the place of a signal. Their amplitude cannot be negative and is not a factor."""
+"""Forms that replace a signal. Their amplitude is non-negative and no factor."""
 
 MEMORIES = frozenset({TermForm.MEMORY, TermForm.SLIP, TermForm.DELAY, TermForm.LAG, TermForm.PLAY})
 
@@ -58,7 +58,7 @@ class Term:
     """A term at a port.
 
     Attributes:
-        shape: nonlinear numbers, shape (s,).
+        shape: nonlinear parameters, shape (s,).
         fixed: knots, or period and order.
         bounds: of the shape, shape (s, 2); may be empty.
     """
@@ -83,11 +83,11 @@ class Term:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Return amplitudes, then shape."""
+        """Return amplitudes, then shape parameters."""
         return (*self.amplitudes, *self.shape)
 
     def with_numbers(self, numbers: Sequence[float]) -> Term:
-        """Return the term with other numbers, shape (p + s,)."""
+        """Return the term with other values, shape (p + s,)."""
         values, count = tuple(float(number) for number in numbers), len(self.amplitudes)
         return replace(self, amplitudes=values[:count], shape=values[count:])
 
@@ -162,7 +162,7 @@ def _own(term: Term) -> Evaluate:
 
 def _curve(term: Term) -> Evaluate:
     knots, x = np.array(term.fixed), term.signals[0]
-    # A table is read forty times faster than a spline; its error is (step/range)² times the curvature.
+    # A table is forty times faster than a spline; its error is (step/range)² times the curvature.
     places = np.linspace(knots[0], knots[-1], TABLE)
     values = BSpline(knots, bends(term.fixed) @ np.array(term.amplitudes), DEGREE)(places).tolist()
     low, per = float(knots[0]), (TABLE - 1) / float(knots[-1] - knots[0])
@@ -181,10 +181,10 @@ def _curve(term: Term) -> Evaluate:
 
 
 TABLE = 1001
-"""Places at which a curve is worked out."""
+"""Points of a curve's table."""
 
 DEGREE = 3
-"""Of the splines of a curve."""
+"""Degree of a curve's splines."""
 
 
 def bends(knots: Sequence[float]) -> Floats:
@@ -213,7 +213,7 @@ def _remembering(term: Term) -> Evaluate:
 
 
 Step: TypeAlias = "Callable[[tuple[float, float, float], float, float], float]"
-"""State from time, signal and state of the call before, a time and the signal there."""
+"""Function from the previous call's time, signal and state, a time and its signal, to a state."""
 
 
 def _lagging(constant: float) -> Step:
@@ -266,4 +266,4 @@ _STEPS: Mapping[TermForm, Callable[[float, tuple[float, ...]], tuple[Step, float
     TermForm.PLAY: lambda a, _: (_playing(a), 1.0, 0.0),
     TermForm.SLIP: lambda a, shape: (_playing(shape[0]), -a / shape[0], 0.0),
 }
-"""What goes on from call to call, the factor of its state, and that of the signal, by form."""
+"""By form: the function that updates the state, the factor of the state, and the factor of the signal."""

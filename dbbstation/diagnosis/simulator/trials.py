@@ -1,4 +1,4 @@
-"""Trial inputs made from recorded ones, simulated with each of two terms."""
+"""Trial inputs derived from recorded ones, simulated with each of two terms."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.terms import Term
 
 FACTORS = (0.5, 2.0)
-"""Sizes and speeds of the recorded inputs that are tried, over what they were."""
+"""Tried sizes and speeds, over the recorded ones."""
 
 PERIODS = (2, 8, 32)
-"""Turns of a sine over a recording that are tried: a slow one, one of the middle, a fast one."""
+"""Tried numbers of sine periods over a recording: slow, medium, fast."""
 
 QUARTER = 0.25
-"""Of a recording: a step is up for the middle half."""
+"""Share of a recording before and after a step."""
 
 
 def trial_inputs(model: Model) -> list[TrialInput]:
-    """Return the longest run's inputs and variations; none without inputs."""
+    """Return the longest run's inputs and variations; empty without inputs."""
     run = max(range(len(model.runs)), key=lambda k: len(model.runs[k]))
     recorded = model.runs[run]
     t = recorded.inputs["t"]
@@ -72,7 +72,7 @@ def trial_inputs(model: Model) -> list[TrialInput]:
 
 
 def apart(work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: Floats) -> float:
-    """Return the standardised difference of two terms under an input."""
+    """Return the standardised difference of two terms for an input."""
     model = work.model
     own = [k for k, p in enumerate(model.parameters) if p.run in {None, trial.run}]
     parameters = tuple(replace(p, run=None if p.run is None else 0) for p in (model.parameters[k] for k in own))
@@ -95,7 +95,7 @@ def apart(work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Seq
 
 
 def beside(columns: Floats, wanted: Floats) -> Floats:
-    """Return rows beyond columns, shape (n, p), shape (n,)."""
+    """Return the residual of rows, shape (n,), after fitting columns, shape (n, p)."""
     norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     values = np.linalg.lstsq(columns / norm, wanted, rcond=1e-10)[0]
     return np.asarray(wanted - (columns / norm) @ values)

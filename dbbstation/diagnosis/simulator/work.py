@@ -1,7 +1,7 @@
 """Residuals and derivatives of simulations.
 
-Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side]. The
-dose's effect is a hundredth of the residual, or less if both disagree.
+Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side]. A
+dose's effect is a hundredth of the residual, or less if both responses disagree.
 """
 
 from __future__ import annotations
@@ -36,32 +36,32 @@ class RanAwayError(CalibrationError):
 
 
 ANSWER = 0.01
-"""Answer to a dose, over the residual, both root mean squares: small enough to be linear, large beside what an integrator rounds."""
+"""Intended rms response to a dose over the residual's rms: nearly linear, but far above an integrator's rounding."""
 
 ROOM = 30.0
-"""Factor by which an answer may be off that and is still taken."""
+"""Largest factor between an accepted response and the intended one."""
 
 AGREE = 0.1
-"""Share by which answers per dose of two sizes may differ: of second order, their difference then leaves a hundredth or so."""
+"""Largest relative difference of responses per dose for two doses; second-order extrapolation then leaves about a hundredth."""
 
 UNSEEN = 1e-9
-"""Answer over the spread of the output below which there is none: digits run out there."""
+"""Response over the output's spread below which rounding dominates."""
 
 
 @dataclass(frozen=True)
 class FittedState:
-    """Values of all fitted numbers."""
+    """Values of all fitted parameters."""
 
     values: tuple[float, ...]
     terms: tuple[Term, ...] = ()
 
     @property
     def numbers(self) -> Floats:
-        """Return values, then terms' numbers, shape (m,)."""
+        """Return parameter values, then values of terms, shape (m,)."""
         return np.array([*self.values, *(number for term in self.terms for number in term.numbers)])
 
     def with_numbers(self, numbers: Floats) -> FittedState:
-        """Return the terms with other numbers, shape (m,)."""
+        """Return the terms with other values, shape (m,)."""
         own, first, terms = numbers.tolist(), len(self.values), []
         for term in self.terms:
             terms.append(term.with_numbers(own[first : first + len(term.numbers)]))
@@ -69,7 +69,7 @@ class FittedState:
         return FittedState(tuple(own[: len(self.values)]), tuple(terms))
 
     def moved(self, place: int, by: float) -> FittedState:
-        """Return the state with one number moved."""
+        """Return the state with one parameter changed."""
         numbers = self.numbers
         numbers[place] += by
         return self.with_numbers(numbers)
@@ -77,12 +77,12 @@ class FittedState:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """Derivatives by numbers.
+    """Derivatives by fitted parameters.
 
     Attributes:
         columns: scaled, shape (n, m).
-        curved: relative difference of doses, shape (m,).
-        seen: answering numbers, shape (m,).
+        curved: relative difference of responses to two doses, shape (m,).
+        seen: parameters with a response, shape (m,).
     """
 
     columns: Floats
@@ -95,8 +95,8 @@ class SimulationRuns:
     """Simulations of a model.
 
     Attributes:
-        scales: of residuals by output, shape (o,).
-        doses: suitable ones by number.
+        scales: sizes of residuals by output, shape (o,).
+        doses: suitable doses by parameter.
         trial: inputs of the model's only run, or None.
     """
 
@@ -117,14 +117,14 @@ class SimulationRuns:
 
     @property
     def size(self) -> int:
-        """Return rows of all runs and outputs."""
+        """Return the number of rows of all runs and outputs."""
         return len(self.time)
 
     def simulated(self, states: Sequence[FittedState], *, strict: bool = True) -> list[Floats]:
-        """Return simulated outputs of all rows at each state, shape (n,).
+        """Return simulated outputs of all rows for each state, shape (n,) each.
 
         Raises:
-            RanAwayError: not finite, if `strict`.
+            RanAwayError: an output is not finite, if `strict`.
         """
         runs = range(len(self.model.runs))
         asks = [
@@ -170,7 +170,7 @@ class SimulationRuns:
         }
 
     def answers(self, state: FittedState, directions: Sequence[PerturbedParameter], size: float) -> Answers:
-        """Return answers to small doses."""
+        """Return the derivatives, from responses to small doses."""
         before = self.residuals([state])[0]
         floor = UNSEEN * float(np.std(self.measured / self.scale))
         wanted = max(ANSWER * size, 100.0 * floor)
@@ -212,10 +212,10 @@ class SimulationRuns:
 
 @dataclass(frozen=True)
 class PerturbedParameter:
-    """A dosed number, of the state or of a new term.
+    """A perturbed parameter, of the state or of a new term.
 
     Attributes:
-        dose: initial; its sign is the side.
+        dose: initial dose; its sign gives the side.
         term: not in the state, or None.
     """
 
@@ -225,7 +225,7 @@ class PerturbedParameter:
     term: Term | None = None
 
     def at(self, state: FittedState, dose: float) -> FittedState:
-        """Return the state with the dose."""
+        """Return the state changed by the dose."""
         if self.term is None:
             return state.moved(self.place, dose)
         numbers = list(self.term.numbers)
@@ -245,5 +245,5 @@ MEND = "narrow the bounds of the parameters, or mend `simulate` for these values
 
 
 def sizes(columns: Mapping[str, Floats]) -> dict[str, float]:
-    """Return signals' greatest absolute values; one for zero."""
+    """Return the greatest absolute values of signals; one for zero."""
     return {name: float(np.abs(values).max(initial=0.0)) or 1.0 for name, values in columns.items()}

@@ -1,4 +1,4 @@
-"""A correction for other rows of the same columns."""
+"""Apply a correction to other rows with the same columns."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class AppliedCorrection:
     Attributes:
         values: shape (n,).
         uncertainty: standard, of the correction without a row's noise, shape (n,).
-        left_out: effects that other rows cannot have, such as a drift.
+        left_out: effects that do not apply to other rows, such as a drift.
         beyond: rows outside the fitted range by variable.
     """
 
@@ -50,13 +50,13 @@ class AppliedCorrection:
 
 @with_one_thread
 def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) -> AppliedCorrection:
-    """Return the correction of other rows, a table `like` the fitted one.
+    """Return the correction of other rows, in a table `like` the fitted one.
 
-    Effects over variables that the correction is made of, the constant and refitted parameters are added. What follows
-    the clock or the run stays behind, and so does a memory of what was before the first row.
+    The correction adds the constant, refitted parameters and effects over its variables. It omits effects over time or
+    runs, and memory of earlier rows.
 
     Raises:
-        CalibrationError: these rows do not show an effect's direction or rate.
+        CalibrationError: these rows lack an effect's direction or rate.
     """
     settled, channel = found.settled, other.channel(sources)
     bank, corrects = settled.bank, found.levels.corrects
@@ -102,7 +102,7 @@ def _variances(rows: Floats, covariance: Floats) -> Floats:
 
 
 FORMED = frozenset({Family.LINEAR, Family.ONCE, Family.TWICE, Family.CURVE, Family.WAVE, Family.BUMP, Family.STEP})
-"""Patterns that are their form over one variable and nothing else."""
+"""Families that depend only on one variable's value."""
 
 
 def _effect(found: Mismatch, channel: Channel, member: Member, values: Floats) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""A table for comparison, and its channel."""
+"""A table of measured and simulated values, and its channel."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.table.contract import TableSource
 
 REFITTED = 2.0
-"""What refitting a parameter changes the simulated value by, one standard deviation, over what that was off by as simulated [rms].
-Halved or doubled it changes no verdict of three tables [docs/mismatch.md]."""
+"""Prior standard deviation of a free parameter's effect, over the rms error as simulated. Half or double changes no
+verdict of three tables [docs/mismatch.md]."""
 
 OFFSET = "offset"
-"""Name of the base column that is the same for all rows."""
+"""Name of the constant base column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Table:
         derivatives: of the simulated value by parameter name, shape (n,).
         columns: numeric, by name, shape (n,).
         known: prior standard uncertainty by name.
-        like: rows that effects were fitted to, if these are others.
+        like: the table to which effects were fitted, if another.
     """
 
     measured: Floats
@@ -70,7 +70,7 @@ class Table:
             return np.inf
         if name in self.known:
             return self.known[name]
-        # What changes the simulated value by much more than it was off by is no correction of a parameter.
+        # A change far above the original error is no plausible correction of a parameter.
         moves = float(np.sqrt(np.mean(np.square(self.derivatives[name]))))
         off = float(np.std(self.measured - self.simulated))
         return REFITTED * off / moves if moves > 0.0 and off > 0.0 else np.inf
@@ -120,7 +120,7 @@ class Table:
 
     @property
     def simulated_is_variable(self) -> bool:
-        """Return whether the simulated value varies and is no variable over again."""
+        """Return whether the simulated value varies and equals no other variable."""
         return bool(np.ptp(self.simulated) > 0.0) and not any(
             _is_same(v.values, self.simulated) for v in self.variables
         )
@@ -143,7 +143,7 @@ class Table:
 def _sizes_of_noise(
     variables: Sequence[Variable], time: Floats | None, blocks: Sequence[slice]
 ) -> Iterator[tuple[str, Floats]]:
-    """Return candidates for proportional noise: distances from range ends, and speeds."""
+    """Return candidate sizes of proportional noise: distances from range ends, and speeds."""
     for variable in variables:
         yield f"{variable.name} less its least value", variable.values - variable.low
         yield f"its largest value less {variable.name}", variable.high - variable.values
@@ -164,7 +164,7 @@ def rounding_of(values: Floats) -> float:
 
 
 EQUAL = 1e-9
-"""Share of a range by which values differ that are equal."""
+"""Relative difference of equal values, over the range."""
 
 
 def _is_same(one: Floats, other: Floats) -> bool:
@@ -173,4 +173,4 @@ def _is_same(one: Floats, other: Floats) -> bool:
 
 
 SAME = 1.0 - 1e-6
-"""Correlation from which on the simulated value is a variable over again, which then stands for both."""
+"""Correlation above which the simulated value equals a variable, which then represents both."""

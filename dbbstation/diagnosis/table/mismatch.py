@@ -1,4 +1,4 @@
-"""Whether simulation and recording differ, and by which variable, form and size."""
+"""Decide whether simulation and recording differ, and by which variable, form and size."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from dbbstation.text.texts import Texts
 
 FAR_STATED = 3.0
-"""Standard uncertainties by which a parameter is off what was stated of it from which on this is said: one in 400 by chance."""
+"""Distance of a parameter from its stated value, in standard uncertainties, that is reported: one in 400 by chance."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,11 @@ class RefittedParameter:
     """A refitted parameter of the simulation.
 
     Attributes:
-        before: base alone, ordinary least squares, correlation-adjusted.
-        confounded: R² on findings.
+        before: value with the base alone, by ordinary least squares; uncertainty corrected for correlation.
+        confounded: R² of its effect on findings.
         known: prior standard uncertainty; None if free.
-        stated: by the user; otherwise twice the simulated difference.
-        far: whether so large a change needs a new derivative or prior.
+        stated: whether the user stated the prior; otherwise it is twice the simulated difference.
+        far: whether the change is so large that derivative or prior should be renewed.
     """
 
     name: str
@@ -83,7 +83,7 @@ class Mismatch:
 
     Attributes:
         levels: existence, variables and law of a difference.
-        is_worse_here: than simulated, on the rows.
+        is_worse_here: whether the fit is worse than simulated on these rows.
         held_out: None if not tested.
     """
 
@@ -106,17 +106,17 @@ class Mismatch:
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
-        """Return findings that are present and predict, if tested."""
+        """Return the findings that are present and, if tested, predict."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
     @property
     def is_worse(self) -> bool:
-        """Return whether predictions are worse than simulated, on held-out parts if tested."""
+        """Return whether predictions are worse than simulated values, on held-out parts if tested."""
         return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
     @property
     def is_there(self) -> bool:
-        """Return whether a difference exceeds noise and base parameters."""
+        """Return whether a difference remains beyond noise and base parameters."""
         return bool(self.settled.best.members) or not self.left.is_noise
 
     @property
@@ -126,17 +126,17 @@ class Mismatch:
 
     @property
     def offset(self) -> Value | None:
-        """Return the constant difference, or None if not allowed."""
+        """Return the constant difference, or None if not fitted."""
         return next((one.before for one in self.fitted if one.name == OFFSET), None)
 
     @property
     def offset_is_there(self) -> bool:
-        """Return whether the constant exceeds chance."""
+        """Return whether the constant is significant."""
         return self.offset is not None and abs(self.offset.value) >= OUT * self.offset.uncertainty
 
     @property
     def parameters(self) -> tuple[RefittedParameter, ...]:
-        """Return parameters of the simulation."""
+        """Return the refitted parameters of the simulation."""
         return tuple(one for one in self.fitted if one.name != OFFSET)
 
     @property
@@ -151,13 +151,13 @@ class Mismatch:
 
     @property
     def rms_before(self) -> float:
-        """Return the rms beyond base parameters, in the table's unit."""
+        """Return the rms after refitting base parameters, in the table's unit."""
         base = self.settled.channel.base.samples @ np.array([f.before.value for f in self.fitted])
         return rms(self.settled.channel.residual - base)
 
     @property
     def rms_after(self) -> float:
-        """Return the rms beyond all findings."""
+        """Return the rms after correction by all findings."""
         return rms(self.settled.channel.residual - self.explained)
 
 
@@ -174,11 +174,11 @@ def find_mismatch(
     """Compare measured with simulated values.
 
     Args:
-        hold_out: repeat for each held-out part; takes most of the time.
-        matters: size of interest, in the table's unit; None: the refitted residual.
+        hold_out: whether to repeat for each held-out part, which takes most of the time.
+        matters: size of interest, in the table's unit; None for the refitted residual.
 
     Raises:
-        CalibrationError: rounding hides what so large a difference follows.
+        CalibrationError: the difference is so large that rounding hides its variables.
     """
     try:
         with np.errstate(over="raise"):
@@ -230,7 +230,7 @@ def _found(
 
 
 def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progress: Callable[..., None]) -> HeldOutError:
-    """Return the held-out error against simulated values and a constant; choices are appended to `chosen`."""
+    """Return the held-out error, relative to simulated values plus a constant; selections are appended to `chosen`."""
     residual = settled.channel.residual
     parts = iter(parts_of(settled.channel))
 
@@ -249,13 +249,13 @@ def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progres
 
 @with_one_thread
 def choose_without(channel: Channel, rows: Flags, *, beginning: Beginning = Beginning.EVERYTHING) -> Settled:
-    """Repeat the selection without rows, shape (n,), in a smaller search, which can only raise the error."""
+    """Repeat the selection without rows, shape (n,), by a smaller search, which can only increase the error."""
     kept = channel.without(rows).thinned(BOUNDS.fold_rows)
     return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=BOUNDS.work_without)
 
 
 def fitted_together(settled: Settled) -> Solution:
-    """Return base and best members fitted to all kept rows, the base first."""
+    """Return the fit of base, then best members, to all kept rows."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     both = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))

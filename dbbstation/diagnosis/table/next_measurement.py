@@ -1,4 +1,4 @@
-"""What to measure next on a table."""
+"""Propose the next measurements for a table."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
 
 ALIKE = 0.95
-"""Correlation of two variables from which on rows hardly tell which of them an effect follows: a tenth of its variance is left."""
+"""Correlation above which rows hardly distinguish two variables: only a tenth of the variance differs."""
 
 TAKEN_UP = 0.9
-"""Share of a parameter's effect that what was found can do as well, from which on its value rests on the choice of these."""
+"""Share of a parameter's effect that findings can also explain, above which its value depends on their selection."""
 
 
 @dataclass(frozen=True)
 class Next:
-    """One thing to measure."""
+    """One proposed measurement."""
 
     text: str
     variables: tuple[str, ...]
@@ -73,7 +73,7 @@ def _rest_of_turns(found: Mismatch) -> Iterator[Next]:
 
 
 WHOLE = 0.95
-"""Share of a turn from which on all of it was measured."""
+"""Share of a turn that counts as a whole turn."""
 
 
 def _other_way(found: Mismatch) -> Iterator[Next]:
@@ -87,7 +87,7 @@ def _other_way(found: Mismatch) -> Iterator[Next]:
 
 
 ONE_WAY = 0.02
-"""Share of the rows in the rarer direction of travel below which a variable goes one way only."""
+"""Share of rows in the rarer direction below which travel counts as one-way."""
 
 
 def _apart(found: Mismatch) -> Iterator[Next]:
@@ -102,7 +102,7 @@ def _apart(found: Mismatch) -> Iterator[Next]:
             if alike[a, b] > ALIKE and led & {one.name, other.name}:
                 held, moving = (one, other) if one.kind is Kind.TIME else (other, one)
                 how = f"Measure with {held.name} held while {moving.name} moves"
-                if held.kind is Kind.TIME:  # which cannot be held
+                if held.kind is Kind.TIME:  # cannot be kept constant
                     how = f"Measure with another curve of {moving.name} over {held.name}"
                 text = (
                     f"{how}: they move together here (correlation {alike[a, b]:.3f}), so that these "

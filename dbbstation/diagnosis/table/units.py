@@ -1,4 +1,4 @@
-"""Units and kinds of columns, guessed or stated."""
+"""Units and kinds of columns, from names or statements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Meaning:
 
     Attributes:
         period: of an angle's turn, else None.
-        driven: results from the simulation, as a motor's torque.
+        driven: True if it results from the simulation, as a motor's torque.
     """
 
     unit: str
@@ -81,24 +81,24 @@ UNITS: dict[str, Meaning] = {
     "urad": Meaning("µrad", Kind.ANGLE),
     "arcsec": Meaning("arcsec", Kind.ANGLE),
 }
-"""What a name ends in, or what is stated, in small letters."""
+"""Meanings by ending of a name, or by statement, in small letters."""
 
 _AMOUNTS = {"l": "l", "ml": "ml", **{name: one.unit for name, one in UNITS.items() if one.kind is not Kind.TIME}}
-"""What a rate may count per time: `flow_l_min`, `speed_v_s`."""
+"""Amounts in rates, as in `flow_l_min`, `speed_v_s`."""
 
 _CLOCKS = {"t", "time", "timestamp", "clock", "elapsed", "date"}
 _CALENDAR = {"year", "years", "day", "days", "jd", "mjd", "bjd"}
-"""Columns that count by themselves when a row was measured, and are called no more than that."""
+"""Names of calendar columns that give a row's time without a unit."""
 _THERMOMETERS = ("temp", "temperature")
 _WORDS = re.compile(r"[^a-z0-9µ%]+")
 
 
 RATE_WORDS = 2
-"""Words of a rate, an amount and a time, behind a name."""
+"""Words of a rate after a name: amount and time."""
 
 
 def meaning_of(name: str) -> Meaning:
-    """Return the unit or kind of a column by its name, such as `travel_mm`, `t_s`, `oil_temp_c`, `angle_deg`; else `PLAIN`."""
+    """Return the unit or kind that a column's name states, such as `travel_mm`, `t_s`, `oil_temp_c`, `angle_deg`; else `PLAIN`."""
     words = [word for word in _WORDS.split(name.lower()) if word]
     if (found := _unit_at_end(words)) is not None:
         return found
@@ -119,7 +119,7 @@ def _unit_at_end(words: list[str]) -> Meaning | None:
         if found.kind is not Kind.TIME or _CLOCKS & set(words[:-1]):
             return found
         rate = _AMOUNTS.get(words[-2]) if len(words) > RATE_WORDS else None
-        return Meaning(f"{rate}/{found.unit}" if rate else found.unit, Kind.ANY)  # else a duration, no clock
+        return Meaning(f"{rate}/{found.unit}" if rate else found.unit, Kind.ANY)  # otherwise a duration
     return None
 
 

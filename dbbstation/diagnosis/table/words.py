@@ -38,11 +38,11 @@ MEANINGS: dict[Family, str] = {
     Family.PULSES: "It begins and ends in time: something came or went, a force or a state that the simulation does not have.",
     Family.BLOCKS: "Runs differ by a constant: something was set up or reset between them.",
 }
-"""What each form may mean."""
+"""Possible meanings of each form."""
 
 
 def sentence_of(found: Mismatch, finding: CauseFinding) -> str:
-    """Return place, possible meaning and resemblance of an effect."""
+    """Return a text on place, possible meaning and similar effects."""
     parts = [_where(found, finding)]
     if finding.form is not None:
         parts.append(MEANINGS[finding.form])
@@ -66,7 +66,7 @@ PERSISTS = "It is something that happened in these rows, and stayed: parts that 
 RECURS = "It is something that happens again in these rows: found without each part, it predicts that part, too."
 
 CONFOUNDED = 0.1
-"""Share of an effect that parameters conceal from which on this is said."""
+"""Share of an effect absorbed by parameters that is reported."""
 
 
 def _where(found: Mismatch, finding: CauseFinding) -> str:

@@ -1,4 +1,4 @@
-"""A force that repeats along the travel."""
+"""A force periodic along the travel."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Cogging(DriveSource):
-    """Force with a period in position: F = c cos(2 pi x / p) + s sin(2 pi x / p)."""
+    """Force periodic in position: F = c cos(2 pi x / p) + s sin(2 pi x / p)."""
 
     name = "cogging"
     varies_with = "position wave"
@@ -38,7 +38,7 @@ class Cogging(DriveSource):
         sine = Parameter("sine_n", "N", size, "amplitude of the sine")
         found = []
         for wave in scale.waves_per_m:
-            # A wave that is off by a quarter over the travel fits no more; three points hold the best one between them.
+            # A wave wrong by a quarter period over the travel does not fit; three points enclose the best one.
             grid = tuple(1e3 / (wave + step / scale.travel_m) for step in (0.15, 0.0, -0.15))
             period = Parameter("period_mm", "mm", 1e3 / wave, "travel of one wave", grid)
             label = f"{1e3 / wave:.3g} mm"

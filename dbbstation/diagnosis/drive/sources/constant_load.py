@@ -1,4 +1,4 @@
-"""A load in both directions."""
+"""A load equal in both directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Paramete
 
 
 class ConstantLoad(DriveSource):
-    """A constant force: a weight's share, or the channel's zero."""
+    """A constant force: part of a weight, or a zero offset of the channel."""
 
     name = "constant-load"
     varies_with = "speed"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
 
 COULOMB_SHARE = 0.5
-"""Usual size, one standard deviation, of the force's root mean square."""
+"""Usual size, one standard deviation, relative to the force's rms."""
 
 MOST_OF_COULOMB = 1.5
-"""Times the Coulomb friction up to which friction after a reversal can be: 2.5 standard deviations of what its formula is off by."""
+"""Largest friction after a reversal over Coulomb friction: 2.5 standard deviations of the formula's inaccuracy."""
 
 
 class CoulombFriction(DriveSource):
@@ -17,7 +17,7 @@ class CoulombFriction(DriveSource):
     name = "coulomb-friction"
     varies_with = "speed"
     form_uncertainty = 0.05  # friction of guides and seals scatters along the travel by some 5 % of its mean
-    prior_probability = 0.5  # every drive with seals, nut or guides has it; whether it matters is as likely as not
+    prior_probability = 0.5  # every drive with seals, nut or guides has it; it matters in half of them
     texts = Texts(
         what="Dry friction of nut, bearings, seals and guides holds the drive back with the same force at every speed.",
         shows="The force jumps by twice the friction where the drive reverses; at very low speed it does not go to "

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 class FrictionAsymmetry(DriveSource):
-    """Coulomb friction differs by 2 A, viscous by 2 B.
+    """Coulomb friction differs by 2 A between directions, viscous by 2 B.
 
-    F = A + B |v|, beside F_c sign(v) + F_v v: forwards (F_c + A) + (F_v + B) v, backwards (F_c - A) + (F_v - B) |v|. In
-    motion A equals a constant load; B does not.
+    F = A + B |v|, added to F_c sign(v) + F_v v, gives (F_c + A) + (F_v + B) v forwards and (F_c - A) + (F_v - B) |v|
+    backwards. In motion A acts like a constant load, B does not.
     """
 
     name = "friction-asymmetry"

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 5.0)
-"""Time constants that are tried, of the recording's length; the last is as good as a straight line."""
+"""Tried time constants over the recording's length; the last is almost a straight line."""
 
 
 class FrictionDrift(DriveSource):
@@ -21,7 +21,7 @@ class FrictionDrift(DriveSource):
 
     name = "friction-drift"
     varies_with = "time by direction"
-    form_uncertainty = 0.2  # one time constant stands for oil, seals and screw, which warm each in its own time
+    form_uncertainty = 0.2  # one time constant represents oil, seals and screw
     texts = Texts(
         what="Friction changes during the recording: lubricant warms and thins, seals and bearings run in.",
         shows="The force at the same place, speed and direction is not the same later on; forwards and backwards it "

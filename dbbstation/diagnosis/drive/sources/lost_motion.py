@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.signals import Signals
 
 GAPS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
-"""Plays that are tried, of the travel."""
+"""Tried plays, over the travel."""
 
 RISES = (0.25, 1.0, 2.0)
-"""Ways over which the load is taken up again, of the play."""
+"""Tried travels over which the load returns, over the play."""
 
 
 class LostMotion(DriveSource):
-    """After a reversal the load is missing until play is taken up: F = -F_l sign(v) r(d).
+    """After a reversal the load is missing until the play is crossed: F = -F_l sign(v) r(d).
 
-    r is 1 over a travel g and falls to 0 over w. With equal Coulomb friction, friction acts behind the play only.
+    r is 1 over the travel g and falls to 0 over w. If F_l equals the Coulomb friction, all friction is behind the play.
     """
 
     name = "lost-motion"

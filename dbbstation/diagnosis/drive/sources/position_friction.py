@@ -1,4 +1,4 @@
-"""Friction that depends on place."""
+"""Friction that depends on position."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class PositionFriction(DriveSource):
 
     name = "position-friction"
     varies_with = "position by direction"
-    form_uncertainty = 0.2  # a screw is worn and a guide bent by no parabola
+    form_uncertainty = 0.2  # wear and bent guides are no exact parabolas
     texts = Texts(
         what="Friction changes along the travel: the screw's pitch diameter, the alignment of the guide or the "
         "tension of a cover is not the same everywhere.",

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.signals import Signals
 
 POWERS = (1.5, 2.0, 2.5, 3.0)
-"""Powers that are tried. Below 1, a few speeds cannot tell a power from Coulomb with viscous friction: that is left to
-unnamed shapes."""
+"""Tried powers. At few speeds, powers below 1 cannot be distinguished from Coulomb plus viscous friction; unnamed
+shapes cover them."""
 
 
 class PowerLawFriction(DriveSource):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
-"""Lengths of the build-up that are tried, of the travel."""
+"""Tried lengths of the build-up, over the travel."""
 
 
 class Presliding(DriveSource):
@@ -27,7 +27,7 @@ class Presliding(DriveSource):
 
     name = "presliding"
     varies_with = "travel since reversal"
-    form_uncertainty = 0.2  # contacts build up their friction by no exact exponential
+    form_uncertainty = 0.2  # friction builds up only approximately exponentially
     texts = Texts(
         what="Contacts, balls and seals yield elastically before they slide: after a reversal friction turns round "
         "over a short travel, not at once.",

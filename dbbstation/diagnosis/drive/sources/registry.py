@@ -1,4 +1,4 @@
-"""All causes of force by name, found in this folder."""
+"""Find causes of force by name, in this folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @cache
 def known_drive_sources() -> Mapping[str, DriveSource]:
     """Return all causes, sorted by name."""
-    return in_folders(DriveSource, sources)  # type: ignore[type-abstract]  # what derives from it is made
+    return in_folders(DriveSource, sources)  # type: ignore[type-abstract] # subclasses are instantiated
 
 
 def drive_sources_named(names: Iterable[str]) -> tuple[DriveSource, ...]:

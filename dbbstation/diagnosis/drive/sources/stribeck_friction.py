@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.02, 0.04, 0.07, 0.1, 0.14, 0.2, 0.28)
-"""Stribeck speeds that are tried, of the greatest speed: above a fifth the curve is no longer one of low speed."""
+"""Tried Stribeck speeds, over the greatest speed; above a fifth the curve is not limited to low speed."""
 
 
 class StribeckFriction(DriveSource):
@@ -21,7 +21,7 @@ class StribeckFriction(DriveSource):
 
     name = "stribeck-friction"
     varies_with = "speed"
-    form_uncertainty = 0.1  # exponentials, Gaussians and rational functions of the speed are all in use for it
+    form_uncertainty = 0.1  # exponentials, Gaussians and rational functions of speed are all used
     texts = Texts(
         what="Near standstill friction is greater than at speed, because no film of lubricant carries yet.",
         shows="Force peaks where the drive starts and reverses; at very low speed the drive stutters.",

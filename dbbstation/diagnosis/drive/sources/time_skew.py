@@ -1,4 +1,4 @@
-"""Force and position of different times."""
+"""Time shift between force and position."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.signals import Signals
 
 MOST_SAMPLES = 5.0
-"""Samples that channels of one logger, with their filters, may be apart."""
+"""Largest shift between filtered channels of one logger, in samples."""
 
 
 class ForceTimeSkew(DriveSource):
-    """A force late by d: F(t) = F_true(t - d), to first order F_true - d dF/dt."""
+    """The force is late by d: F(t) = F_true(t - d), to first order F_true - d dF/dt."""
 
     name = "time-skew"
     varies_with = "rate of force"
-    form_uncertainty = 0.1  # a filter delays a little more at one frequency than at another
+    form_uncertainty = 0.1  # a filter's delay depends slightly on frequency
     texts = Texts(
         what="The force channel is late or early against the position: filters, bus cycles, the current loop.",
         shows="Peaks where the force changes quickly, at every start, stop and reversal, of one sign where it rises and "
@@ -44,5 +44,5 @@ class ForceTimeSkew(DriveSource):
 
 
 def _columns(signals: Signals, _: tuple[float, ...]) -> Floats:
-    # The low-pass of the comparison bounds what the difference makes of noise.
+    # The low-pass bounds the noise of the difference.
     return -1e-3 * np.gradient(signals.force_n, 1.0 / signals.rate_hz)[:, None]

@@ -1,4 +1,4 @@
-"""A force that comes and goes."""
+"""Force in limited stretches of time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale, T
 class TransientForce(DriveSource):
     """Pulses and steps: F = sum of a_k over t_k to t_k + d_k.
 
-    It has no form: the engine searches for stretches (`dbbstation/inference/stretches.py`).
+    The source has no form, because the comparison searches for stretches (`dbbstation/inference/stretches.py`).
     """
 
     name = "transient-force"
     varies_with = "time"
-    form_uncertainty = 0.02  # edges of pulses are round within the band
+    form_uncertainty = 0.02  # the low-pass rounds edges of pulses
     texts = Texts(
         what="A force that the recorded one does not contain acts for some time: a push, a clamp, a cutting force, a "
         "second drive, or a channel whose zero jumps.",

@@ -106,7 +106,7 @@ class Layout:
 
     @property
     def needs(self) -> frozenset[Need]:
-        """Return the inputs of all sources that affect the reading."""
+        """Return inputs of all sources that affect the reading."""
         return frozenset[Need]().union(*(term.source.needs for term in self.terms if not term.source.of_currents))
 
     def model(self, x: Floats) -> MachineModel:

@@ -271,7 +271,6 @@ def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _
 
 
 def _closure_um(one: CircleAnalysis) -> float:
-    """Return the drift over the turn beyond noise, by overlap or ends [µm]."""
     if one.passes is not None:
         drift, u = one.passes.mean_um, one.passes.u_mean_um(one.noise.sigma_um)
     elif one.closure is not None:

@@ -243,7 +243,6 @@ class _Interval:
 
 
 def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> _Interval:
-    """Compare the measured range with scaled paths; arguments as of `estimated`."""
     angles = np.unique(np.concatenate([path.theta_deg for path in paths]))
     forms = [_at(angles, path.theta_deg, path.form_um[None, :], np.nan)[0] for path in paths]
     highest = [_at(angles, path.theta_deg, path.highest_um, -np.inf) for path in paths]

@@ -75,7 +75,7 @@ def shapes_of(theta_deg: Floats, circle: Circle, spike_deg: float) -> dict[Signa
 
 
 def cyclic_shapes(theta_deg: Floats, circle: Circle, axis: str, period_mm: float) -> Floats:
-    """Return the deviations by unit sine and cosine errors, periodic in an axis's position from the centre, shape (n, 2) [µm].
+    """Return deviations by unit sine and cosine errors, periodic in an axis's position from the centre, shape (n, 2) [µm].
 
     Args:
         theta_deg: shape (n,).

@@ -91,7 +91,7 @@ class CircleChannel:
 
     @property
     def named(self) -> tuple[Cause, ...]:
-        """Return the named causes; all laws and forms of a cause have equal prior probability."""
+        """Return named causes; all laws and forms of a cause have equal prior probability."""
         found = []
         for name in dict.fromkeys(name for name, _ in self.sources):
             laws = [key for key in self.sources if key[0] == name]
@@ -289,7 +289,7 @@ class CircleChannel:
         return replace(self.base, prior=prior)
 
     def _outsize(self) -> tuple[Cause, ...]:
-        """Return the random effects that may exceed their stated size, with the parameters that circles show.
+        """Return random effects that may exceed their stated size, with the parameters that circles show.
 
         Level bars do not measure ball heights. For a ball mounted once, ball and mounting are one effect. Freed balls are omitted.
         """

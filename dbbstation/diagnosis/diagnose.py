@@ -185,7 +185,7 @@ def _quick(settled: SettledCircles) -> Unexplained:
 
 
 def rough_formulas(settled: SettledCircles) -> list[str]:
-    """Return the named causes that need slack, which the joint fit lacks."""
+    """Return named causes that need slack, which the joint fit lacks."""
     evidence = settled.comparison.log_evidence(settled.best.members)
     found = []
     for member in settled.members:

@@ -124,7 +124,7 @@ def _strut_contributions(
 def _followed_by_strut(
     source: ErrorSource, known: Mapping[str, Floats], motion: Motion, machine: Machine
 ) -> list[Floats]:
-    """Return the variables for a strut source's slack, shape (n, 6) each."""
+    """Return variables for a strut source's slack, shape (n, 6) each."""
     if source.varies_with in {"time", "temperature"}:
         return [np.broadcast_to(known["time"][:, None], (len(motion), STRUTS))]
     found = [known["strut-length"]]
@@ -149,7 +149,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> Floats:
 
 
 def _followed(source: ErrorSource, known: Mapping[str, Floats], motion: Motion) -> Floats:
-    """Return the variables for another source's slack, shape (n, q)."""
+    """Return variables for another source's slack, shape (n, q)."""
     name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:
         return known[name][:, None]

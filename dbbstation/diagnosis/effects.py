@@ -43,7 +43,6 @@ class CuredCircle(OfRun):
         centre_um: shift of the centre, X and Y, shape (2,).
         measured_centre_um: measured less commanded centre, shape (2,).
         cured_centre_um: the same without the cause, shape (2,).
-        effect_mm: effect on readings, shape (n,).
     """
 
     g_um: float
@@ -100,7 +99,7 @@ def effects_of(
     unseen: Floats | None = None,
     formula_variance: Floats | None = None,
 ) -> tuple[CauseEffect, ...]:
-    """Return the contributions of causes, the greatest circular deviation first.
+    """Return contributions of causes, the greatest circular deviation first.
 
     An effect is the reading with minus without the cause. Effects add to first order; circular deviations need not.
 

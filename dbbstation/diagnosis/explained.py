@@ -28,10 +28,8 @@ class SettledCircles:
     Attributes:
         after: joint fit of base and named causes.
         posterior: relinearised about this fit.
-        target: target of the comparison, shape (n,).
         noise: estimated with all causes.
         scatter: of balls, in stated standard deviations.
-        stopped: whether interrupted.
     """
 
     after: Calibration

@@ -212,10 +212,8 @@ class Diagnosis:
     """All results of a diagnosis.
 
     Attributes:
-        before: fit of the base.
         held_out: prediction errors before and after [mm].
         chosen_anew: gains with selection repeated without each group; None without causes or for few tests.
-        levels: existence, variables and law of a difference [µm].
         workspace: the calibration's error over the workspace; None without findings.
         second_start_agrees: None if interrupted.
         cancelling: cancelling effects [mm], or None.

@@ -47,7 +47,7 @@ def unseen(calibration: Calibration) -> Floats:
 
 
 def held_beside(before: Calibration, after: Calibration) -> Floats:
-    """Return the directions that only the joint fit holds, shape (h, f); the base's directions are conventions."""
+    """Return directions that only the joint fit holds, shape (h, f); the base's directions are conventions."""
     wide = np.zeros((len(before.solution.held), after.solution.held.shape[1]))
     wide[:, : before.solution.held.shape[1]] = before.solution.held
     beyond = after.solution.held - (after.solution.held @ wide.T) @ wide

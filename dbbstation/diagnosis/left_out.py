@@ -76,7 +76,7 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
 
 
 def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
-    """Return the gains of named causes and classes in groups of tests; None for few tests or without causes.
+    """Return gains of named causes and classes in groups of tests; None for few tests or without causes.
 
     The reference is the kinematic calibration of the same tests.
     """

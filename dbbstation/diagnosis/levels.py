@@ -46,7 +46,7 @@ class CircleBank(Bank):
         return self._columns.of(columns)
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
-        """Return the causes with the base projected out."""
+        """Return causes with the base projected out."""
         return self._circles.beside_base(self.noise.sigma, self._scatter, but_for, only)
 
 

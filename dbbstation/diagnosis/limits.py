@@ -34,7 +34,7 @@ def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:
 
 
 def limits_of_fit(fit: Calibration) -> tuple[LimitReached, ...]:
-    """Return the parameters at limits, and a last step without convergence."""
+    """Return parameters at limits, and a last step without convergence."""
     found = [_at_end(fit, column) for column in fit.at_limit]
     if not fit.settled:
         text = "The joint fit still moved at its last step. Values and uncertainties are those of that step."

@@ -60,7 +60,7 @@ def locate(
     struts: Sequence[Floats | None],
     variable: str,
 ) -> tuple[Location, ...]:
-    """Return the stretches beyond noise, largest share first."""
+    """Return stretches beyond noise, largest share first."""
     smoothed = [smooth(r, np.radians(o.raw.phi_deg)) for o, r in zip(observations, residual_mm, strict=True)]
     total = sum(float(s @ s) for s in smoothed)
     found: list[Location] = []

@@ -172,7 +172,7 @@ class Shape:
         return 1.0 / self.form.frequency if isinstance(self.form, Wave) else None
 
     def columns(self, samples: Samples) -> Floats:
-        """Return the effects of amplitudes on readings: directions times curves, shape (n, d p)."""
+        """Return effects of amplitudes on readings: directions times curves, shape (n, d p)."""
         values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
             curve = self.form.columns(values)
@@ -347,7 +347,7 @@ def _pulled_towards(motion: Motion, machine: Machine) -> Floats:
 
 
 def ranges(runs: Sequence[Samples]) -> Ranges:
-    """Return the extents of variables that all runs have."""
+    """Return extents of variables that all runs have."""
     names = [name for name in runs[0].values if all(name in run.values for run in runs)]
     low = {name: np.min([run.values[name].min(axis=0) for run in runs], axis=0) for name in names}
     high = {name: np.max([run.values[name].max(axis=0) for run in runs], axis=0) for name in names}
@@ -355,7 +355,7 @@ def ranges(runs: Sequence[Samples]) -> Ranges:
 
 
 def shapes(extent: Ranges) -> list[Shape]:
-    """Return the families that need no search, in order of columns."""
+    """Return families that need no search, in order of columns."""
     found: list[Shape] = []
     warmed = [n for n in extent.low if n in TEMPERATURES and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K]
     usual = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time")

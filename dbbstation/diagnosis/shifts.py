@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
-    """Return the biases of machine parameters, largest first; may be empty."""
+    """Return biases of machine parameters, largest first; may be empty."""
     if after is before:
         return ()
     row_of = {name: k for k, name in enumerate(after.layout.names)}

@@ -59,7 +59,7 @@ class _Samples:
 
 @with_one_thread
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
-    """Return the curves of found sources and of the residual over its variable."""
+    """Return curves of found sources and of the residual over its variable."""
     left = ("",) if diagnosis.unexplained.follows is not None else ()
     return tuple(_curves(diagnosis, name) for name in (*found_sources(diagnosis), *left))
 

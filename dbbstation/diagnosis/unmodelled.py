@@ -69,7 +69,7 @@ class Unmodelled:
         self._looked_for |= set(self.follows) - before
 
     def of(self, member: Member) -> tuple[Shape, ...]:
-        """Return the shapes of an effect's form; empty for named causes."""
+        """Return shapes of an effect's form; empty for named causes."""
         return self.shapes.get((member.cause.name, member.variant.label), ())
 
     def _forget(self, names: set[str]) -> None:

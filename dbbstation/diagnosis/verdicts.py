@@ -131,7 +131,7 @@ class _CircleJudge(CauseJudge):
         return bool(np.mean(standing_out(products, variant.plausible) >= OUT) >= TESTABLE_SHARE)
 
     def _unseen_points(self, cause: Cause) -> list[float]:
-        """Return the values of a listed parameter, such as a bump's run, for which these tests do not show a cause.
+        """Return values of a listed parameter, such as a bump's run, for which these tests do not show a cause.
 
         Each listed value is a separate case.
         """

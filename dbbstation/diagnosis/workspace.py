@@ -31,7 +31,6 @@ class WorkspaceError:
     """Difference of tool position between the earlier calibration and the joint model, over the workspace.
 
     Attributes:
-        error_rms_um: rms without the common shift.
         error_greatest_um: greatest length about the common shift.
         at_pose: pose of the greatest error, X, Y, Z, A, B, C [mm, deg].
         uncertainty_rms_um: rms standard uncertainty of the joint model without the common shift; None if unknown.

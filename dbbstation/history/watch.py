@@ -213,8 +213,6 @@ def _scatter(values: Floats, u: Floats) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """Values since a change, without outliers."""
-
     at: NDArray[np.intp]
     of: Standardised
     values: Floats

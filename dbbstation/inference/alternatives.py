@@ -152,7 +152,7 @@ def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause],
 
 
 def standing_out(products: Floats, plausible: Floats) -> Floats:
-    """Return the significances of combinations of plausible amplitudes, ascending, shape (p,).
+    """Return significances of combinations of plausible amplitudes, ascending, shape (p,).
 
     Args:
         products: of a cause's columns given others, over noise, shape (p, p).

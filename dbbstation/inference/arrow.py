@@ -182,7 +182,7 @@ def _group(blocks: Sequence[Block], columns: Integers, known: Columns, noise: fl
 
 
 def _groups(blocks: Sequence[Block], random: Flags) -> list[tuple[list[int], Integers]]:
-    """Return the blocks and random effects of each group.
+    """Return blocks and random effects of each group.
 
     An effect in many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises the work,
     rows times squared columns.

@@ -157,7 +157,7 @@ class Bank:
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
-        """Return the causes with the base projected out; `but_for` marks rows to ignore, shape (m,), with zero target.
+        """Return causes with the base projected out; `but_for` marks rows to ignore, shape (m,), with zero target.
 
         Args:
             only: needed columns, ascending, shape (q,); None for all.
@@ -478,7 +478,7 @@ def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: 
 
 
 def amplitudes_of(variant: Variant) -> Integers:
-    """Return the indices of a form's amplitudes within its law, shape (p,)."""
+    """Return indices of a form's amplitudes within its law, shape (p,)."""
     if not len(variant.whole):
         return np.arange(len(variant.columns))
     return np.searchsorted(variant.whole, variant.columns)

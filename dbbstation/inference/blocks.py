@@ -22,7 +22,6 @@ class Block:
     Attributes:
         columns: that affect the run, shape (k,).
         triangle: triangular factor of J, shape (r, k), r at most k + 1.
-        target: transformed, shape (r,).
         square: sum of squares of the target, an upper bound of fitted squares.
         noise: of another instrument; None for the channel's.
     """
@@ -43,7 +42,7 @@ def compress(columns: Integers, jacobian: Floats, target: Floats) -> Block:
 
 
 def spread(blocks: Sequence[Block], columns: int) -> Floats:
-    """Return the rows of all blocks over all columns, target last, shape (r, columns + 1)."""
+    """Return rows of all blocks over all columns, target last, shape (r, columns + 1)."""
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0
     for block in blocks:
@@ -55,7 +54,7 @@ def spread(blocks: Sequence[Block], columns: int) -> Floats:
 
 
 def spread_over(blocks: Sequence[Block], columns: Integers) -> Floats:
-    """Return the rows of all blocks over some columns, target last, shape (r, k + 1)."""
+    """Return rows of all blocks over some columns, target last, shape (r, k + 1)."""
     order = np.argsort(columns)
     narrow = np.zeros((sum(len(block.target) for block in blocks), len(columns) + 1))
     row = 0

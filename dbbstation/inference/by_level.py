@@ -68,7 +68,7 @@ class VerdictsByLevel:
         return _of_laws(classes, name, self._settled.channel.rows_are)
 
     def instead_of(self, name: str) -> frozenset[str]:
-        """Return the members that a named law replaces."""
+        """Return members that a named law replaces."""
         return frozenset[str]().union(*(one.members for one in self._levels.follows if _named(one, name)))
 
     def alike(self, name: str) -> str:

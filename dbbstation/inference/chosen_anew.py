@@ -99,7 +99,7 @@ def gains_of_tests(
     asked: Callable[[Cause], bool] = lambda _: True,
     **limits: Any,  # noqa: ANN401 - as of `search`
 ) -> KnownGains:
-    """Return the gains of causes and classes in groups of tests.
+    """Return gains of causes and classes in groups of tests.
 
     Args:
         rows: of each group, shape (n,).

@@ -88,7 +88,6 @@ class Coloured:
         """Return white plus first-order noise, or oscillating noise.
 
         Args:
-            share: part of the process in the variance, 0 to 1.
             decay: correlation of neighbours, or of the oscillation's envelope.
         """
         lags = np.arange(LONGEST + 1)

@@ -159,7 +159,7 @@ def beside(channel: Channel, rows: Flags, alike: float) -> Flags:
 
 
 def parts_of(channel: Channel) -> list[tuple[str, Flags]]:
-    """Return the parts with their names; rows have shape (n,)."""
+    """Return parts with their names; rows have shape (n,)."""
     number = part_numbers([block.stop - block.start for block in channel.blocks])
     found = []
     for k in range(int(number.max()) + 1):

@@ -48,7 +48,7 @@ class WithoutPart:
 
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:
-    """Return the variables that a cause follows; for a user's law without variables, its name."""
+    """Return variables that a cause follows; for a user's law without variables, its name."""
     of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
     if of is None:
         return frozenset({name})
@@ -99,7 +99,7 @@ def follow_of(settled: Settled) -> Callable[[str], frozenset[str]]:
 
 
 def weighted(settled: Settled) -> list[tuple[Settled, float]]:
-    """Return the outcomes from all initial noise models, with probabilities."""
+    """Return outcomes from all initial noise models, with probabilities."""
     every = [settled, *settled.others]
     logs = np.array([one.log_probability for one in every])
     return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
@@ -158,7 +158,7 @@ class VariableClass:
 
 
 def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[VariableClass]:
-    """Return the classes of variables that the best set follows, most probable first."""
+    """Return classes of variables that the best set follows, most probable first."""
     follow = follow_of(settled)
     of = {member.cause.name: follow(member.cause.name) for member in settled.best.members}
     there = sorted(frozenset[str]().union(*of.values()), key=lambda v: (-probabilities.of([v]), v))
@@ -181,7 +181,7 @@ def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[V
 def interchangeable(
     settled: Settled, members: Collection[str], follow: Callable[[str], frozenset[str]]
 ) -> tuple[str, ...]:
-    """Return the variables of single causes without memory that can replace members."""
+    """Return variables of single causes without memory that can replace members."""
     best, bank = settled.best, settled.bank
     own = frozenset[str]().union(*(follow(name) for name in members))
     rivals = []

@@ -41,7 +41,7 @@ class Form(ABC):
         """Return each amplitude's curve at values, shape (..., p)."""
 
     def points(self, low: float, high: float) -> Floats:
-        """Return the points to print within the range, shape (q,); by default three, enough for a straight line."""
+        """Return points to print within the range, shape (q,); by default three, enough for a straight line."""
         return np.linspace(low, high, 3)
 
     def text(self, unit: str) -> str:

@@ -189,7 +189,6 @@ def misfit(
     Each group's common first harmonic, such as a ball's place, is excluded.
 
     Args:
-        residuals: one period per run.
         groups: each run's group with a common first harmonic.
         freedom_used: degrees of freedom of the fit in low harmonics, without shifts.
         noise: None to estimate it from high harmonics.

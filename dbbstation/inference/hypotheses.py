@@ -86,7 +86,6 @@ class Hypothesis:
     """A set of causes.
 
     Attributes:
-        members: its causes with best variants and sizes.
         log_factors: averaged log Bayes factor of each member, given the others.
     """
 
@@ -265,7 +264,6 @@ class _Search:
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
-        """Store a first score; examine a likely set whose last member outweighs its odds."""
         if len(members) > self._most_members:
             self._beyond = max(self._beyond, log_posterior)
             return

@@ -182,5 +182,4 @@ def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Membe
 
 
 def _count(members: Sequence[Member]) -> int:
-    """Return the number of parameters of members, nonlinear ones included: each can adapt to a part."""
     return sum(len(member.variant.columns) + len(member.variant.nonlinear) for member in members)

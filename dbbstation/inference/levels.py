@@ -136,7 +136,6 @@ class Followed:
         variables: most probable first; one of them is followed.
         or_variables: indistinguishable variables.
         ways: probabilities that it follows value, direction, delay or time.
-        rms: of the fitted sum, in the residual's unit.
         before: held-out error without the class; None if not tested.
         gain: held-out gain of log density by the class; None if not tested.
         consequence: whether the variable, as stated, results from the simulation and is no cause.
@@ -192,7 +191,7 @@ class Levels:
 
     @property
     def corrects(self) -> frozenset[str]:
-        """Return the variables that a correction uses; empty for all."""
+        """Return variables that a correction uses; empty for all."""
         return corrects_of(self.follows)
 
     def times(self, factor: float) -> Levels:
@@ -219,7 +218,7 @@ CORRECTS = (FollowsAnswer.FOLLOWS, FollowsAnswer.GOES_ON, FollowsAnswer.NOT_TEST
 
 
 def corrects_of(classes: Iterable[Followed]) -> frozenset[str]:
-    """Return the variables that a correction by classes uses; empty for all."""
+    """Return variables that a correction by classes uses; empty for all."""
     every = [one for one in classes if one.answer in CORRECTS]
     own = frozenset(name for one in every for names in one.variables for name in names)
     return own | {name for one in every for name in one.or_variables if name != TIME}

@@ -81,7 +81,6 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
 
 
 def _sums(left: Left, values: Floats, pieces: int, size: float) -> Sums:
-    """Return sums over equal bins of a variable, shape (n,)."""
     low, high = float(values.min()), float(values.max())
     place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
     own, number, count = np.unique(place, return_inverse=True, return_counts=True)
@@ -129,7 +128,6 @@ MULTIPLES = (1, 2, 3)
 
 
 def _least(tried: float) -> float:
-    """Return the least explained squares that outweigh prior odds: twice a log Bayes factor."""
     return -2.0 * NEIGHBOUR * log_odds(1, tried)
 
 

@@ -128,8 +128,6 @@ class Scan:
     Attributes:
         log_factor: averaged log Bayes factors, shape (c,).
         factors: log Bayes factors by form and size, shape (m, s).
-        first: first form of each cause, shape (c,).
-        last: one after its last form, shape (c,).
     """
 
     causes: tuple[Cause, ...]
@@ -558,7 +556,6 @@ def amplitude_size(member: Member, values: Floats) -> float:
 
 
 def _log_factors(seen: Floats, along: Floats) -> Floats:
-    """Return log Bayes factors at all scales, shape (m, s)."""
     squares = SCALES[:, None] ** 2
     information = 1.0 + squares * seen[:, None, :]
     return np.asarray(

@@ -34,7 +34,7 @@ def modulated(
     along: Sequence[Floats],
     signs: Sequence[Floats] | None,
 ) -> Floats:
-    """Return the effects of m actuators times smooth functions, over all runs, shape (n, q).
+    """Return effects of m actuators times smooth functions, over all runs, shape (n, q).
 
     Args:
         signs: directions of travel per run, shape (n, m); None if irrelevant.

@@ -100,12 +100,12 @@ class Fitting:
 
     @classmethod
     def of(cls, columns: Floats, sd: Floats, coloured: Coloured, whitening: csr_array | None) -> Fitting:
-        """Return the basis of columns; arguments as for `Left.of`."""
+        """Return basis of columns; arguments as for `Left.of`."""
         none = np.zeros((len(columns), 0))
         return cls(none, len(columns), coloured, whitening).beside(columns, sd)
 
     def beside(self, columns: Floats, sd: Floats) -> Fitting:
-        """Return the basis with further columns, shape (n, k); unknown priors are infinite."""
+        """Return basis with further columns, shape (n, k); unknown priors are infinite."""
         noise = self.coloured.innovation
         bounded = np.flatnonzero(np.isfinite(sd))
         size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))

@@ -29,7 +29,6 @@ def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) 
 
 
 def _place(settled: Settled, names: tuple[str, ...]) -> str | None:
-    """Return the label of the form that all members surely have; None without such a form or label."""
     labels = {max(form_probabilities(settled, name).items(), key=lambda one: one[1]) for name in names}
     found = {label if probability >= SURE else "" for label, probability in labels}
     return (found.pop() or None) if len(found) == 1 else None

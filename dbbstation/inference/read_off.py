@@ -40,12 +40,7 @@ HALF = 0.5
 
 @dataclass(frozen=True)
 class Span:
-    """A range of a variable in which an effect is present.
-
-    Attributes:
-        low: [unit].
-        high: [unit].
-    """
+    """A range of a variable in which an effect is present."""
 
     variable: str
     low: float
@@ -67,8 +62,6 @@ class CauseFinding:
         rows: first and last row of each stretch; may be empty.
         equivalent: indistinguishable causes, this one first; may be empty.
         ambiguous_with: causes of which one is present if this is not.
-        text: reason; may be empty.
-        acts: whether other rows can show it.
         gains: held-out gains; None if not tested.
         persists: whether held-out parts confirm a single event.
         recurs: whether a wave over time is found without each predicted part.
@@ -268,7 +261,6 @@ class CauseJudge:
         return any(0 <= first - b.start < SHORTEST or 0 <= b.stop - 1 - last < SHORTEST for b in blocks)
 
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
-        """Return parameters with the larger of model and jackknife uncertainties."""
         found = named_values(self._settled, member, values, covariance)
         own = self._own.get(member.cause.name)
         if own is None or self._trial is None or not self._trial.refits:

@@ -31,7 +31,7 @@ MOVED = (*IN_TIME, *PLACED)
 
 
 def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
-    """Return the significant patterns of the residual."""
+    """Return significant patterns of the residual."""
     channel = bank.channel
     left = _left(bank, *_fitted(bank, members))
     size = channel.size / left.noise

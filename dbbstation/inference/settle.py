@@ -198,7 +198,6 @@ def _settled(
 
 
 def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
-    """Return promising laws without exact columns; empty at the limit of work."""
     return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in laid_out]
 
 

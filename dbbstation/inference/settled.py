@@ -36,7 +36,6 @@ class Settled:
     """The outcome of a comparison.
 
     Attributes:
-        log_probability: of noise and best hypothesis, up to a constant.
         stopped: whether the search reached its limit of work; the result is then the best so far.
     """
 

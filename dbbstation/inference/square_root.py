@@ -96,9 +96,7 @@ class Solution:
     """Result of `solve`.
 
     Attributes:
-        directions: of fitted columns, marginalised over random ones.
         held: directions held at zero, in scaled columns, shape (h, f).
-        chi2: weighted sum of squared residuals, with priors.
         stated_chi2: part of `chi2` from priors and blocks with separate noise.
         freedom_used: degrees of freedom of measurements with the channel's noise.
     """
@@ -201,7 +199,7 @@ def chi2_without(
 
 
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Floats:
-    """Return the orthonormal directions, in scaled columns, with standard deviations above 1."""
+    """Return orthonormal directions, in scaled columns, with standard deviations above 1."""
     arrow = arrow_of(blocks, known, noise)
     directions = directions_of(arrow.root_of_fitted * known.scale[arrow.fitted])
     return directions.vectors[directions.singular < 1.0 - ROUNDING]
@@ -225,7 +223,7 @@ def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, h
 
 
 def directions_of(seen: Floats) -> Directions:
-    """Return the directions of a scaled root of information, shape (r, f), most certain first."""
+    """Return directions of a scaled root of information, shape (r, f), most certain first."""
     _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
     padded = np.zeros(seen.shape[1])
     padded[: len(singular)] = singular

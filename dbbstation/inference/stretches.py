@@ -26,8 +26,6 @@ SHORTEST = 3
 
 @dataclass(frozen=True)
 class _Window:
-    """A stretch by first row and one after the last, with log Bayes factor."""
-
     first: int
     last: int
     worth: float
@@ -42,7 +40,7 @@ def stretches(
     clock: Clock | None = None,
     by: tuple[Variable, Floats] | None = None,
 ) -> list[Pattern]:
-    """Return the significant stretches as patterns of one, two and more stretches.
+    """Return significant stretches as patterns of one, two and more stretches.
 
     Args:
         size: prior standard deviation, over noise.
@@ -347,7 +345,7 @@ def _cumulative(rows: Floats) -> Floats:
 
 
 def _squares_of_edges(noise: Coloured, longest: int) -> Floats:
-    """Return the squares of both whitened edges, for stretch lengths 0 to `longest`."""
+    """Return squares of both whitened edges, for stretch lengths 0 to `longest`."""
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
     inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2 - taps.sum() ** 2)])

@@ -64,7 +64,6 @@ def _sides_mm(triangle: Floats) -> Floats:
 
 
 def _turned(vector: Floats, axis: Floats, turn: float) -> Floats:
-    """Return a vector rotated by 120 degrees about an axis [Rodrigues]."""
     angle = turn * 2.0 * np.pi / 3.0
     turned: Floats = (
         vector * np.cos(angle) + np.cross(axis, vector) * np.sin(angle) + axis * (axis @ vector) * (1.0 - np.cos(angle))

@@ -62,7 +62,7 @@ class Passed:
 
 
 def compensated(model: MachineModel, wanted: Motion) -> Floats:
-    """Return the commands, shape (n, 6) [mm, deg], that bring the machine to all wanted poses.
+    """Return commands, shape (n, 6) [mm, deg], that bring the machine to all wanted poses.
 
     Args:
         model: only the machine's sources are inverted.
@@ -134,8 +134,6 @@ def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
 
 
 class _Slope:
-    """Each strut's secant of the missing length over its command."""
-
     def __init__(self) -> None:
         self._before: tuple[Floats, Floats] | None = None
 
@@ -168,7 +166,7 @@ class _Stretch:
         self._smooth, self._known = self._without_search()
 
     def commanded(self, driven: Floats) -> Floats:
-        """Return the poses at nominal lengths, shape (n, 6) [mm, deg]."""
+        """Return poses at nominal lengths, shape (n, 6) [mm, deg]."""
         return forward(self._nominal, driven, self._near).to_poses(self._convention)
 
     def passed(self) -> Passed:

@@ -77,7 +77,7 @@ class MachineModel:
         return total
 
     def acting(self, motion: Motion) -> tuple[Fitted, ...]:
-        """Return the sources that change pose or reading of this motion."""
+        """Return sources that change pose or reading of this motion."""
         return tuple(f for f in self.sources if f.shared == f.source.shared_by(motion) and not f.source.of_currents)
 
     @cached_property

@@ -86,7 +86,6 @@ class Observation:
         return np.array([*self.setup.fixed_ball_mm, *self.raw.circle.tilt_deg]) if self.stood is None else self.stood
 
     def _standing(self, until_s: float | None) -> Motion:
-        """Return the resting motion during the set-up: three samples, a second apart."""
         raw = self.raw
         pose = self.standing_pose
         return Motion(

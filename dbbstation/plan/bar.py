@@ -108,7 +108,7 @@ class Bar(Record):
         return mm_per_k * math.hypot(math.sqrt(2.0) * usual, of_coefficient)
 
     def lacks(self, temp_c: float | None) -> tuple[str, ...]:
-        """Return the facts that are missing for an absolute length."""
+        """Return facts that are missing for an absolute length."""
         if self.expansion_um_m_k == 0.0:
             return ()
         stated = (

@@ -116,7 +116,6 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
 
 
 def _axes_differ(squares: Floats, freedom: int) -> float:
-    """Return the probability of so large a variance ratio if axes are equal, corrected for the number of pairs [Bonferroni]."""
     if squares.min() <= 0.0:
         return 1.0 if squares.max() <= 0.0 else 0.0
     pairs = len(squares) * (len(squares) - 1) / 2

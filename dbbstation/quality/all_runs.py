@@ -86,7 +86,6 @@ def _as_planned(runs: tuple[Seen, ...]) -> RunForm:
 
 
 def _as_turned(runs: tuple[Seen, ...]) -> RunForm:
-    """Return the form of the first run judged as if it had the second's direction."""
     one, other = runs
     as_other = replace(one, run=replace(one.run, circle=other.run.circle, expected=other.run.expected))
     return form_of(as_other, _off(one, as_other, REVERSING))

@@ -29,7 +29,6 @@ class RunAssessment:
         causes: for REPEAT: one sentence with finding and remedy per cause, the most explanatory first.
         unseen: for CANNOT TELL: possible faults that no measurement of the plan shows.
         settled_by: for CANNOT TELL: measurements that would show these faults.
-        later: possible faults that later circles will show.
     """
 
     word: Advice

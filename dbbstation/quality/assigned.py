@@ -53,7 +53,7 @@ class FormerSitting:
     read_um: Mapping[tuple[str, str], Floats]
 
     def moved(self, circles: Sequence[Planned]) -> tuple[Planned, ...]:
-        """Return the circles with this session's readings as expectation."""
+        """Return circles with this session's readings as expectation."""
         found = []
         for one in circles:
             more = along_travel(one.circle) * (self.read_um[key_of(one)] - expected_um(one))
@@ -66,7 +66,7 @@ _Changes = tuple[tuple[int, int], ...]
 
 
 def effects_of(circles: Sequence[Planned], reference: FormerSitting | None = None) -> PlanEffects:
-    """Return the effects on a plan's circles, relative to the previous session's readings."""
+    """Return effects on a plan's circles, relative to the previous session's readings."""
     moved = circles if reference is None else reference.moved(circles)
     return PlanEffects(moved, owns=1 if reference is None else 2)
 
@@ -145,7 +145,6 @@ class Assigned:
 
     @cached_property
     def _looked_up(self) -> Mapping[_Changes, float]:
-        """Log posterior densities of all assignments that can affect a decision."""
         known: dict[_Changes, float] = {(): self.score(())}
         least = known[()] - self._cost
         followed: set[_Changes] = set()
@@ -160,7 +159,6 @@ class Assigned:
         return known
 
     def _follow(self, base: _Changes, least: float) -> dict[_Changes, float]:
-        """Return the neighbours of an assignment, except neighbours too improbable to affect a decision."""
         beside = _Beside(self, self._labels(base))
         found: dict[_Changes, float] = {}
         for runs, instead in self._changes:
@@ -209,7 +207,6 @@ class Assigned:
         return tuple(self._all_changes())
 
     def _all_changes(self) -> Iterator[tuple[Sequence[int], Sequence[Sequence[int]]]]:
-        """Yield possible relabellings: of one run, of all runs of a mounting, or of two exchanged mountings."""
         yield from (([run], [[label] for label in self._everything]) for run in range(len(self.runs)))
         groups = self._groups
         for group in groups:

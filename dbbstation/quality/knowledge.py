@@ -64,11 +64,9 @@ class Expected:
     """A circle as expected from the nominal machine or a model.
 
     Attributes:
-        centre_mm: X and Y minus commanded, shape (2,).
         radial_mm: mean reading less nominal bar length.
         covariance_mm2: of centre and mean reading, with ball, mounting and bar, shape (3, 3).
         place_known: False for a ball set up under the spindle, whose centre is meaningless.
-        mounting_mm: standard deviation of remounting, in X and Y.
         reversals_deg: angles from +X at which a strut reverses.
         form_um: as `Seen.coefficients_um`, shape (7,).
         effects_um: changes of `form_um` by one standard deviation of each cause, shape (7, p) each; keys are the cause
@@ -150,7 +148,6 @@ class Seen:
         coefficients_um: orthonormal Fourier coefficients of readings less bar length, shape (7,): mean, cosines, sines
             of harmonics 1 to 3, by commanded angle from the start towards +Y.
         local_um: coefficients of `local_columns`, shape (59,); zeros for too few samples.
-        ways: feed-in and feed-out; None if not recorded.
     """
 
     run: Run

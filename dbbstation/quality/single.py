@@ -270,7 +270,6 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
 
 
 def _slower(one: Seen, others: Others) -> Finding | None:
-    """Return a finding if a lower feed, not stops, made the turn longer; else None."""
     circle, recording = one.run.circle, one.run.recording
     if one.feed_mm_min is not None or one.longer_s is None:
         return None

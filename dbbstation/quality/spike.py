@@ -98,7 +98,6 @@ def _apart(values_um: Floats, phi_deg: Floats) -> tuple[Floats, Flags]:
 
 
 def _scales(apart: Floats, among: Flags) -> tuple[Floats, float]:
-    """Return the standard deviation of differences at each reading, shape (n,) [µm], and its degrees of freedom."""
     count = len(apart)
     whole, _ = scale_of(list(apart[among]))
     if among.any():

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Explained:
-    """The likelihood gain of another circle as explanation of a run."""
-
     ratio: float
     fits: bool
     label: str
@@ -106,7 +104,6 @@ def _predicted(one: Seen) -> Iterator[_Explained]:
 
 
 def _density(off: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Return logarithms of normal densities, up to a constant, and squared distances."""
     squares: Floats = np.sum(off * np.linalg.solve(covariance, off[..., None])[..., 0], axis=-1)
     return -0.5 * (np.linalg.slogdet(covariance)[1] + squares), squares
 

@@ -113,7 +113,6 @@ def _straying(both: Together, size: int) -> float:
 
 
 def _placed(own: Expected, circle: Circle, more_um: Floats, covariance_um2: Floats) -> Expected:
-    """Return an expectation whose form, centre and mean are changed by a form along the travel [µm]."""
     start = np.radians(circle.start_deg)
     # A shift along the bar at the start is sqrt 2 times the cosine's coefficient; a raised bar measures cos e times the
     # shift.

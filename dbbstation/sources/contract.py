@@ -203,7 +203,7 @@ class Motion(WithLogged):
 
     @cached_property
     def provides(self) -> frozenset[Need]:
-        """Return the inputs that this motion provides."""
+        """Return inputs that this motion provides."""
         given = {Need.POSE: True, Need.PATH: self.is_path, Need.TIME: self.time_s is not None}
         given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
         given[Need.READING] = self.reading_mm is not None

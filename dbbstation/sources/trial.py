@@ -84,7 +84,7 @@ def trial_machine() -> Machine:
 
 
 def undeclared(kind: type[ErrorSource]) -> list[str]:
-    """Return the faults that prevent a class from being instantiated; may be empty."""
+    """Return faults that prevent a class from being instantiated; may be empty."""
     faults = []
     missing = sorted(getattr(kind, "__abstractmethods__", ()))
     if missing:
@@ -234,7 +234,6 @@ def _of_proportion(
     parameters: Sequence[Parameter],
     values: Floats,
 ) -> list[str]:
-    """Check that zero values have zero effect, and, for sources without memory, that doubled amplitudes double the effect."""
     zero = np.zeros(len(parameters))
     nothing = source.effect(motion, machine, zero)
     slopes = source.derivative(motion, machine, zero)

@@ -96,7 +96,7 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
 
 
 def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
-    """Return the numbers of missing and present samples on the turn, or in the whole recording if no turn is found.
+    """Return numbers of missing and present samples on the turn, or in the whole recording if no turn is found.
 
     Unusable samples count as missing. Losses outside the turn are harmless.
     """
@@ -211,13 +211,11 @@ COUNTS_BACKWARDS = "the gauge counts the wrong way round: turn its counting dire
 
 
 def _counts_backwards(t: Floats, length: Floats, circle: Circle) -> bool:
-    """Return whether both ends are shorter than the middle by a feed-in, as with an inverted gauge."""
     ends = (float(np.median(length[np.abs(t - end) <= STANDING_S])) for end in (t[0], t[-1]))
     return all(abs(float(np.median(length)) - end - circle.feed_in_mm) < 0.5 * circle.feed_in_mm for end in ends)
 
 
 def _first_below(t: Floats, length: Floats, circle: Circle) -> int | None:
-    """Return the first sample that is half a feed-in shorter than the start, or None."""
     standing = np.abs(t - t[0]) <= STANDING_S
     below = np.flatnonzero(length < float(np.median(length[standing])) - circle.feed_in_mm / 2.0)
     return int(below[0]) if len(below) and below[0] > 0 else None
@@ -392,7 +390,6 @@ def one_turn_deg(theta_deg: Floats, circle: Circle) -> Floats:
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: Flags) -> RawCircle:
-    """Return the turn's usable rows; refuse gaps, jumps and lengths far from the circle."""
     if recording.usable is not None:
         rows = rows & recording.usable
     phi = phi_deg[rows]

@@ -133,7 +133,6 @@ def _doubts(layout: Layout, x: Floats, solution: Solution, held: frozenset[str])
 
 
 def _misfits(residual_a: Sequence[float], fine_a: Sequence[float], noise: Sequence[Noise | None]) -> list[str]:
-    """Return a note on motors with slow residuals; noise counts only if its correlation is long."""
     lacking = [
         str(motor + 1)
         for motor, (left, fine, found) in enumerate(zip(residual_a, fine_a, noise, strict=True))

@@ -79,8 +79,6 @@ class Calibration:
     """The outcome of a fit.
 
     Attributes:
-        x: all columns, shape (k,).
-        solution: covariance, directions and held rows of all columns.
         machine_residual_mm: per run, residual without the machine's sources.
         residual_mm: per run, residual without machine sources and measurement effects.
         blocks: information blocks for x: one per circle, then motor currents.
@@ -111,7 +109,7 @@ class Calibration:
 
     @property
     def circle_blocks(self) -> tuple[Block, ...]:
-        """Return the blocks of the circles."""
+        """Return blocks of the circles."""
         return self.blocks[: len(self.observations)]
 
     @property
@@ -392,7 +390,6 @@ def _predicted(
 
 
 def _settled(blocks: Sequence[Block], layout: Layout, noise: Noise, held: Floats) -> tuple[Solution, Noise]:
-    """Solve with the noise estimated from the solution's residual; three iterations converge to 0.1 %."""
     count = sum(block.count for block in blocks if block.noise is None)
     sigma = noise.sigma
     for _ in range(3):

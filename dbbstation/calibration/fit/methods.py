@@ -48,7 +48,7 @@ class Method(StrEnum):
 
 
 def as_known(method: Method, machine: Machine, observations: Sequence[Observation]) -> list[Observation]:
-    """Return the runs with ball positions and priors of a method.
+    """Return runs with ball positions and priors of a method.
 
     Args:
         observations: raw circles; conventional methods ignore known ball positions.
@@ -109,7 +109,6 @@ def _check_read(observations: Sequence[Observation]) -> None:
 
 
 def _check_not_centred(observations: Sequence[Observation]) -> None:
-    """Refuse centred recordings: all centres are more exact than a ball's set-up allows."""
     if not observations:
         return
     seen = [figures(observation.raw) for observation in observations]

@@ -67,7 +67,7 @@ def prescribed(layout: Layout, lost: Floats, wanted: Sequence[Name]) -> Floats:
 
 
 def names_of(layout: Layout, held: Floats) -> tuple[Name, ...]:
-    """Return the parameters that unit rows, shape (h, f), hold."""
+    """Return parameters that unit rows, shape (h, f), hold."""
     fitted = _fitted(layout)
     return tuple(fitted[int(np.argmax(np.abs(row)))] for row in held)
 

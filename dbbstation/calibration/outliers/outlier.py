@@ -52,7 +52,6 @@ class Outlier:
     Attributes:
         test: name of the test, or of the session for a bar.
         size_um: residual rms of a run, displacement of a ball, or length error of a bar.
-        uncertainty_um: standard; None for a run.
         shift_um: of a ball, machine axes; None for a run.
         sure: False if a single mounting cannot distinguish a badly seated ball from a wrong CMM row.
         alike: other error sources that explain it about equally well.

@@ -29,12 +29,12 @@ ALONE = 1.2
 
 
 def strange_runs(calibration: Calibration) -> list[int]:
-    """Return the indices of one test's outlying runs; may be empty."""
+    """Return indices of one test's outlying runs; may be empty."""
     return _strange_test(calibration) or _strange_run(calibration)
 
 
 def _strange_test(calibration: Calibration) -> list[int]:
-    """Return the runs of a test whose omission lets all others fit, as indices; may be empty.
+    """Return runs of a test whose omission lets all others fit, as indices; may be empty.
 
     Both directions under a wrong test bias the fit, so their own residuals are hardly larger.
     """

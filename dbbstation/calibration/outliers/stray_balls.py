@@ -187,7 +187,6 @@ def _same(a: MountingOffset, b: MountingOffset) -> bool:
 
 
 def _freed(run: Observation) -> Observation:
-    """Return the run with a free ball; its height is free only if the circle shows it."""
     size = np.zeros(3) + run.setup.mounting_repeatability_mm
     seen = 3 if run.raw.circle.elevation_deg != 0.0 else 2
     size[:seen] = UNKNOWN_MM

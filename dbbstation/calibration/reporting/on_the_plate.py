@@ -90,7 +90,7 @@ def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
 
 
 def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:
-    """Return the shifts of balls at stated places, without freed balls and balls under the spindle."""
+    """Return shifts of balls at stated places, without freed balls and balls under the spindle."""
     tests: dict[str, list[str]] = {}
     for observation, name in zip(calibration.observations, names_of_tests(calibration.observations), strict=True):
         tests.setdefault(observation.setup.mounting, []).append(name)

@@ -100,7 +100,7 @@ class Change:
         )
 
     def columns(self, point: tuple[float, ...]) -> Floats:
-        """Return the derivatives of readings B minus A by amplitudes, for each combination, shape (n, p)."""
+        """Return derivatives of readings B minus A by amplitudes, for each combination, shape (n, p)."""
         of_a = self._of(0, point) if len(self._whens) > 1 else None
         of_b = self._of(1, point)
         found = []

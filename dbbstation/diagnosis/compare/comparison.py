@@ -62,7 +62,6 @@ class Comparison:
         held_out: prediction errors with the stated set-up alone, and with findings [mm].
         effects: of the best set, by name, largest first.
         noticed_mm: detectable change of any strut's length.
-        levels: existence, variables and law of a difference [µm].
     """
 
     matching: Matching

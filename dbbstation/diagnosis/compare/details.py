@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
-    """Return the effects of the best set by name, largest evidence first."""
+    """Return effects of the best set by name, largest evidence first."""
     comparison, best = settled.comparison, settled.best
     kinematic = _kinematic(sides)
     found = {}

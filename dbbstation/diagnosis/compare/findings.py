@@ -22,8 +22,6 @@ class RunDifference:
         centre_shift_uncertainty_um: from noise and stated balls.
         mean_radial_change_uncertainty_um: from noise, stated bars, and balls of raised bars.
         circularity_um: range of the difference about its centre.
-        peak_um: with sign.
-        by_angle_um: means over ten degrees from +X.
         smooth_mm: smoothed difference, shape (s,).
         found_mm: effect of found causes, shape (s,).
     """

@@ -160,7 +160,7 @@ class Sectors:
 
     @classmethod
     def of(cls, theta_deg: Floats, count: int) -> Sectors:
-        """Return the sectors for samples at angles from +X, shape (n,)."""
+        """Return sectors for samples at angles from +X, shape (n,)."""
         sector = np.minimum((theta_deg * (count / FULL_TURN_DEG)).astype(np.int64), count - 1)
         there, group = np.unique(sector, return_inverse=True)
         highest, _ = bands(len(there))

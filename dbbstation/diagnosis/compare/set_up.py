@@ -76,7 +76,7 @@ def _per_degree(pair: Pair) -> Floats:
 
 
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, Floats, Floats]]:
-    """Yield the tests that share a source's values, its columns, shape (n, p), and stated sizes, shape (p,) [mm].
+    """Yield tests that share a source's values, its columns, shape (n, p), and stated sizes, shape (p,) [mm].
 
     If runs share the error in both sessions, the variances add.
     """
@@ -184,5 +184,5 @@ def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
 
 
 def with_set_up(follows: Sequence[Followed], sides: Sides, settled: Settled) -> tuple[Followed, ...]:
-    """Return the classes; classes equal in all tests are attributed to the set-up."""
+    """Return classes; classes equal in all tests are attributed to the set-up."""
     return tuple(replace(one, where=ALIKE) if alike_in_all(one, sides, settled) else one for one in follows)

@@ -39,7 +39,7 @@ class Sides:
 
     @classmethod
     def of(cls, machine: Machine, pairs: Sequence[Pair]) -> Sides:
-        """Return the sides for paired runs."""
+        """Return sides for paired runs."""
         a = tuple(_thinned(pair.a[0], pair) for pair in pairs)
         b = tuple(_thinned(pair.b[0], pair) for pair in pairs)
         return cls(machine, tuple(pairs), (a, b))
@@ -52,7 +52,7 @@ class Sides:
 
     @cached_property
     def orders(self) -> tuple[Integers, ...]:
-        """Return the indices of each pair's rows among common angles."""
+        """Return indices of each pair's rows among common angles."""
         return tuple(np.argsort(pair.b[0].raw.circle.phi_deg(pair.theta_deg)) for pair in self.pairs)
 
     @cached_property
@@ -104,7 +104,7 @@ class Sides:
         return found
 
     def groups(self, source: ErrorSource) -> Integers:
-        """Return the groups in which each pair's runs share values, in both sessions, shape (r,)."""
+        """Return groups in which each pair's runs share values, in both sessions, shape (r,)."""
         names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
         order = list(dict.fromkeys(names))
         return np.array([order.index(name) for name in names], dtype=np.int64)

@@ -25,7 +25,7 @@ OWN_LOBES = (2, 3, 4, 5)
 
 
 def variables_of(sides: Sides) -> tuple[Variable, ...]:
-    """Return the variables of unmodelled effects: angle, place, tilt, time."""
+    """Return variables of unmodelled effects: angle, place, tilt, time."""
     circles = [pair.circle for pair in sides.pairs]
     per_run = [
         ("place in X", "mm", Kind.LENGTH, [circle.centre_mm[0] for circle in circles]),

@@ -57,7 +57,6 @@ class DriveFinding:
         concealed: share of squares that mass and viscous friction absorb.
         gain: log Bayes factor given the others.
         parameters: fitted values; for an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
-        parts: its waves, pulses or forms, if several.
         at_end: parameters at a limit of their grid.
         complement: alternative stretches to `parts`.
         persists: whether held-out parts confirm a single event, such as drift.
@@ -239,7 +238,6 @@ class DriveFindings:
         held_out_rms_n: None if not tested.
         noticed: `notes` in JSON.
         chosen: causes of the last model, ordered by force.
-        levels: existence, variables and law of a difference [N].
     """
 
     mismatch: bool

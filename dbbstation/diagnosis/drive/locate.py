@@ -26,7 +26,7 @@ SLOW = 0.1
 def locate(
     recordings: Recordings, residual_n: Floats, noise: Coloured, variable: str | None
 ) -> tuple[ForceLocation, ...]:
-    """Return the stretches of a residual, shape (m,) [N], beyond noise, largest share first, and their variable."""
+    """Return stretches of a residual, shape (m,) [N], beyond noise, largest share first, and their variable."""
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
     together = min(noise.correlation_samples, float(SMOOTHED))
     threshold = COUNTS_SIGMA * noise.sigma * np.sqrt(together / SMOOTHED)

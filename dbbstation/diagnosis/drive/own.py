@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def drive_columns(signals: Signals) -> dict[str, Floats]:
-    """Return the columns available to a source, shape (n,) each, for all samples of a recording.
+    """Return columns available to a source, shape (n,) each, for all samples of a recording.
 
     `direction` is +1, -1, or 0 at standstill; `since_reversal_mm` is infinite before the first reversal.
     """

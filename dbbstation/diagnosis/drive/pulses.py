@@ -54,7 +54,7 @@ class Edges:
 
 
 def edges_of(recordings: Recordings, parts: Sequence[CausePart]) -> Edges:
-    """Return the edges of stretches of time."""
+    """Return edges of stretches of time."""
     times = np.array([edge for part in parts for edge in part.t_s or ()])
     times = times[(times > recordings.time_s[0]) & (times < recordings.time_s[-1])]
     every = np.concatenate([one.turns[one.kept[0] : one.kept[-1]] for one in recordings.signals])
@@ -100,7 +100,7 @@ def complement_of(parts: Sequence[CausePart], first_s: float, last_s: float) -> 
 
 
 def pulse_parts(explained: ExplainedDrive, names: Sequence[str]) -> list[CausePart]:
-    """Return the stretches whose force differs from the surrounding force."""
+    """Return stretches whose force differs from the surrounding force."""
     # Neighbouring levels share most of their uncertainty, so they need a common factor.
     settled, recordings = explained.settled, explained.drive.recordings
     after, apart, times = (

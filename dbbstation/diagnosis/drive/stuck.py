@@ -23,7 +23,7 @@ MOST_STUCK = 0.3
 
 
 def stuck_samples(force_n: Floats, t_s: Floats, moving: Flags, name: str) -> tuple[Flags, list[str]]:
-    """Return the samples with a stuck force, shape (n,), and notes; standstill does not count.
+    """Return samples with a stuck force, shape (n,), and notes; standstill does not count.
 
     Raises:
         CalibrationError: the force never changes, or is mostly stuck.

@@ -78,7 +78,7 @@ class Verdicts(CauseJudge):
 
     @property
     def predicting(self) -> list[str]:
-        """Return the members of `named` used for prediction, largest first.
+        """Return members of `named` used for prediction, largest first.
 
         Of equivalent causes only one predicts. Causes that are themselves ambiguous are fitted but do not predict.
         """

@@ -67,7 +67,6 @@ class SimulatorComparison:
 
     Attributes:
         findings: present or possible terms, present first.
-        levels: existence, followed signals, and term of a difference.
         held_out: None if not tested.
         as_simulated: measured less simulated values at stated parameters, shape (n,).
         nonlinear: departure from linearity in standard uncertainties, by term; nan without budget.
@@ -94,7 +93,7 @@ class SimulatorComparison:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """Return the inserted terms with values."""
+        """Return inserted terms with values."""
         return self.found.state.terms
 
     @property
@@ -105,12 +104,12 @@ class SimulatorComparison:
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
-        """Return the findings that are present and, if tested, predict."""
+        """Return findings that are present and, if tested, predict."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
     @property
     def rms(self) -> tuple[float, float, float]:
-        """Return the rms errors as simulated, refitted and corrected."""
+        """Return rms errors as simulated, refitted and corrected."""
         every = (self.as_simulated, self.base.fitted.residual, self.found.residual)
         return tuple(float(np.sqrt(np.mean(rows**2))) for rows in every)  # type: ignore[return-value]  # three of them
 

@@ -77,7 +77,7 @@ def directions_of(work: SimulationRuns, state: FittedState) -> list[PerturbedPar
 
 
 def bounds_of(work: SimulationRuns, state: FittedState) -> tuple[Floats, Floats]:
-    """Return the bounds of each parameter, shape (m,)."""
+    """Return bounds of each parameter, shape (m,)."""
     low = [p.low for p in work.model.parameters]
     high = [p.high for p in work.model.parameters]
     for term in state.terms:

@@ -72,7 +72,7 @@ def gains_of(parts: Sequence[PredictedPart]) -> KnownGains:
 
 
 def parts(work: SimulationRuns) -> list[tuple[str, Flags]]:
-    """Return the parts, by `part_numbers` of the runs, with all outputs."""
+    """Return parts, by `part_numbers` of the runs, with all outputs."""
     runs, outputs = work.model.runs, len(work.model.outputs)
     number = part_numbers([len(run) for run in runs])
     of_run = np.split(number, np.cumsum([len(run) for run in runs])[:-1])

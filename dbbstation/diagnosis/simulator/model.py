@@ -97,7 +97,7 @@ class Model:
     runs: tuple[SimulatorRecording, ...]
 
     def of_run(self, run: int, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
-        """Return the arguments of `simulate` for one run and parameter values, shape (k,)."""
+        """Return arguments of `simulate` for one run and parameter values, shape (k,)."""
         pairs = zip(self.parameters, values, strict=True)
         return tuple((p.key, float(value)) for p, value in pairs if p.run is None or p.run == run)
 

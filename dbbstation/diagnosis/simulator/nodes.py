@@ -63,7 +63,7 @@ class Node:
 
     @cached_property
     def outside(self) -> tuple[Candidate, ...]:
-        """Return the candidates that are not inserted."""
+        """Return candidates that are not inserted."""
         work = self.work
         longest = max(work.model.runs, key=len).inputs["t"]
         found = candidates(work.model.ports, work.signals(self.fitted.state), self.own, longest)
@@ -77,7 +77,7 @@ class Node:
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Return the laws of candidates that are not inserted, and the reasons against others."""
+        """Return laws of candidates that are not inserted, and the reasons against others."""
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property
@@ -91,7 +91,7 @@ class Node:
         return {**found, **departures(self.work, self.fitted.state, others, self.size)}
 
     def answers_of(self, name: str) -> Floats:
-        """Return the responses to a term, shape (n, p)."""
+        """Return responses to a term, shape (n, p)."""
         first = len(self.work.model.parameters)
         for one, term in zip(self.inside, self.fitted.state.terms, strict=True):
             if one.name == name:
@@ -211,7 +211,7 @@ class Nodes:
     challenges: list[Challenge] = field(default_factory=list)
 
     def withstood(self, node: Node) -> list[Challenge]:
-        """Return the challenges whose named laws are in a node."""
+        """Return challenges whose named laws are in a node."""
         return [one for one in self.challenges if one.names <= node.names and one.curve not in node.names]
 
     def base(self, start: FittedState) -> Node:

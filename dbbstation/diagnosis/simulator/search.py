@@ -147,7 +147,7 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
 
 
 def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
-    """Return the members smaller than the slack of other terms at their port.
+    """Return members smaller than the slack of other terms at their port.
 
     Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, because
     similar effects may cancel.

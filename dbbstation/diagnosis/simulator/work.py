@@ -170,7 +170,7 @@ class SimulationRuns:
         }
 
     def answers(self, state: FittedState, directions: Sequence[PerturbedParameter], size: float) -> Answers:
-        """Return the derivatives, from responses to small doses."""
+        """Return derivatives, from responses to small doses."""
         before = self.residuals([state])[0]
         floor = UNSEEN * float(np.std(self.measured / self.scale))
         wanted = max(ANSWER * size, 100.0 * floor)

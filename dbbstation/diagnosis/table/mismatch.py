@@ -82,7 +82,6 @@ class Mismatch:
     """The answer on a table.
 
     Attributes:
-        levels: existence, variables and law of a difference.
         is_worse_here: whether the fit is worse than simulated on these rows.
         held_out: None if not tested.
     """
@@ -106,7 +105,7 @@ class Mismatch:
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
-        """Return the findings that are present and, if tested, predict."""
+        """Return findings that are present and, if tested, predict."""
         return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
 
     @property
@@ -136,7 +135,7 @@ class Mismatch:
 
     @property
     def parameters(self) -> tuple[RefittedParameter, ...]:
-        """Return the refitted parameters of the simulation."""
+        """Return refitted parameters of the simulation."""
         return tuple(one for one in self.fitted if one.name != OFFSET)
 
     @property

@@ -126,7 +126,7 @@ def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | Non
 
 
 def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
-    """Return the inputs of a source that motions lack, including changing temperatures; may be empty."""
+    """Return inputs of a source that motions lack, including changing temperatures; may be empty."""
     try:
         for motion in motions:
             source.require(motion)

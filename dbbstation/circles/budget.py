@@ -198,10 +198,8 @@ def budgets(
 
 
 def _with_form(budget: Budget, known: SetUpKnowledge) -> Budget:
-    """Return a budget with the form of both balls, if stated.
-
-    A range of readings errs by at most the form of either ball. Hysteresis compares the same places of both.
-    """
+    """Return a budget with the form of both balls, if stated."""
+    # A range of readings errs by at most the form of either ball. Hysteresis compares the same places of both.
     if known.u_form_um is None:
         return budget
     terms = dict(budget.terms_um)

@@ -101,10 +101,8 @@ def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> Conti
 
 
 def _processes(harmonic: Floats) -> Floats:
-    """Return the power of first-order processes and power laws, shape (corners + exponents, h).
-
-    At lines 0 and 1 a power law is filtered by the window of one turn.
-    """
+    """Return the power of first-order processes and power laws, shape (corners + exponents, h)."""
+    # At lines 0 and 1 a power law is filtered by the window of one turn.
     laws = np.maximum(harmonic, 1.0) ** -EXPONENTS[:, None]
     for line, power in enumerate(_THROUGH_A_TURN):
         laws[:, harmonic == line] = power[:, None]
@@ -112,11 +110,9 @@ def _processes(harmonic: Floats) -> Floats:
 
 
 def _through_a_turn(line: int) -> Floats:
-    """Return the power of laws f^-a, cut off at `SLOWEST`, at a line, shape (exponents,).
-
-    The result is the mean over positive and negative frequencies, each filtered by sinc², the window of one turn
-    [Priestley, Spectral Analysis and Time Series, 1981, sec. 6.2].
-    """
+    """Return the power of laws f^-a, cut off at `SLOWEST`, at a line, shape (exponents,)."""
+    # The result is the mean over positive and negative frequencies, each filtered by sinc², the window of one turn
+    # [Priestley, Spectral Analysis and Time Series, 1981, sec. 6.2].
     cycles = np.concatenate([np.geomspace(SLOWEST, 0.3, 2001)[:-1], np.linspace(0.3, 30.0, 30001)])
     window = np.sinc(cycles - line) ** 2 + np.sinc(cycles + line) ** 2
     return np.asarray(np.trapezoid(cycles ** -EXPONENTS[:, None] * window, cycles, axis=1))

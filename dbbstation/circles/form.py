@@ -78,11 +78,9 @@ Weaker lines count as noise alone; otherwise noise left in the form would count 
 
 
 def _sharp(quick_um: Floats, low: int) -> Floats:
-    """Return short local form, such as a reversal spike, shape (n,).
-
-    A Gaussian filter with four times the low cut-off smooths the deviations; values beyond the noise limit are form.
-    Medians of three readings suppress single outliers.
-    """
+    """Return short local form, such as a reversal spike, shape (n,)."""
+    # A Gaussian filter with four times the low cut-off smooths the deviations; values beyond the noise limit are form.
+    # Medians of three readings suppress single outliers.
     count = len(quick_um)
     passed = np.exp2(-((np.arange(count // 2 + 1.0) / (4.0 * low)) ** 2))
     smooth, beside = (

@@ -66,7 +66,7 @@ SAMPLES_PER_UNDULATION = 4
 class CirclePath:
     """The path of one direction or both, in the circle's plane.
 
-    A raised bar's circle is horizontal, with radius R cos e, so bar lengths are converted to distances from the ball's vertical.
+    Lengths of a raised bar become distances from the ball's vertical, because its circle is horizontal with radius R cos e.
 
     Attributes:
         theta_deg: about the ball, from +X towards +Y, shape (n,).

@@ -174,11 +174,9 @@ def _best(fits: Sequence[_Fit]) -> _Fit:
 
 
 def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[Floats, Floats]:
-    """Return values and standard uncertainties averaged over spike lengths, shapes (k,).
-
-    Weights are marginal likelihoods: exp(-squares / 2 s²) times the root of the covariance determinant [law of total
-    variance; Hoeting et al., Stat. Sci. 14 (1999), eqs 2, 3]. A single best length would fit noise.
-    """
+    """Return values and standard uncertainties averaged over spike lengths, shapes (k,)."""
+    # Weights are marginal likelihoods: exp(-squares / 2 s²) times the root of the covariance determinant [law of total
+    # variance; Hoeting et al., Stat. Sci. 14 (1999), eqs 2, 3]. A single best length would fit noise.
     squares = np.array([one.left_um @ one.left_um for one in fits]) / sigma_um**2
     spread = np.array([np.linalg.slogdet(one.unit_covariance)[1] for one in fits])
     # Likely lengths are tried more densely, so each is weighted by its part of the logarithmic scale.

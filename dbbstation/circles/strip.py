@@ -21,15 +21,14 @@ REACHED = 1e-3
 def strip_widths(outer: Floats, inner: Floats, theta_deg: Floats) -> Floats:
     """Return minimum-zone widths of nearly round paths, shape (draws,), in their unit.
 
-    A centre offset (a, b) changes radii by a cos θ + b sin θ; second order is below a nanometre at 0.4 mm. Four
-    alternating points determine the Chebyshev approximation. They are exchanged one at a time [Remez 1934; Cheney,
-    Introduction to Approximation Theory, ch. 3] until lower and upper bound agree.
-
     Args:
         outer: greatest deviation, shape (draws, angles).
         inner: least deviation, shape (draws, angles).
         theta_deg: ascending, shape (angles,).
     """
+    # A centre offset (a, b) changes radii by a cos θ + b sin θ; second order is below a nanometre at 0.4 mm. Four
+    # alternating points determine the Chebyshev approximation. They are exchanged one at a time [Remez 1934; Cheney,
+    # Introduction to Approximation Theory, ch. 3] until lower and upper bound agree.
     theta = np.radians(theta_deg)
     points = _first_points(outer, inner, theta_deg)
     width = np.full(len(outer), np.inf)

@@ -289,10 +289,9 @@ class CircleChannel:
         return replace(self.base, prior=prior)
 
     def _outsize(self) -> tuple[Cause, ...]:
-        """Return random effects that may exceed their stated size, with the parameters that circles show.
-
-        Level bars do not measure ball heights. For a ball mounted once, ball and mounting are one effect. Freed balls are omitted.
-        """
+        """Return random effects that may exceed their stated size, with the parameters that circles show."""
+        # Level bars do not measure ball heights. For a ball mounted once, ball and mounting are one effect. Freed balls
+        # are omitted.
         setups = [observation.setup for observation in self.observations]
         put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
         raised = {o.setup.mounting for o in self.observations if o.raw.circle.elevation_deg != 0.0}

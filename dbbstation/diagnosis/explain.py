@@ -242,11 +242,9 @@ def _but_for(cause: Cause, known: Mapping[int, bool]) -> Cause:
 
 
 def _idle_laws(fit: Calibration, channel: CircleChannel) -> set[tuple[str, str]]:
-    """Return laws with undetermined nonlinear parameters and a simpler alternative.
-
-    Undetermined means at a limit, or as uncertain as the prior. If a fit without convergence has no such parameter, all
-    laws are simplified.
-    """
+    """Return laws with undetermined nonlinear parameters and a simpler alternative."""
+    # Undetermined means at a limit, or as uncertain as the prior. If a fit without convergence has no such parameter,
+    # all laws are simplified.
     sigma, prior = np.sqrt(fit.solution.variance), fit.layout.known.prior
     idle, all_of_them = set(), set()
     for term in fit.layout.terms:

@@ -261,10 +261,8 @@ def variables(motion: Motion, machine: Machine) -> dict[str, Floats]:
 
 
 def _since_reversal_s(time_s: Floats, speed_mm_s: Floats) -> Floats:
-    """Return time since each strut's reversal with its new sign; zero before, shape (n, 6) [s].
-
-    The time of reversal is interpolated at zero speed.
-    """
+    """Return time since each strut's reversal with its new sign; zero before, shape (n, 6) [s]."""
+    # The time of reversal is interpolated at zero speed.
     since = np.zeros_like(speed_mm_s)
     for strut in range(speed_mm_s.shape[1]):
         speed = speed_mm_s[:, strut]
@@ -327,11 +325,9 @@ def _hoses(frames: Frames, machine: Machine) -> Floats:
 
 
 def _pulled_towards(motion: Motion, machine: Machine) -> Floats:
-    """Return the struts' stretch by unit pulls, shape (n, 6, 60): five parameters per place.
-
-    The parameters are the pull at the platform's middle, moments at `LEVER_MM` about its axes, and a downward force for
-    unknown height.
-    """
+    """Return the struts' stretch by unit pulls, shape (n, 6, 60): five parameters per place."""
+    # The parameters are the pull at the platform's middle, moments at `LEVER_MM` about its axes, and a downward force
+    # for unknown height.
     struts, frames = motion.struts(machine), motion.frames(machine)
     count = len(motion)
     hoses, still = _hoses(frames, machine), np.zeros((count, 3))

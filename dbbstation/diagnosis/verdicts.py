@@ -131,10 +131,8 @@ class _CircleJudge(CauseJudge):
         return bool(np.mean(standing_out(products, variant.plausible) >= OUT) >= TESTABLE_SHARE)
 
     def _unseen_points(self, cause: Cause) -> list[float]:
-        """Return values of a listed parameter, such as a bump's run, for which these tests do not show a cause.
-
-        Each listed value is a separate case.
-        """
+        """Return values of a listed parameter, such as a bump's run, for which these tests do not show a cause."""
+        # Each listed value is a separate case.
         found = set()
         for variant in cause.variants:
             if variant.label or not variant.nonlinear:

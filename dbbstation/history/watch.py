@@ -182,10 +182,8 @@ def _settled(event: TrendEvent, level: Floats, u_level: Floats, start: int) -> T
 
 
 def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[TrendEvent]:
-    """Return outliers that become part of the following event on the same side.
-
-    If this event is an outlier itself, only an adjacent one counts.
-    """
+    """Return outliers that become part of the following event on the same side."""
+    # If this event is an outlier itself, only an adjacent one counts.
     first = found.since - 1
     return [
         event

@@ -182,11 +182,9 @@ def _group(blocks: Sequence[Block], columns: Integers, known: Columns, noise: fl
 
 
 def _groups(blocks: Sequence[Block], random: Flags) -> list[tuple[list[int], Integers]]:
-    """Return blocks and random effects of each group.
-
-    An effect in many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises the work,
-    rows times squared columns.
-    """
+    """Return blocks and random effects of each group."""
+    # An effect in many blocks, such as a bar, would join all groups. The limit of blocks per effect minimises the work,
+    # rows times squared columns.
     total, count = len(random), sum(len(block.target) for block in blocks)
     together = [(list(range(len(blocks))), np.zeros(0, dtype=np.int64))]
     if len(blocks) < 2 or not random.any() or count * np.count_nonzero(random) ** 2 < BOUNDS.group_work:  # noqa: PLR2004 - a pair

@@ -110,11 +110,10 @@ SAME = 1e-6
 
 
 def _bend(family: Family, variable: Variable, grows: float, size: float, unit: str, members: int) -> Law:
-    """Return saturation or dead zone, according to the simulated value's growth with a variable.
-
-    A limit and a dead zone of one width add up to a straight line. If the simulation contains this line, an object with
-    a limit lacks the part beyond the width, and an object with a dead zone lacks the part within. The sign decides.
-    """
+    """Return saturation or dead zone, according to the simulated value's growth with a variable."""
+    # A limit and a dead zone of one width add up to a straight line. If the simulation contains this line, an object
+    # with a limit lacks the part beyond the width, and an object with a dead zone lacks the part within. The sign
+    # decides.
     # Centred at zero if it has both signs, else at mid-range.
     middle = 0.0 if variable.low < 0.0 < variable.high else 0.5 * (variable.low + variable.high)
     values, largest = variable.values - middle, max(variable.high - middle, middle - variable.low)
@@ -218,10 +217,9 @@ def _integral(
     unit: str,
     members: int,
 ) -> Law:
-    """Return a law for accumulating quantities, such as mass or heat, with each run's initial value.
-
-    The balanced value of a signal is seldom zero (outflow, bias, room temperature), so the law includes a linear drift.
-    """
+    """Return a law for accumulating quantities, such as mass or heat, with each run's initial value."""
+    # The balanced value of a signal is seldom zero (outflow, bias, room temperature), so the law includes a linear
+    # drift.
     starts = starts_of(blocks) if len(blocks) > 1 else 0
     middle = 0.5 * (variable.low + variable.high)
     travel = np.concatenate([variable.travel(rows) for rows in blocks])

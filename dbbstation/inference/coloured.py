@@ -308,14 +308,13 @@ def autoregressive(rows: Floats, stretches: Sequence[slice]) -> Coloured:
 def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) -> Coloured:
     """Fit white plus first-order noise to bands; return white noise if it is not worse.
 
-    Autocovariance: a at lag 0, plus b phi^|k| cos(k t). Spectrum: a + b / 2 times the sum over w ± t of (1 - phi²) / |1 -
-    phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. Two or three parameters cannot follow
-    unexplained lines.
-
     Args:
         most: largest phi.
         oscillates: whether to try also oscillations at the bands' frequencies t.
     """
+    # Autocovariance: a at lag 0, plus b phi^|k| cos(k t). Spectrum: a + b / 2 times the sum over w ± t of (1 - phi²) /
+    # |1 - phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. Two or three parameters
+    # cannot follow unexplained lines.
     weight = bands.count / LOG_VARIANCE
     worth = float(np.log(bands.count.sum()))
 

@@ -118,11 +118,9 @@ def _stretches(samples: int) -> Iterator[slice]:
 
 
 def amplitudes(values: Floats, phase_rad: Floats, highest: int) -> NDArray[np.complex128]:
-    """Return least-squares harmonics a_k, shape (highest + 1,), so that values are the real part of sum a_k exp(i k phase).
-
-    Normal equations need only sums and differences of harmonics. They are ill-conditioned for incomplete periods, which
-    use the basis instead.
-    """
+    """Return least-squares harmonics a_k, shape (highest + 1,), so that values are the real part of sum a_k exp(i k phase)."""
+    # Normal equations need only sums and differences of harmonics. They are ill-conditioned for incomplete periods,
+    # which use the basis instead.
     return amplitudes_of([values], phase_rad, highest)[0]
 
 
@@ -363,10 +361,8 @@ def _fitted(mean: Floats, shapes: Floats) -> Floats:
 
 
 def _not_negative(rows: Floats, values: Floats) -> Floats:
-    """Return non-negative least squares by two columns, shape (processes, 2).
-
-    If the solution is negative, a single column is best.
-    """
+    """Return non-negative least squares by two columns, shape (processes, 2)."""
+    # If the solution is negative, a single column is best.
     normal = np.einsum("cih,cjh->cij", rows, rows)
     right = np.einsum("cih,ch->ci", rows, values)
     squares = np.einsum("cii->ci", normal)

@@ -361,10 +361,8 @@ class _Search:
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
 
     def _possible(self, comparison: ModelComparison, members: list[Member]) -> list[float]:
-        """Return the members' log Bayes factors for non-negative amplitudes.
-
-        The factor is the posterior over the prior probability of positive values, one half.
-        """
+        """Return the members' log Bayes factors for non-negative amplitudes."""
+        # The factor is the posterior over the prior probability of positive values, one half.
         found = [0.0] * len(members)
         if not any(any(member.variant.positive) for member in members):
             return found

@@ -376,13 +376,12 @@ class ModelComparison:
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
         """Scan each member given the others, in its variant, without slack, over all sizes.
 
-        The inverse of a block of A's inverse is the block's information given the others [Schur complement; Horn and
-        Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
-
         Returns:
             Per member: the member with its best size, the log Bayes factor averaged over sizes with the variant's
             weight, and the log Bayes factor of the best size without weights.
         """
+        # The inverse of a block of A's inverse is the block's information given the others [Schur complement; Horn and
+        # Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
         inverse = np.linalg.inv(information)

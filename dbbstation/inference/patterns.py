@@ -257,10 +257,8 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Return products of two variables, each with its zero at the ends or the middle of its range.
-
-    For angles, products of cosines and sines give waves of sum and difference.
-    """
+    """Return products of two variables, each with its zero at the ends or the middle of its range."""
+    # For angles, products of cosines and sines give waves of sum and difference.
     if covers_turns(one) or covers_turns(other):
         a, b = (
             turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)

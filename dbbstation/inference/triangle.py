@@ -16,11 +16,9 @@ RANK = 1e-9
 
 
 def triangle_of(stacked: Floats) -> Floats:
-    """Return the triangular factor of QR, up to signs; refuse NaN and infinity.
-
-    Factoring cache-sized slabs first is three times as fast [Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput.
-    34 (2012) A206].
-    """
+    """Return the triangular factor of QR, up to signs; refuse NaN and infinity."""
+    # Factoring cache-sized slabs first is three times as fast [Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci.
+    # Comput. 34 (2012) A206].
     columns = stacked.shape[1]
     slab = max(BOUNDS.slab, 4 * columns)  # each round leaves at most a quarter of the rows
     while len(stacked) >= 2 * slab:

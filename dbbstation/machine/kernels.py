@@ -138,12 +138,10 @@ def _struts(
 
 @inlined
 def _orthogonalise(matrix: Floats, triangle: Floats, sound: Floats) -> None:
-    """Orthogonalise columns of a matrix, shape (6, 6, LANES), in place by modified Gram-Schmidt.
-
-    With the right-hand side as a further column (`_substitute`), this is equivalent to Householder's method: as stable
-    as pivoted elimination, but without row exchanges. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix
-    Anal. Appl. 13 (1992) 176-190]
-    """
+    """Orthogonalise columns of a matrix, shape (6, 6, LANES), in place by modified Gram-Schmidt."""
+    # With the right-hand side as a further column (`_substitute`), this is equivalent to Householder's method: as
+    # stable as pivoted elimination, but without row exchanges. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J.
+    # Matrix Anal. Appl. 13 (1992) 176-190]
     for k in range(6):
         for lane in range(LANES):
             square = 0.0
@@ -230,10 +228,8 @@ def _newton(
 
 @inlined
 def _move(t: Floats, r: Floats, step: Floats, state: Integers) -> None:
-    """Move unconverged platforms by (dt, w), shape (6, LANES) [mm, rad].
-
-    Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4) is an exact rotation without sine; its angle is |w| less |w|³/12.
-    """
+    """Move unconverged platforms by (dt, w), shape (6, LANES) [mm, rad]."""
+    # Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4) is an exact rotation without sine; its angle is |w| less |w|³/12.
     for lane in range(LANES):
         goes = state[lane] == TOO_MANY_STEPS
         for k in range(3):
@@ -268,11 +264,9 @@ def forward(
     rotation: Floats,
     outcome: Integers,
 ) -> None:
-    """Newton-Raphson on strut lengths [CAL eq 2], from near poses to lengths `target` (n, 6).
-
-    Solving J (dt, w) = target - L with exact Jacobian and rotation converges quadratically; only the third step reuses
-    a Jacobian. `outcome` (n,) is converged if the residual's norm is within `tolerance` [mm].
-    """
+    """Newton-Raphson on strut lengths [CAL eq 2], from near poses to lengths `target` (n, 6)."""
+    # Solving J (dt, w) = target - L with exact Jacobian and rotation converges quadratically; only the third step
+    # reuses a Jacobian. `outcome` (n,) is converged if the residual's norm is within `tolerance` [mm].
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, wanted = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, LANES))
     matrix, triangle = np.empty((6, 6, LANES)), np.empty((6, 6, LANES))
@@ -389,13 +383,11 @@ def bar(
     gain: Floats,
     outcome: Integers,
 ) -> None:
-    """Return a bar's length and sensitivities by the adjoint method: one linear solution per pose.
-
-    With n from fixed to tool ball and o the tool ball in the platform frame, J^T g = [n, (R o) x n] gives the
-    sensitivity to strut lengths; g_i u_i is the sensitivity to base joint i. Shapes: fixed_ball in the machine frame,
-    tool_ball in the platform frame, lengths (n,), directions (n, 3), gain (n, 24): six struts, then base joints' x, y,
-    z.
-    """
+    """Return a bar's length and sensitivities by the adjoint method: one linear solution per pose."""
+    # With n from fixed to tool ball and o the tool ball in the platform frame, J^T g = [n, (R o) x n] gives the
+    # sensitivity to strut lengths; g_i u_i is the sensitivity to base joint i. Shapes: fixed_ball in the machine frame,
+    # tool_ball in the platform frame, lengths (n,), directions (n, 3), gain (n, 24): six struts, then base joints' x,
+    # y, z.
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
     matrix, triangle = np.empty((6, 6, LANES)), np.empty((6, 6, LANES))

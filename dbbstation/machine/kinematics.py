@@ -222,10 +222,8 @@ def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Resp
 
 
 def _spans(hexapod: Hexapod, frames: Frames) -> tuple[Floats, Floats]:
-    """Return T + R P - Q and R P, both (n, 6, 3) [mm].
-
-    NumPy is used because starting the compiler takes half a second.
-    """
+    """Return T + R P - Q and R P, both (n, 6, 3) [mm]."""
+    # NumPy is used because starting the compiler takes half a second.
     base, platform = _joints(hexapod, len(frames))
     arm = platform @ np.swapaxes(frames.rotation, 1, 2)
     return frames.position_mm[:, np.newaxis, :] + arm - base, arm

@@ -102,15 +102,14 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
 def compensated_on(passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
     """Return commands along one stretch, shape (n, 6) [mm, deg], and the memory at its end.
 
-    The command is the pose whose nominal strut lengths equal F(T wanted; actual) minus the sources' errors. Weights act
-    at wanted poses, other sources at commanded poses. Sources without memory converge in a few iterations. Accumulating
-    sources invert their own effect. Other sources with memory are solved for many rows together. If a row fails, as at
-    a reversal with play, it is searched alone by bisection for each strut.
-
     Raises:
         KinematicsError: a pose that the machine cannot take.
         ModelError: a source needs missing data; or no command leads to a pose.
     """
+    # The command is the pose whose nominal strut lengths equal F(T wanted; actual) minus the sources' errors. Weights
+    # act at wanted poses, other sources at commanded poses. Sources without memory converge in a few iterations.
+    # Accumulating sources invert their own effect. Other sources with memory are solved for many rows together. If a
+    # row fails, as at a reversal with play, it is searched alone by bisection for each strut.
     if len(wanted) == 0:
         return wanted.poses, passed
     stretch = _Stretch(passed, replace(wanted, straight=True))

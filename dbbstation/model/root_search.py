@@ -78,10 +78,8 @@ class RootSearch:
             self.done, self.lost = True, 1 + int(np.argmax(away if away.any() else open_))
 
     def _between(self, width: Floats) -> Floats:
-        """Return alternately the middle, limited by |f|, and the false position.
-
-        False position is exact for the slope -1, as after a play.
-        """
+        """Return alternately the middle, limited by |f|, and the false position."""
+        # False position is exact for the slope -1, as after a play.
         middle = self._low + 0.5 * width
         with np.errstate(invalid="ignore", divide="ignore"):
             false = self._low + width * self._low_value / (self._low_value - self._high_value)

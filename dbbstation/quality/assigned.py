@@ -183,10 +183,8 @@ class Assigned:
         return spare >= self._cost and spare >= self._mistakes(changes)
 
     def _at_most(self, changes: _Changes) -> float:
-        """Return an upper bound of a log density, from its value before the last runs.
-
-        However well a run is predicted, its readings scatter by their own part.
-        """
+        """Return an upper bound of a log density, from its value before the last runs."""
+        # However well a run is predicted, its readings scatter by their own part.
         count = self._fresh.start
         most = self._known_before.get(tuple(each for each in changes if each[0] < count), np.inf)
         labels = dict(changes)

@@ -83,10 +83,8 @@ def _chance(analysis: CircleAnalysis) -> float:
 
 
 def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
-    """Return whether two neighbouring blocks of a run start with readings that another run contains in succession.
-
-    If not, `_shared` is zero. Stretches of the other run are sorted once per length, a power of two.
-    """
+    """Return whether two neighbouring blocks of a run start with readings that another run contains in succession."""
+    # If not, `_shared` is zero. Stretches of the other run are sorted once per length, a power of two.
     assert other.analysis is not None  # noqa: S101 - asked before
     if length not in other.stretches:
         other.stretches[length] = np.sort(_stretches(other.analysis.raw.length_mm, length))
@@ -96,10 +94,8 @@ def _may_share(begins: NDArray[np.uint64], other: Seen, length: int) -> bool:
 
 
 def _shared(own_mm: Floats, other_mm: Floats, row: int) -> int:
-    """Return the number of readings in stretches common to two runs.
-
-    Blocks have half the length that chance allows, so every longer common stretch contains a whole block.
-    """
+    """Return the number of readings in stretches common to two runs."""
+    # Blocks have half the length that chance allows, so every longer common stretch contains a whole block.
     block = (row + 1) // 2
     if min(len(own_mm), len(other_mm)) < row:
         return 0

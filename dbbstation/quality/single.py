@@ -142,10 +142,8 @@ def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None)
 
 
 def _left_open_um(expected: Expected | None) -> float:
-    """Return the drift that moves the centre by the ball's stated uncertainty [µm].
-
-    A linear drift D over the turn is a sawtooth with the first harmonic D / pi.
-    """
+    """Return the drift that moves the centre by the ball's stated uncertainty [µm]."""
+    # A linear drift D over the turn is a sawtooth with the first harmonic D / pi.
     return 0.0 if expected is None else np.pi * expected.place_um
 
 

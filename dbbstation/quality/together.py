@@ -93,10 +93,9 @@ def expected_beside(both: Together | None) -> Expected | None:
 
 
 def _tail(weights: Floats, covariances_um2: Floats) -> float:
-    """Return the factor on the mean covariance that accounts for the longer tails of a mixture of sizes.
-
-    A sound circle exceeds the scaled ellipsoid with probability SHARE. The mixed covariances are assumed to be proportional.
-    """
+    """Return the factor on the mean covariance that accounts for the longer tails of a mixture of sizes."""
+    # A sound circle exceeds the scaled ellipsoid with probability SHARE. The mixed covariances are assumed to be
+    # proportional.
     sizes = np.trace(covariances_um2, axis1=1, axis2=2)
     sizes /= weights @ sizes
     normal = float(chdtri(COEFFICIENTS, SHARE))

@@ -72,10 +72,9 @@ def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = N
 
 
 def _step(columns: Floats, left: Floats) -> Floats | None:
-    """Return the least-squares solution for a few columns, shape (k,), or None.
-
-    Normal equations suffice, because Gauss-Newton corrects rounding. Ill-conditioned short arcs are solved by orthogonal decomposition.
-    """
+    """Return the least-squares solution for a few columns, shape (k,), or None."""
+    # Normal equations suffice, because Gauss-Newton corrects rounding. Ill-conditioned short arcs are solved by
+    # orthogonal decomposition.
     normal = columns @ columns.T
     least, *_, most = np.linalg.eigvalsh(normal)
     if most < WORST_CONDITION * least:

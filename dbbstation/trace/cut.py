@@ -149,11 +149,9 @@ def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float
 
 
 def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
-    """Return the standard uncertainty of the midpoint between both edges, as an angle [deg].
-
-    An edge between two samples has the uncertainty spacing / sqrt(12); the mean of two edges has 1 / sqrt(2) of it.
-    Several samples on the feed-in divide it by their number. Negligible values are set to zero.
-    """
+    """Return the standard uncertainty of the midpoint between both edges, as an angle [deg]."""
+    # An edge between two samples has the uncertainty spacing / sqrt(12); the mean of two edges has 1 / sqrt(2) of it.
+    # Several samples on the feed-in divide it by their number. Negligible values are set to zero.
     spacing_s = float(np.median(np.diff(recording.good.t_s)))
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     share = min(1.0, spacing_s / feeding_s)
@@ -236,10 +234,8 @@ def _edge(t: Floats, length: Floats, circle: Circle, first: int) -> float:
 
 
 def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> None:
-    """Refuse a recording whose duration or overlap contradicts the programmed feed.
-
-    Dwells only lengthen a trace. The overlap passes the same places twice.
-    """
+    """Refuse a recording whose duration or overlap contradicts the programmed feed."""
+    # Dwells only lengthen a trace. The overlap passes the same places twice.
     duration = edges[1] - edges[0]
     at_least = circle.feed_mm_min * circle.swept_deg / circle.turning_deg_s / duration
     found = overlap_feed(recording, circle, edges)
@@ -324,11 +320,9 @@ def _overlap_feed(
 def _match(
     recording: Recording, circle: Circle, middle: float, start_s: float
 ) -> tuple[float, float, float, float] | None:
-    """Return the turn's duration near `start_s` at which both passes match, with its uncertainty.
-
-    If the second pass is T later, the passes differ by offset + slope (T - turn). The regression on their common slope
-    is iterated.
-    """
+    """Return the turn's duration near `start_s` at which both passes match, with its uncertainty."""
+    # If the second pass is T later, the passes differ by offset + slope (T - turn). The regression on their common
+    # slope is iterated.
     half_s = circle.overshoot_deg / FULL_TURN_DEG * start_s
     t, length = recording.good.t_s - middle, recording.good.length_mm
     # The first pass is about half a turn before the middle. A wrong feed shifts it, so only its inner part is used.

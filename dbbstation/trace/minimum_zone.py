@@ -50,13 +50,12 @@ class MinimumZone:
 def minimum_zone(points_mm: Floats) -> MinimumZone:
     """Return the exact minimum zone of a closed path.
 
-    Two outer and two inner points with crossing chords determine it [Rivlin, Approximation by circles, Computing 21
-    (1979)]; its centre is the intersection of two bisectors. The search tries all pairs of a few points and adds
-    protruding points until no point protrudes.
-
     Raises:
         TraceError: fewer than four different points.
     """
+    # Two outer and two inner points with crossing chords determine it [Rivlin, Approximation by circles, Computing 21
+    # (1979)]; its centre is the intersection of two bisectors. The search tries all pairs of a few points and adds
+    # protruding points until no point protrudes.
     points_mm = np.asarray(points_mm, dtype=np.float64)
     chosen = _extremes(points_mm)
     for _ in range(MOST_ROUNDS):

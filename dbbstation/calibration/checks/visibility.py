@@ -152,11 +152,9 @@ def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
 
 
 def _leverage(calibration: Calibration, fitted: Integers) -> dict[str, float]:
-    """Return, per test, the trace of covariance times the test's information, after elimination of its random effects.
-
-    The trace approximates the number of parameters lost without the test. Effects shared with other tests, such as the
-    bar's length, count as unknowns.
-    """
+    """Return, per test, the trace of covariance times the test's information, after elimination of its random effects."""
+    # The trace approximates the number of parameters lost without the test. Effects shared with other tests, such as
+    # the bar's length, count as unknowns.
     known, noise = calibration.layout.known, calibration.noise.effective
     tests: dict[str, list[Block]] = {}
     for observation, block in zip(calibration.observations, calibration.circle_blocks, strict=True):

@@ -40,7 +40,7 @@ class MotorFindings:
     Attributes:
         noise: of each motor's readings, or of sector means in long runs; None without readings.
         residual_a: rms per motor; NaN without readings.
-        fine_a: noise noise from differences of neighbours, without slow misfit; NaN without readings.
+        fine_a: noise from differences of neighbours, without slow misfit; NaN without readings.
         held: names of undetermined drive parameters.
         alone: centre of gravity by channel (`circles`, `currents`) and parameter, with standard deviation [mm]; None if
             this channel alone does not determine it. Empty without cog-shift.

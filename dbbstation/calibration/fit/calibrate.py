@@ -247,11 +247,9 @@ def _approached(
     left: Sequence[Floats],
     motion_of: MotionOf,
 ) -> tuple[Floats, list[Block]]:
-    """Approach a machine with errors of millimetres, by Gauss-Newton steps with a usual bar's noise.
-
-    Nonlinearity dominates early residuals; as noise it would hide determined directions. The noise is therefore
-    estimated only after steps no longer halve the residual.
-    """
+    """Approach a machine with errors of millimetres, by Gauss-Newton steps with a usual bar's noise."""
+    # Nonlinearity dominates early residuals; as noise it would hide determined directions. The noise is therefore
+    # estimated only after steps no longer halve the residual.
     noise = Noise(FIRST_NOISE_MM, 1.0).effective
     held = lost_directions(nominal, layout.known, noise)
     blocks = list(nominal)
@@ -278,12 +276,10 @@ def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> Floats:
 
 
 def _share(layout: Layout, step: Floats, before: Floats, share: float) -> float:
-    """Return the share of a step to take.
-
-    Full steps oscillate in shape parameters with small amplitude and in nearly undetermined combinations. If the share
-    s gave successive steps with the ratio q, the share s / (1 - q) would have reached the minimum (Aitken's rule). The
-    smallest such share is used.
-    """
+    """Return the share of a step to take."""
+    # Full steps oscillate in shape parameters with small amplitude and in nearly undetermined combinations. If the
+    # share s gave successive steps with the ratio q, the share s / (1 - q) would have reached the minimum (Aitken's
+    # rule). The smallest such share is used.
     shaped = np.array([bool(p.grid) for term in layout.terms for p in term.parameters])
     now, last = step / layout.known.scale, before / layout.known.scale
     along = float(now @ last) / max(float(last @ last), 1e-300)

@@ -34,10 +34,8 @@ def strange_runs(calibration: Calibration) -> list[int]:
 
 
 def _strange_test(calibration: Calibration) -> list[int]:
-    """Return runs of a test whose omission lets all others fit, as indices; may be empty.
-
-    Both directions under a wrong test bias the fit, so their own residuals are hardly larger.
-    """
+    """Return runs of a test whose omission lets all others fit, as indices; may be empty."""
+    # Both directions under a wrong test bias the fit, so their own residuals are hardly larger.
     # Per run, because one array of all residuals would need another number per sample.
     squares_um2 = [rms_um(residual) ** 2 for residual in calibration.residual_mm]
     if np.sqrt(np.average(squares_um2, weights=list(map(len, calibration.residual_mm)))) < LEAST_UM:

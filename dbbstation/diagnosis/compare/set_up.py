@@ -76,10 +76,8 @@ def _per_degree(pair: Pair) -> Floats:
 
 
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, Floats, Floats]]:
-    """Yield tests that share a source's values, its columns, shape (n, p), and stated sizes, shape (p,) [mm].
-
-    If runs share the error in both sessions, the variances add.
-    """
+    """Yield tests that share a source's values, its columns, shape (n, p), and stated sizes, shape (p,) [mm]."""
+    # If runs share the error in both sessions, the variances add.
     shared = [[source.shared_by(motion) for motion in motions] for motions in sides.motions]
     together = list(zip(*shared, strict=True))
     alike = len(set(together)) == len(set(shared[0])) == len(set(shared[1]))

@@ -121,11 +121,9 @@ def drive_channel(
 
 
 def _beyond(straight: Floats, patterns: Iterator[Pattern]) -> Iterator[Pattern]:
-    """Return curves made orthogonal to base and single-parameter causes, which they contain.
-
-    Curves near standstill are not orthogonalised, because friction would extend them to full speed. Over position the
-    whole curve also competes with a named law plus its remainder.
-    """
+    """Return curves made orthogonal to base and single-parameter causes, which they contain."""
+    # Curves near standstill are not orthogonalised, because friction would extend them to full speed. Over position the
+    # whole curve also competes with a named law plus its remainder.
     axes = axes_of(straight, SAME)
     for pattern in patterns:
         if isinstance(pattern.form, Spline) and pattern.form.falls:
@@ -279,10 +277,8 @@ def _starts(recordings: Recordings) -> list[float]:
 
 
 def _first_look(recordings: Recordings, smooth: Floats) -> tuple[Scale, float]:
-    """Return sizes with the strongest waves over position, and the shortest searched wave [mm].
-
-    At usual speed the shortest wave takes one period of the cut-off. Waves are found successively.
-    """
+    """Return sizes with the strongest waves over position, and the shortest searched wave [mm]."""
+    # At usual speed the shortest wave takes one period of the cut-off. Waves are found successively.
     scale = recordings.scale
     speed = float(np.median(np.abs(recordings.at(lambda s: s.speed_m_s))))
     highest = min(recordings.scale.cutoff_hz / speed * scale.travel_m, BOUNDS.waves_of_drive * WAVE_STEP)

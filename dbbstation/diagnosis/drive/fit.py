@@ -144,12 +144,10 @@ def _solved(rows: Floats, sd: Floats, noise: float) -> tuple[Floats, Floats]:
 
 
 def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> DriveFit:
-    """Return the fit for reported values, with cautious uncertainties.
-
-    Whitening emphasises changes of force, where friction laws are least exact. Ordinary least squares is more robust
-    and is used if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251,
-    sec. 2], with coloured covariance [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
-    """
+    """Return the fit for reported values, with cautious uncertainties."""
+    # Whitening emphasises changes of force, where friction laws are least exact. Ordinary least squares is more robust
+    # and is used if both differ beyond noise [Hausman, Specification tests in econometrics, Econometrica 46 (1978)
+    # 1251, sec. 2], with coloured covariance [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
     bank, sd = settled.bank, _prior_sd(drive, members)
     white = fit(drive, settled, members)
     rows = np.column_stack([white.samples, drive.channel.residual])
@@ -164,10 +162,8 @@ def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -
 
 
 def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
-    """Return the greatest standardised difference between both estimates.
-
-    Its variance is the difference of variances [Hausman 1978, corollary 2.6].
-    """
+    """Return the greatest standardised difference between both estimates."""
+    # Its variance is the difference of variances [Hausman 1978, corollary 2.6].
     told = list(range(len(efficient.drive.channel.base.names)))
     for member in efficient.members:
         if member.cause.name in efficient.drive.of_law:
@@ -180,11 +176,9 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
 
 
 def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise: float) -> DriveFit:
-    """Return the fit with uncertainties widened by results without stretches and with half the bandwidth.
-
-    Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
-    1.5].
-    """
+    """Return the fit with uncertainties widened by results without stretches and with half the bandwidth."""
+    # Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
+    # 1.5].
     stretch = np.arange(len(rows)) * FOLDS // len(rows)
     each = [triangle_of(rows[stretch == k]) for k in range(FOLDS)]
     others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(FOLDS))
@@ -203,10 +197,8 @@ def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise
 
 
 def _information(settled: Settled, samples: Floats, sd: Floats, counted: float) -> Floats:
-    """Return the covariance of columns times coloured noise, with priors, shape (k, k).
-
-    Rows are divided by the square of the `counted` noise.
-    """
+    """Return the covariance of columns times coloured noise, with priors, shape (k, k)."""
+    # Rows are divided by the square of the `counted` noise.
     bank = settled.bank
     taken = samples
     if bank.whitening is not None:

@@ -158,10 +158,8 @@ def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None 
 
 
 def _refuse_wrong_sign(one: Recordings) -> None:
-    """Refuse a force with wrong sign.
-
-    After removal of inertia, load and spring, friction makes force and speed positively correlated.
-    """
+    """Refuse a force with wrong sign."""
+    # After removal of inertia, load and spring, friction makes force and speed positively correlated.
     force, speed = one.force_n, one.motion[:, 1]
     if not one.scale.reverses:
         return

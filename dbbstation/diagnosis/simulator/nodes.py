@@ -298,10 +298,8 @@ class Nodes:
     def _fitted(
         self, node: Node, state: FittedState, inside: tuple[Candidate, ...], most: float = np.inf
     ) -> Node | None:
-        """Refit unweighted, then repeatedly with its own noise until stable.
-
-        A residual above `most`, a wrong minimum, returns None.
-        """
+        """Refit unweighted, then repeatedly with its own noise until stable."""
+        # A residual above `most`, a wrong minimum, returns None.
         fitted, before = fit(self.work, state), None
         if _rms(fitted.residual) > most:
             return None

@@ -75,10 +75,8 @@ class BarCyclic(ErrorSource):
         return Effect(reading_mm=MM_PER_UM * np.column_stack([sine, cosine, period]))
 
     def _waves(self, motion: Motion, period_um: float) -> tuple[Floats, Floats]:
-        """Return sine and cosine, shape (n, 2) [1], and the phase's derivative by the period, shape (n,) [rad/µm].
-
-        A period of zero or less gives no wave.
-        """
+        """Return sine and cosine, shape (n, 2) [1], and the phase's derivative by the period, shape (n,) [rad/µm]."""
+        # A period of zero or less gives no wave.
         self.require(motion)
         reading = reading_without_noise_mm(motion)
         if period_um <= 0.0:

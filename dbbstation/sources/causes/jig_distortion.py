@@ -66,10 +66,8 @@ class JigDistortion(ErrorSource):
 
 
 def _bends(motion: Motion) -> tuple[Floats, Floats]:
-    """Return the ball's shift by bow, saddle and twist: at d = 0, and its change per mm of depth.
-
-    Both have shape (3, 3), in [mm/µm] and [1/µm]; a ball in no bore gives zero.
-    """
+    """Return the ball's shift by bow, saddle and twist: at d = 0, and its change per mm of depth."""
+    # Both have shape (3, 3), in [mm/µm] and [1/µm]; a ball in no bore gives zero.
     setup = motion.setup
     if setup is None or setup.plate is None:
         return np.zeros((3, 3)), np.zeros((3, 3))

@@ -192,11 +192,10 @@ def _spike(
 ) -> tuple[float, float, float]:
     """Return the spike [mm] after the turning point, and its derivatives by height [1] and by its constant.
 
-    A strut that has not reversed has sign 0. A constant of zero gives no spike.
-
     Args:
         fading: decay variable: travel or time since the turning point.
     """
+    # A strut that has not reversed has sign 0. A constant of zero gives no spike.
     if length <= 0.0:
         return 0.0, 0.0, 0.0
     ratio = way / (RISE * abs(height)) if height != 0.0 else np.inf

@@ -151,10 +151,8 @@ def _follow(
     lag: Floats,
     by_constant: Floats,
 ) -> None:
-    """Solve each column exactly, with speeds linear between rows.
-
-    e = -tau dx/dt + tau² d²x/dt² is a solution; the difference decays as exp(-t / tau).
-    """
+    """Solve each column exactly, with speeds linear between rows."""
+    # e = -tau dx/dt + tau² d²x/dt² is a solution; the difference decays as exp(-t / tau).
     rows, columns = speed.shape
     for k in range(rows if rows > 1 else 0):
         last = max(k, 1) - 1

@@ -55,11 +55,9 @@ def _parabola(travel: Floats, i: int, k: int, side: float) -> tuple[float, float
 
 @inlined
 def _vertex(travel: Floats, i: int, k: int, side: float) -> tuple[float, float]:
-    """Return the turning point on the high (1.0) or low (-1.0) side, and its distance after row k, in rows.
-
-    The neighbouring parabola midway is a lower limit; otherwise the point could jump between nearly equal rows and make
-    a compensation oscillate.
-    """
+    """Return the turning point on the high (1.0) or low (-1.0) side, and its distance after row k, in rows."""
+    # The neighbouring parabola midway is a lower limit; otherwise the point could jump between nearly equal rows and
+    # make a compensation oscillate.
     slope, bend, before, after = _parabola(travel, i, k, side)
     if bend <= 0.0:
         return travel[k, i], 0.0

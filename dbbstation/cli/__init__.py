@@ -142,7 +142,7 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
         if debug:
             raise
         echo(f"{type(problem).__name__}: {problem}", err=True)
-        echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
+        echo(f"this is a fault of dbbstation itself; {_DEBUG} shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
 

@@ -134,7 +134,9 @@ def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolutio
         try:
             return read_on_calibrator(source, count, resolution_um)
         except ValueError as error:
-            raise click.UsageError(f"{error}: say with --resolution-um what the display's last digit is") from error
+            raise click.UsageError(
+                f"{error}: state the size of the display's last digit with --resolution-um"
+            ) from error
 
 
 def _file(

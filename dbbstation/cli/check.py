@@ -30,7 +30,7 @@ def _anchor(text: str) -> str:
     if re.fullmatch(r"[0-9a-f]{16,64}", text.lower()):
         return text.lower()
     raise ValueError(
-        "give sixteen to sixty-four hexadecimal digits, as printed by a report and `dbbstation check` show them"
+        "give sixteen to sixty-four hexadecimal digits, as in a report or in the output of `dbbstation check`"
     )
 
 
@@ -112,7 +112,7 @@ def check(
             "--tests and --exclude choose tests of a dry run: give plans and one machine, without faults"
         )
     if profile is not None and instrument is None:
-        raise click.UsageError("--profile is one of an instrument: give --instrument too")
+        raise click.UsageError("--profile needs --instrument")
     seen = [] if instrument is None else _seen(_sound(results, "dbb-plan"), instrument, profile)
     problems = [problem for result in results for problem in result.problems]
     problems += [problem for run in runs for problem in run.problems]

@@ -107,7 +107,7 @@ def _print(result: CirclesResult, *, several: bool) -> None:
                 ]
             )
         print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "U", "D", "U", "H", "U"], "at [deg]"], rows)
-    echo("\nG, F and H are without the contribution of noise; --budget states this contribution.")
+    echo("\nG, F and H exclude the contribution of noise; --budget states this contribution.")
     _print_why_not(_with_budgets(result))
 
 
@@ -156,7 +156,7 @@ def _print_budgets(result: CirclesResult) -> None:
             missing |= dict.fromkeys(budget.missing)
     echo("\nstandard uncertainties u [µm]")
     print_table(["test", "dir", "n", "figure", "term", "u"], rows)
-    echo(f"not stated, and not in U: {', '.join(missing)}")
+    echo(f"not stated, and therefore not in U: {', '.join(missing)}")
 
 
 def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> None:

@@ -38,8 +38,7 @@ def _print_runs(result: ComparisonResult) -> None:
     from dbbstation.cli.output import print_table
 
     echo(
-        "B less A [µm], largest first; found: rms of what was found; sigmas: size in standard deviations; u: standard uncertainty by noise, "
-        "balls and bars"
+        "B minus A [µm], largest first; found: rms of the found difference; sigmas: size in standard deviations; u: standard uncertainty by noise, balls and bars"
     )
     titles = ["test", "dir", "n", "found", "sigmas", "rms", "noise", "centre x", "y", "u", "mean", "u", "G", "peak"]
     rows = [
@@ -76,8 +75,7 @@ def _print_causes(result: ComparisonResult) -> None:
     there = [cause for cause in result.causes if isinstance(cause, ComparedCause) and cause.where is not None]
     if there:
         echo(
-            "\nwhat the sessions differ by; share: of all that was found; opposite: part that changes its sign with the "
-            "direction; calibration: part that a new calibration would take up"
+            "\ndifferences of the sessions; share: of all found differences; opposite: part that changes its sign with the direction; calibration: part that a new calibration would absorb"
         )
         rows = [
             [

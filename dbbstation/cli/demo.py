@@ -128,7 +128,7 @@ def _print(result: DemoResult) -> None:
     echo(f"The report says: {result.report.verdict.headline}")
     for rank, one in enumerate(result.report.causes, start=1):
         echo(
-            f"Cause {rank} of what was measured before: {one.cause}, {one.g_um:.1f} µm of G, {one.centre_um:.1f} µm of the "
+            f"Cause {rank} of the errors before: {one.cause}, {one.g_um:.1f} µm of G, {one.centre_um:.1f} µm of the "
             f"centres. {one.cure}"
         )
     echo()

@@ -37,7 +37,7 @@ def show(result: DriveResult) -> None:
         echo(f"  friction {side}: " + ", ".join(f"{name} {n.in_words}" for name, n in values.items()))
     held_back = result.held_back
     first, last = held_back.t_s
-    echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
+    echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without this part:")
     before = float("inf")
     for step in held_back.steps:
         name = f"+ {step.added}" if step.added else "mass and viscous friction"

@@ -248,7 +248,7 @@ def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path,
         matching = [path for path in files if name in {str(path), path.name}]
         runs = [run for one in said.split(",") if (run := run_name(one.strip(), list(plan.tests))) is not None]
         if len(matching) != 1:
-            raise click.UsageError(f"--runs {text}: {name or 'it'} names {len(matching)} of the files that are given")
+            raise click.UsageError(f"--runs {text}: {len(matching)} of the given files have the name {name!r}")
         if len(runs) != len(said.split(",")):
             raise click.UsageError(
                 f"--runs {text}: {said} is no run of the plan, whose tests are {', '.join(plan.tests)}"
@@ -281,7 +281,7 @@ def _started(files: Sequence[Path], said: Sequence[str], zone: str | None) -> di
         matching = [path for path in files if not has or name in {str(path), path.name}]
         if len(matching) != 1:
             raise click.UsageError(
-                f"--started {text}: it is for {len(matching)} of the files that are given; write FILE=TIME"
+                f"--started {text}: it applies to {len(matching)} of the given files; write FILE=TIME"
             )
         try:
             found[str(matching[0])] = moment_in(when, None if zone is None else zone_named(zone)).at
@@ -308,7 +308,7 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
         if len(parts) > 1:
             file = Path(table.table.file).name
             if not click.confirm(f"the angles of {file} turn round: has it {len(parts)} runs", err=True):
-                raise click.UsageError("a run turns one way: check the file")
+                raise click.UsageError("a run turns in one direction: check the file")
             return mapping.model_copy(update={"split": "direction"})
     return mapping
 
@@ -349,7 +349,7 @@ def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> 
         f"the angles of {Path(file).name} span {span:.0f} degrees, those of no circle of the plan do: is that right"
     )
     if not click.confirm(f"{question} (one turn counts)", err=True):
-        raise click.UsageError("check plan and files: a run has a turn, or a turn with the plan's overshoot")
+        raise click.UsageError("check plan and files: a run is one turn, or one turn with the plan's overshoot")
     stated = angle.model_copy(update={"span_deg": round(span, 1)})
     return replace(reader, mapping=reader.mapping.model_copy(update={"angle": stated}))
 

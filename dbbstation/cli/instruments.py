@@ -38,7 +38,7 @@ def instruments(
         names = [one.profile for one in load_variants(name) if one.profile]
         return Answer(instrument_result(protocol, names, whole=True), _details(protocol, names))
     if profile is not None:
-        raise click.UsageError("--profile is one of an instrument: name the instrument too")
+        raise click.UsageError("--profile needs the name of an instrument")
     known = [load_variants(one) for one in known_instruments()]
     shown = (instrument_result(one[0], (each.profile for each in one if each.profile)) for one in known)
     lines: list[str] = []

@@ -149,7 +149,7 @@ def sheet(
     def words() -> None:
         print_table(["ball", "x [mm]", "y [mm]", "z [mm]", "u [µm]", "dx [µm]", "dy [µm]", "dz [µm]"], rows)
         if lost:
-            echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
+            echo(f"balls that the sheet lacks, left out of the new file: {', '.join(lost)}")
         if cmm_temp_c is None:
             echo("the file lacks the plate's temperature on the CMM: give --cmm-temp-c")
         echo_line(f"{len(balls)} balls written to {out}")
@@ -192,7 +192,7 @@ def holders(
 
     if (jig is None) != (out is None):
         raise click.UsageError(
-            "give --jig and --out together: the new file is the old one with the result in its holders"
+            "give --jig and --out together: the new file is the old file with the computed repeatability"
         )
     if out is not None:
         refuse_existing_table(out, force=force)
@@ -291,7 +291,9 @@ def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str
         name = row.holder or holder
         if not name:
             what = "nothing says which holder this row is of"
-            raise InputError.of(sheet, what, "say it with --columns NAME=holder, or --holder for all", line=row.line)
+            raise InputError.of(
+                sheet, what, "state it with --columns NAME=holder, or --holder for all rows", line=row.line
+            )
         centre = tuple(1e3 * value for value in row.centre_mm if np.isfinite(value))
         groups.setdefault((name, row.name or row.bore), []).append(centre)
     found: dict[str, list[Any]] = {}

@@ -138,7 +138,7 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
     if kept is not None:
         if options.said:
             also = ", ".join(options.said)
-            raise click.UsageError(f"{options.mapping} says what columns mean: edit it, or leave out {also}")
+            raise click.UsageError(f"{options.mapping} states the meaning of columns: edit it, or leave out {also}")
         mapping = read_mapping(kept)
         language, encoding = mapping.numbers, mapping.encoding
     shops = shops_numbers() if language is None else None
@@ -228,7 +228,7 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
 
             known = ", ".join(MEANINGS)
             raise click.UsageError(
-                f"--columns {text}: write NAME=MEANING or NAME=MEANING:UNIT, a meaning is one of {known}"
+                f"--columns {text}: write NAME=MEANING or NAME=MEANING:UNIT; MEANING is one of {known}"
             )
         if found[0] not in table.table.names:
             raise click.UsageError(f"--columns {text}: the columns are {', '.join(table.table.names)}")

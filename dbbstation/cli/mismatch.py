@@ -98,9 +98,7 @@ def _print(result: MismatchResult) -> None:
     _print_parameters(result)
     if held_out:
         echo(
-            f"\nheld-out error: {held_out.as_simulated:.3g} as simulated, {held_out.before:.3g} refitted, "
-            f"{held_out.after:.3g} {unit} rms corrected; over {len(held_out.folds)} parts, each predicted by a "
-            "choice without it"
+            f"\nheld-out error: {held_out.as_simulated:.3g} as simulated, {held_out.before:.3g} refitted, {held_out.after:.3g} {unit} rms corrected; over {len(held_out.folds)} parts, each predicted by causes chosen without it"
         )
     elif any(f.verdict == "identified" for f in there):
         echo("\nno parts were held out: predictions of the identified causes were not tested.")
@@ -124,7 +122,9 @@ def _print_first(result: MismatchResult) -> None:
             f"{unit} rms as simulated.\n".replace("  ", " ")
         )
     if result.stopped:
-        echo(f"Ended early: {result.stopped}. This is the best answer so far; fewer columns (--variables) take less.\n")
+        echo(
+            f"Ended early: {result.stopped}. This is the best answer so far; with fewer columns (--variables) the search is shorter.\n"
+        )
 
 
 def _print_whether(result: MismatchResult) -> None:
@@ -191,7 +191,7 @@ def _print_parameters(result: MismatchResult) -> None:
     echo("\nparameters of the simulation, fitted anew:")
     for p in parameters:
         before, after = p.before.in_words, p.after.in_words
-        echo(f"  {p.name}: {before} alone, {after} beside what was found; R² {p.confounded:.2f} with it")
+        echo(f"  {p.name}: {before} alone, {after} with the found effects; R² {p.confounded:.2f} with them")
         if p.far:
             echo(f"    {TOO_FAR_STATED if p.stated else TOO_FAR}")
 

@@ -29,7 +29,7 @@ def show_simulator(result: SimulatorResult) -> None:
     if held_out:
         echo(
             f"\nheld-out error: {held_out.as_simulated:.3g} as simulated, {held_out.refitted:.3g} refitted, "
-            f"{held_out.corrected:.3g} {unit} rms corrected; over {len(held_out.parts)} parts, each chosen anew and simulated"
+            f"{held_out.corrected:.3g} {unit} rms corrected; over {len(held_out.parts)} parts, each predicted by terms chosen without it"
         )
     elif there:
         echo("\nno parts were held out, or the search ended before: predictions were not tested.")
@@ -60,7 +60,7 @@ def _print_whether(result: SimulatorResult) -> None:
         echo("No mismatch was found so far; the search ended before it had tested all of the residual.")
     else:
         echo(
-            f"No mismatch: what the refitted simulator leaves, {rms.refitted:.3g} {unit} rms, is noise.".replace(
+            f"No mismatch: the residual of the refitted simulator, {rms.refitted:.3g} {unit} rms, is noise.".replace(
                 "  ", " "
             )
         )

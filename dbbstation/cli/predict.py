@@ -33,7 +33,9 @@ def show(result: PredictionResult) -> None:
         f"u of {', '.join(unknown)} is not known: {result.uncertainty_not_known_because}"
     )
     if result.directions_lost:
-        say("  a joint_tolerance_mm in the machine file of the calibration, or tests that show it, would determine it")
+        say(
+            "  a joint_tolerance_mm in the machine file of the calibration, or tests that measure it, would determine it"
+        )
 
 
 predict = command(task, show, CommandOutput("table", table=True, field="file", required=True))

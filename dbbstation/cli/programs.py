@@ -37,7 +37,7 @@ def print_programs(result: ProgramsResult) -> None:
         for told in each.remarks:
             say(f"{each.file}: {told}")
     if result.acceleration_mm_s2 is not None:
-        say(f"pieces are chosen for {result.dialect} with {result.acceleration_in_words}")
+        say(f"the lengths of pieces suit {result.dialect} with {result.acceleration_in_words}")
     _say_uncertainty(result.programs)
 
 

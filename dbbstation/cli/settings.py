@@ -67,7 +67,7 @@ def settings(
 
     if template:
         if folder is not None or as_json:
-            raise click.UsageError("--template prints a settings file and takes nothing else")
+            raise click.UsageError("--template prints a settings file and allows no other option")
         echo(_template(), nl=False)
         return
     found = shop_settings()

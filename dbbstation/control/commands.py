@@ -68,7 +68,7 @@ def _fitted(name: str, values: Mapping[str, float], machine: Machine, known: Map
         if set(names) == set(values) and law.needs <= {Need.POSE}:
             return Fitted(law, np.array([values[each] for each in names]))
     raise ModelError(
-        f"what the control corrects has the source {name}, which is unknown, has other parameters or follows more than the pose",
+        f"the control corrects the source {name}, which is unknown, has other parameters or depends on more than the pose",
         where="`control` of the machine file",
         remedy="switch the parts that follow thermometers off while measuring, and take them out of `control`",
     )

@@ -87,7 +87,7 @@ def check_name(name: str) -> None:
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in _KEYWORDS or len(name) > LONGEST_NAME:
         raise StationError(
-            f"{name!r} is no name of a component in C",
+            f"{name!r} cannot be the name of a component in C",
             remedy=f"name the file with small letters, digits and underscores, at most {LONGEST_NAME}, such as dbbkins.comp",
         )
 

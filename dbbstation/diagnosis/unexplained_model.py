@@ -85,8 +85,7 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
         raise ModelError("the model has no unnamed effect that a curve describes")
     if curve.follows not in KEPT_AS:
         raise ModelError(
-            f"what is left follows {curve.variable}, which no program knows of itself or no model has a source for: it "
-            "cannot be compensated"
+            f"the residual follows {curve.variable}, which no program contains or no source of a model describes: it cannot be compensated"
         )
     (source,) = sources_named([KEPT_AS[curve.follows]])
     machine = after.layout.machine

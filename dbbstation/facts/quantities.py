@@ -99,7 +99,7 @@ class Reach:
         if not self.distance.fits(distance):
             raise PydanticCustomError(
                 "implausible",
-                "lies {value} mm from the origin, expected {least} to {most} mm{guess}",
+                "is {value} mm from the origin, expected {least} to {most} mm{guess}",
                 {
                     "value": f"{distance:g}",
                     "least": f"{self.distance.least:g}",
@@ -124,7 +124,7 @@ class Rising:
         if not self.span.fits(high - low):
             raise PydanticCustomError(
                 "implausible",
-                "the limits lie {value} {unit} apart, which is not plausible{guess}",
+                "the limits are {value} {unit} apart, which is not plausible{guess}",
                 {"value": f"{high - low:g}", "unit": self.span.unit, "guess": self.span.guess(high - low)},
             )
         return pair

@@ -67,7 +67,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
     raise InstrumentError(
         f"its protocol cannot express {status!r}",
         where=protocol.name,
-        remedy="give a code, a special or a message frame of the protocol file that status",
+        remedy="give this status to a code, a special or a message frame of the protocol file",
     )
 
 

@@ -193,7 +193,7 @@ class Instrument:
             InstrumentError: the port does not open, or the start sequence gets no answer.
         """
         if self._thread is not None:
-            raise InstrumentError("it is being read already", where=self.where, remedy="stop it first")
+            raise InstrumentError("the instrument is already being read", where=self.where, remedy="stop it first")
         self._link = self._link or self._open(self._port)
         self._adapter = adapter_of(self._port) if self._reconnect_s and isinstance(self._port, str) else None
         self._last_s, self._away = None, False
@@ -258,7 +258,7 @@ class Instrument:
                 if self._failure is not None:
                     raise self._failure
                 if self._thread is None or not self._thread.is_alive():
-                    raise InstrumentError("it is not being read", where=self.where, remedy="start it first")
+                    raise InstrumentError("the instrument is not being read", where=self.where, remedy="start it first")
                 # Woken by each reading; the limit is for a thread that ended in between.
                 self._arrived.wait(0.1)
             return self._queue.popleft()
@@ -371,7 +371,7 @@ def _command(link: Link, step: LineCommand, patience_s: float) -> bytes:
     while step.reply and step.reply not in came:
         if step.refused and step.refused in came:
             raise InstrumentError(
-                f"it refuses the command {symptoms.shown(step.send)}",
+                f"the instrument refuses the command {symptoms.shown(step.send)}",
                 where=link.name,
                 remedy="check instrument, profile, and that its display shows the actual value",
             )

@@ -166,7 +166,9 @@ class Poller:
         noisy = [answer for answer in self._recent if answer.raw and not answer.clean]
         if len(noisy) >= MOST_NOISY:
             raw = b"".join(answer.raw for answer in self._recent)[-LONGEST_LINE:]
-            raise self._to.symptom(raw, f"{len(noisy)} of {len(self._recent)} replies have bytes of no reply")
+            raise self._to.symptom(
+                raw, f"{len(noisy)} of {len(self._recent)} exchanges contain bytes that belong to no reply"
+            )
 
     def _explanation(self) -> str:
         follow_up, protocol = self._protocol.ask.follow_up, self._protocol.explaining

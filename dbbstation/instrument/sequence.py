@@ -94,7 +94,7 @@ class SampleOrder(Generic[Held]):
         if followers >= RESTART_FOLLOWERS:
             self._held.pop()
             raise InstrumentError(
-                f"the sample counter went from {self._last} to {first} and counts on from there",
+                f"the sample counter went from {self._last} to {first} and continues from there",
                 where=self._where,
                 remedy="the instrument was restarted, or another program reads the same port: start the measurement again",
             )

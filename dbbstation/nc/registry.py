@@ -67,6 +67,8 @@ def dialect_of_file(file: str, text: str) -> Dialect:
     if len(fitting) != 1:
         names = ", ".join(dialect.name for dialect in fitting or having)
         raise StationError(
-            f"the program may be in several NC dialects: {names}", where=file, remedy="say which, with --written-in"
+            f"the program may be in several NC dialects: {names}",
+            where=file,
+            remedy="state the dialect with --written-in",
         )
     return fitting[0]

@@ -198,7 +198,13 @@ def _tables(
         if len(back):
             what = f"{file.time} does not rise"
             faults.append(
-                Problem(table.file, int(table.lines[back[0] + 1]), 0, what, "order the rows by time; one run a file")
+                Problem(
+                    table.file,
+                    int(table.lines[back[0] + 1]),
+                    0,
+                    what,
+                    "order the rows by time, and put each run into its own file",
+                )
             )
     if not faults and sum(map(len, found)) < FEWEST_ROWS:
         what = f"{sum(map(len, found))} rows are too few to compare, {FEWEST_ROWS} are needed"

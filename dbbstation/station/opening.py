@@ -51,7 +51,7 @@ def check_session(
     if other:
         was, now = ("plain circles", "NC programs") if with_programs else ("NC programs", "plain circles")
         what = f"its runs were commanded by {was}, now {now} are asked for"
-        faults.append(Problem(str(folder), 0, 0, what, "measure them into a session of their own"))
+        faults.append(Problem(str(folder), 0, 0, what, "measure them into a separate session"))
     faults += _mixed(folder, session, details.instrument)
     if faults:
         raise InputError(faults)

@@ -141,7 +141,7 @@ class Storage:
         expected = self._writer.session.folder / "runs" / f"{run.label}.csv"
         if self._journal.sealed_path != expected:
             raise OutputError(
-                f"the run was to be {expected.name}, which is taken",
+                f"the run needs the name {expected.name}, which is taken",
                 where=str(expected.parent),
                 remedy="another program writes into this session: end it, then continue",
             )

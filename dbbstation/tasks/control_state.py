@@ -38,6 +38,6 @@ def lengths_by_tool(texts: Iterable[str]) -> dict[int, float]:
     for name, (length,) in named_numbers(texts, {1}).items():
         number = name.lstrip("TH")
         if not number.isdecimal():
-            raise ValueError(f"{name!r} is no number of a tool")
+            raise ValueError(f"{name!r} is not the number of a tool")
         found[int(number)] = length
     return found

@@ -169,7 +169,7 @@ class TaskParameter:
             if end is not None and sign * value > sign * end:
                 raise ValueError(f"{value:g} is out of range: {word} {end:g}")
         if one.above is not None and value <= one.above:
-            raise ValueError(f"{value:g} is out of range: more than {one.above:g}")
+            raise ValueError(f"{value:g} is out of range: it must be more than {one.above:g}")
         return value
 
 
@@ -215,7 +215,7 @@ class Declared:
         """Return checked arguments for the task.
 
         Raises:
-            ArgumentError: a value that it does not take, or that does not go with another.
+            ArgumentError: a value that it does not take, or that cannot be combined with another.
         """
         bound = self.signature.bind(*args, **named)
         there = []

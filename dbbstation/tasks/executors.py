@@ -92,7 +92,7 @@ class WorkPool(Generic[Item, Result]):
                     return True
                 except CancelledError as error:
                     raise SchedulerError(
-                        "the scheduler went away", where=self.scheduler, remedy="start it, and give the command again"
+                        "the scheduler went away", where=self.scheduler, remedy="start it, and repeat the command"
                     ) from error
                 except Exception as error:
                     if not _is_killed(error):

@@ -119,7 +119,7 @@ def blocks(
         except InputError as error:
             if run.state is not RunState.RECORDING:
                 raise
-            say(f"{session.name}: run {run.label} was broken off and is left out: {error.problems[0]}")
+            say(f"{session.name}: run {run.label} was interrupted and is left out: {error.problems[0]}")
             continue
         recording, count = read.recording, len(read.recording)
         try:

@@ -283,7 +283,7 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
         serials = first.serial_number, other.serial_number
         if all(serials) and serials[0] != serials[1]:
             what = f"it is of machine {serials[1]}, {first.folder} of machine {serials[0]}"
-            faults.append(Problem(str(other.folder), 0, 0, what, "fit the sessions of one machine together"))
+            faults.append(Problem(str(other.folder), 0, 0, what, "choose sessions of one machine"))
         elif unlike := differences(first.machine, other.machine):
             what = (
                 f"its machine file is not that of {first.folder}: {in_words(unlike)}, in {first.name} and {other.name}"

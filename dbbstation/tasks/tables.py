@@ -154,7 +154,7 @@ def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabula
     units = {name: meaning_of(name).unit for name in (asked.measured, asked.simulated)}
     if len({unit for unit in units.values() if unit}) > 1:
         said = " and ".join(f"`{name}` in {unit}" for name, unit in units.items())
-        faults.append(Problem(first, 0, 0, f"{said} cannot be compared", "give both in one unit"))
+        faults.append(Problem(first, 0, 0, f"{said} cannot be compared", "give both in the same unit"))
     if asked.measured == asked.simulated:
         what = f"`{asked.measured}` is named for measured and for simulated values"
         faults.append(Problem(first, 0, 0, what, "name the column of the simulation"))
@@ -237,7 +237,7 @@ def _faults_of_scale(files: Sequence[TableFile], asked: TableOptions) -> list[Pr
     what = (
         f"`{more}` goes up to {greatest[more]:g}, `{less}` to {greatest[less]:g}: these are no values of one quantity"
     )
-    return [Problem(files[0].file, files[0].header, 0, what, "give both in one unit")]
+    return [Problem(files[0].file, files[0].header, 0, what, "give both in the same unit")]
 
 
 def _greatest(files: Sequence[TableFile], name: str) -> float:
@@ -336,7 +336,7 @@ class _Reader:
             if name not in table.derivatives
         ]
         both = sorted(set(self._asked.known) & set(self._asked.free))
-        faults += [Problem("--free", 0, 0, f"`{name}` is stated with --known, too", "give it once") for name in both]
+        faults += [Problem("--free", 0, 0, f"`{name}` is also stated with --known", "give it once") for name in both]
         if faults:
             raise InputError(faults)
 

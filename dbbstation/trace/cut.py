@@ -246,7 +246,7 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
     else:
         return
     raise TraceError(
-        f"{shown}, the plan says {circle.feed_mm_min:g}",
+        f"{shown}, but the plan states {circle.feed_mm_min:g}",
         where=recording.name,
         remedy="set the override on the control to 100 % and run it again; if this feed is intended, state it in the plan",
     )
@@ -391,7 +391,7 @@ def _selected(recording: Recording, circle: Circle, phi_deg: Floats, rows: Flags
     if gaps.max() > LARGEST_GAP_DEG:
         start = float(np.concatenate([[0.0], np.sort(phi)])[int(np.argmax(gaps))])
         raise TraceError(
-            f"no sample over {gaps.max():.1f} degrees, from {start:.1f} degrees after the start of the turn",
+            f"no sample over {gaps.max():.1f} degrees; the gap begins {start:.1f} degrees after the start of the turn",
             where=recording.name,
             remedy="repeat the run",
         )

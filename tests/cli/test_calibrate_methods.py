@@ -78,7 +78,7 @@ def test_prescribed_parameters_may_be_chosen(run, jig_session):
     [
         (("--method", "conv-b"), "no set-up errors were measured in test a"),
         (("--prescribe", "base-joints.joint_1_z_mm,base-joints.joint_2_z_mm"), "2 parameters are prescribed"),
-        (("--prescribe", "joint_1_z_mm"), "cannot be prescribed: not among the parameters that are fitted"),
+        (("--prescribe", "joint_1_z_mm"), "cannot be prescribed: these parameters are not fitted"),
     ],
 )
 def test_what_cannot_be_done_is_said(run, jig_session, arguments, said):

@@ -154,7 +154,7 @@ def test_a_model_without_findings_is_no_use(session):
 def test_budget_and_findings_are_printed(session):
     out = call("circles", session, "--tests", "a", "--budget", "--findings").out
     assert "noise of the readings" in out
-    assert "not stated, and not in U: " in out
+    assert "not stated, and therefore not in U: " in out
     assert "nothing is wrong" in out
 
 

@@ -134,7 +134,7 @@ def test_a_fault_of_the_program_says_so(run, monkeypatch, fifteen):
     outcome = run("calibrate", fifteen)
     assert outcome.code == FAILED
     assert outcome.err == (
-        "ValueError: three is not two\nthis is a fault of dbbstation itself; with --debug it shows what to report\n"
+        "ValueError: three is not two\nthis is a fault of dbbstation itself; --debug shows what to report\n"
     )
     with pytest.raises(ValueError, match="three is not two"):
         run("calibrate", fifteen, "--debug")

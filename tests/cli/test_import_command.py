@@ -254,7 +254,7 @@ def test_other_faults_of_words_are_answered(run, tmp_path):
     file = table(tmp_path / "old.csv", rows)
     words = ["import", file, "--out", tmp_path / "s", *WHERE, *UNKNOWN, *ANGLE, "--yes"]
     assert "no run of the plan" in run(*words, "--zero-mm", "150", "--runs", "old.csv=zz-ccw").err
-    assert "names 0 of the files" in run(*words, "--zero-mm", "150", "--runs", "new.csv=a").err
+    assert "0 of the given files have the name" in run(*words, "--zero-mm", "150", "--runs", "new.csv=a").err
     assert "nothing says which test" in run(*words, "--zero-mm", "150").err
     assert "--columns angel=angle:deg: the columns are" in run(*words, "--columns", "angel=angle:deg").err
     assert "write NAME=MEANING" in run(*words, "--columns", "angle_deg=angle:mm").err

@@ -73,10 +73,10 @@ def test_uncertainties_of_three_axes_become_their_root_mean_square(run, tmp_path
     [
         ("ball,x,y\n9-short,0,0\n4-short,-100,-100\n", "`9-short` has no z"),
         ("ball,x,y,z\n9-short,0,0,0\nball-x,-100,-100,0\n", "the jig has no ball `ball-x`"),
-        ("ball,x,y,z\n9-short,0,0,0\n9-short,0,0,0\n", "comes a second time"),
+        ("ball,x,y,z\n9-short,0,0,0\n9-short,0,0,0\n", "is in the sheet a second time"),
         ("ball,x,y,z\n9-short,0,0,0\n4-short,100,100,0\n", "at bore 8"),
         ("ball,x,y,z\n9-short,0,0,0\n4-short,-100,abc,0\n", "cmm.csv:3: y is `abc`"),
-        ("ball,a,b,c\n9-short,0,0,0\n4-short,-100,-100,0\n", "no column is taken for x"),
+        ("ball,a,b,c\n9-short,0,0,0\n4-short,-100,-100,0\n", "no column is known to be x"),
         ("x,y,z\n0,0,0\n-100,-100,0\n", "no column says which ball"),
         ("nothing", "there is no table"),
     ],
@@ -121,7 +121,7 @@ def test_dmis_points_in_inch_with_other_names(run, tmp_path):
     done = sheet(run, file, tmp_path / "new.yaml", "--u-um", "0.8", "--names", "P1=9-short")
     assert done.code == DONE, done.err
     assert read_jig(tmp_path / "new.yaml").balls["9-short"].centre_mm == pytest.approx((0.254, 0.508, 0.762))
-    assert "not in the sheet, and not in the new file: 4-short" in done.out
+    assert "balls that the sheet lacks, left out of the new file: 4-short" in done.out
 
 
 def test_ten_mountings_in_three_bores_go_into_the_jig(run, tmp_path):
@@ -191,7 +191,7 @@ def test_a_sheet_with_a_row_per_coordinate(run, tmp_path):
     ("old", "new", "what"),
     [
         ("zValue\tZ\t0.0069", "diameter\tD\t0.0069", "9-short has no z"),
-        ("Y\t-100.0024", "X\t-100.0024", "x of 4-short comes a second time"),
+        ("Y\t-100.0024", "X\t-100.0024", "x of 4-short is in the sheet a second time"),
         ("-100.0441", "abc", "plate_chr.txt:6:6: actual of 4-short x is `abc`"),
         ("4-short\tmm\nEND", "4-short\tfoot\nEND", "plate_chr.txt:8:10: `foot` is no unit"),
     ],

@@ -230,7 +230,7 @@ def test_runs_are_told_apart_by_a_column(run, warm, tmp_path):
             "x.csv:1: there is no column `measured`; did you mean",
         ),
         (("--measured", "measured_mm", "--simulated", "measured_mm"), "is named for measured and for simulated values"),
-        (("--measured", "measured_mm", "--simulated", "other_um"), "cannot be compared; give both in one unit"),
+        (("--measured", "measured_mm", "--simulated", "other_um"), "cannot be compared; give both in the same unit"),
         ((*COLUMNS, "--variables", "palce_mm"), "there is no column `palce_mm`; did you mean `place_mm`?"),
         ((*COLUMNS, "--run", "day"), "there is no column `day`"),
         (COLUMNS, "x.csv:1: 4 rows with all values are too few to compare, 30 are needed"),

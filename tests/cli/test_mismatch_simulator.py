@@ -134,7 +134,7 @@ def test_a_simulation_that_takes_too_long_is_refused_with_its_input(run, decay, 
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (("--measured", "level_m"), "--measured does not go with --simulator"),
+        (("--measured", "level_m"), "--measured cannot be combined with --simulator"),
         (("--most-runs", "0"), "most-runs"),
     ],
 )

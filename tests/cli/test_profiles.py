@@ -87,7 +87,7 @@ def test_settings_have_a_profile_that_belongs_to_their_instrument(run, tmp_path:
     assert "there is no such port" in other.err
     alone = run("check", settings(tmp_path, "profile: no-checksum\n"))
     assert alone.code == FAILED
-    assert "a profile is one of an instrument" in alone.err
+    assert "a profile needs `instrument` in the same file" in alone.err
 
 
 def test_check_says_what_a_plan_gets_from_an_instrument(run, tmp_path: Path):

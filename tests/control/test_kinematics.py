@@ -135,7 +135,7 @@ def test_a_thermometer_that_the_control_lacks_is_named(reference: Machine) -> No
 
 @pytest.mark.parametrize("name", ["Kins", "1kins", "my-kins", "int", "k" * 21, ""])
 def test_a_name_that_is_not_c_is_refused(name: str, reference: Machine) -> None:
-    with pytest.raises(StationError, match="is no name of a component in C"):
+    with pytest.raises(StationError, match="cannot be the name of a component in C"):
         component(MachineModel(reference), kernel(), name, DIGEST)
 
 

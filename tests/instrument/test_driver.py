@@ -64,7 +64,7 @@ def test_readings_that_came_are_given_before_the_error() -> None:
     with expected((b"", stream)) as port, Instrument(ENCODER, port) as instrument:
         time.sleep(0.1)
         assert len(instrument.drain()) == 2
-        with pytest.raises(InstrumentError, match="scripted: the sample counter went from 7 to 1 and counts on"):
+        with pytest.raises(InstrumentError, match="scripted: the sample counter went from 7 to 1 and continues"):
             instrument.drain()
         with pytest.raises(InstrumentError, match="the sample counter"):
             instrument.read()
@@ -74,12 +74,12 @@ def test_after_a_stop_there_is_nothing_to_wait_for() -> None:
     with expected((b"", b"\r\n00006,+0150.00031,A\r\n")) as port:
         instrument = Instrument(ENCODER, port)
         instrument.start()
-        with pytest.raises(InstrumentError, match="it is being read already"):
+        with pytest.raises(InstrumentError, match="the instrument is already being read"):
             instrument.start()
         time.sleep(0.05)
         instrument.close()
         assert instrument.read().counter == 6
-        with pytest.raises(InstrumentError, match="it is not being read"):
+        with pytest.raises(InstrumentError, match="the instrument is not being read"):
             instrument.read()
         instrument.close()
 

@@ -179,7 +179,7 @@ def test_the_text_of_an_error_is_asked_for_once_while_it_lasts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("answer", "fault"), [(b"\x06", None), (b"\x15", "it refuses the command"), (b"\x02", "instead of")]
+    ("answer", "fault"), [(b"\x06", None), (b"\x15", "the instrument refuses the command"), (b"\x02", "instead of")]
 )
 def test_key_commands_are_answered_by_ack_or_nak(tmp_path: Path, answer: bytes, fault: str | None) -> None:
     """ND 287 user manual, page 108. A start sequence may press keys; a display that refuses one is told of at once."""

@@ -58,7 +58,7 @@ def test_a_restart_is_believed_when_three_lines_count_on_from_behind() -> None:
     sequence = SampleOrder[int](100_000, "COM3")
     for counter in (500, 501, 0, 1):
         sequence.place(counter, counter)
-    with pytest.raises(InstrumentError, match="COM3: the sample counter went from 501 to 0 and counts on from there"):
+    with pytest.raises(InstrumentError, match="COM3: the sample counter went from 501 to 0 and continues from there"):
         sequence.place(2, 2)
 
 

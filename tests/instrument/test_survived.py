@@ -162,7 +162,7 @@ def test_a_gauge_whose_replies_only_begin_as_those_of_another_is_refused() -> No
     with (
         VirtualInstrument(tesa, lambda _: 150.1, clock=ScaledClock(10)) as virtual,
         Instrument(sylvac, virtual.port, clock=virtual.clock) as instrument,
-        pytest.raises(InstrumentError, match="replies have bytes of no reply") as caught,
+        pytest.raises(InstrumentError, match="exchanges contain bytes that belong to no reply") as caught,
     ):
         for _ in instrument.readings():
             pass

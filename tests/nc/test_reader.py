@@ -110,7 +110,7 @@ def test_a_helix_moves_the_other_axes_evenly():
         ("G2 X5 I9 F100", 4, "9.0000 and 4.0000 mm"),
         ("G2 X5 I2.5 P1.5 F100", 12, "number of turns"),
         ("G0 X5 P7", 7, "nothing in this line uses P7"),
-        ("G53 G2 X5 R5 F100", 1, "G53 goes with G0 and G1"),
+        ("G53 G2 X5 R5 F100", 1, "G53 is allowed only with G0 or G1"),
         ("G20 F10 G1 X1", 5, "counts in the units before it on some controls"),
         ("G90.1 G2 X5 I2.5 F10", 10, "both I and J"),
     ],

@@ -172,7 +172,7 @@ def test_a_simulation_stays_in_memory_until_it_is_saved(tmp_path):
         (lambda: dbb.mismatch({}, "a", "b", decimal=";"), "decimal: ';' is not one of"),
         (lambda: dbb.mismatch({}, "a", "b", known={"a": -1}), "known: `a=-1` is not understood"),
         (lambda: dbb.mismatch({}, "a", "b", most_runs=3), "most_runs: `most_runs` needs `simulator`"),
-        (lambda: dbb.mismatch({}, "a", simulator="m.yaml"), "measured: `measured` does not go with `simulator`"),
+        (lambda: dbb.mismatch({}, "a", simulator="m.yaml"), "measured: `measured` cannot be combined with `simulator`"),
         (lambda: dbb.mismatch({}, matters=True), "matters: `True` is no number"),
         (lambda: dbb.identify("drive.csv", cutoff_hz=float("nan")), "cutoff_hz: nan is not a finite number"),
     ],

@@ -121,6 +121,5 @@ def _check_not_centred(observations: Sequence[Observation]) -> None:
         raise CalibrationError(
             f"the centres of the {len(seen)} circles lie within {1e3 * off:.2g} µm rms of the fixed balls, closer than any "
             "mounting: a centre compensation has removed the machine's position errors from these recordings",
-            remedy="switch centre compensation off and measure again, or export raw lengths; --method conv-a uses "
-            "these recordings for everything but the position",
+            remedy="switch centre compensation off and measure again, or export raw lengths; --method conv-a uses these recordings, but not their positions",
         )

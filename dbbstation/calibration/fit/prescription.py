@@ -48,19 +48,18 @@ def prescribed(layout: Layout, lost: Floats, wanted: Sequence[Name]) -> Floats:
         unknown = [f"{source}.{name}" for source, name in wanted if (source, name) not in fitted]
         if unknown:
             raise CalibrationError(
-                f"{', '.join(unknown)} cannot be prescribed: not among the parameters that are fitted",
+                f"{', '.join(unknown)} cannot be prescribed: these parameters are not fitted",
                 remedy=f"name them as in {'.'.join(fitted[0])}",
             )
         if len(set(wanted)) != len(lost):
             raise CalibrationError(
-                f"{len(set(wanted))} parameters are prescribed, but these tests lose {len(lost)} directions",
+                f"{len(set(wanted))} parameters are prescribed, but these tests leave {len(lost)} directions undetermined",
                 remedy=f"prescribe {len(lost)}, or leave the choice to the program",
             )
         rows = [fitted.index(name) for name in dict.fromkeys(wanted)]
     if rows and np.linalg.svd(lost[:, rows], compute_uv=False)[-1] < LEAST_SHARE:
         raise CalibrationError(
-            f"the parameters {', '.join('.'.join(fitted[row]) for row in rows)} do not hold every direction that these "
-            "tests lose",
+            f"the parameters {', '.join('.'.join(fitted[row]) for row in rows)} do not hold every direction that these tests leave undetermined",
             remedy="prescribe, for example, all three coordinates of one base joint, two of another, one of a third",
         )
     return np.eye(len(fitted))[rows]

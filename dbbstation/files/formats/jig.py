@@ -32,7 +32,7 @@ def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, flo
             if distance < _CLOSEST_BORES_MM:
                 raise PydanticCustomError(
                     "implausible",
-                    "bores {one} and {two} lie {distance} mm apart, closer than a holder is wide; expected mm",
+                    "bores {one} and {two} are {distance} mm apart, less than the width of a holder; expected mm",
                     {"one": other, "two": bore, "distance": f"{distance:g}"},
                 )
     return bores

@@ -150,7 +150,7 @@ class MappingFile(Schema):
     def _complete(self) -> Self:
         meanings = [column.means for column in self.columns.values()]
         for one in sorted({m for m in meanings if m != IGNORED and meanings.count(m) > 1}):
-            raise PydanticCustomError("twice", "two columns are `{one}`; take one of them for `ignored`", {"one": one})
+            raise PydanticCustomError("twice", "two columns are `{one}`; mark one of them as `ignored`", {"one": one})
         if LENGTH in meanings and DEVIATION in meanings:
             raise PydanticCustomError("both", "length and deviation are the same quantity; mark one as `ignored`", {})
         if LENGTH not in meanings and DEVIATION not in meanings:

@@ -160,7 +160,7 @@ def _sealed(run: RunEntry) -> RunEntry:
     if run.state is not RunState.RECORDING and not run.sha256:
         raise PydanticCustomError(
             "unsealed",
-            "the run is {state} but has no sha256; only a run in recording has none",
+            "the run is {state} but has no sha256; only a run that is being recorded may lack it",
             {"state": run.state.value},
         )
     return run

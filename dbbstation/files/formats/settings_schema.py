@@ -151,7 +151,5 @@ class SettingsFile(Schema):
     @model_validator(mode="after")
     def _profile_of_something(self) -> "SettingsFile":
         if self.profile is not None and self.instrument is None:
-            raise PydanticCustomError(
-                "alone", "a profile is one of an instrument; give `instrument` in the same file", {}
-            )
+            raise PydanticCustomError("alone", "a profile needs `instrument` in the same file", {})
         return self

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def _name(text: str) -> str:
     if not text.isidentifier() or text.startswith("_"):
-        raise PydanticCustomError("name", "`{text}` is no name that a Python program can use", {"text": text})
+        raise PydanticCustomError("name", "`{text}` is not a valid name in Python", {"text": text})
     return text
 
 
@@ -138,12 +138,14 @@ class SimulatorFile(Schema):
         if sum(one is not None for one in (self.python, self.program, self.fmu)) != 1:
             raise PydanticCustomError("kind", "one of `python`, `program` and `fmu` is expected", {})
         if twice := sorted(set(self.parameters) & set(self.states)):
-            raise PydanticCustomError("twice", "`{one}` is a parameter and a state", {"one": twice[0]})
+            raise PydanticCustomError("twice", "`{one}` is both a parameter and a state", {"one": twice[0]})
         if "t" in self.inputs:
-            raise PydanticCustomError("time", "the input `t` is the time already; give it another name", {})
+            raise PydanticCustomError("time", "the input `t` already means the time; give it another name", {})
         for name, port in self.ports.items():
             if "t" in port.signals:
-                raise PydanticCustomError("time", "the signal `t` of port `{port}` is the time already", {"port": name})
+                raise PydanticCustomError(
+                    "time", "the signal `t` of port `{port}` already means the time", {"port": name}
+                )
         return self
 
 

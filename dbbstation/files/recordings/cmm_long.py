@@ -100,7 +100,7 @@ def _gathered(
             what = f"{names['value']} of {of['ball']} {axis} is `{shortened(of['value'])}`, not a finite number"
             fault("value", what, "correct the cell or take the row out")
         elif axis in found:
-            fault("axis", f"{axis} of {of['ball']} comes a second time", "take one of the rows out")
+            fault("axis", f"{axis} of {of['ball']} is in the sheet a second time", "remove one of the rows")
         else:
             factor = UNITS[LENGTH][row_unit] / UNITS[LENGTH][unit] if row_unit else 1.0
             # A U has a unit of its own, or that of the sheet: the row's unit is the value's.

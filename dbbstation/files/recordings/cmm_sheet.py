@@ -93,7 +93,7 @@ def read_sheet(
         missing_column(name, table.names, str(path), table.header) for name in found.values() if name not in table.names
     ]
     remedy = f"say which with --columns NAME={missing[0] if missing else 'x'}; columns here: {', '.join(table.names)}"
-    faults += [Problem(str(path), table.header, 0, f"no column is taken for {key}", remedy) for key in missing]
+    faults += [Problem(str(path), table.header, 0, f"no column is known to be {key}", remedy) for key in missing]
     if "ball" not in found and not ({"bore"} if of_one_holder else {"bore", "holder"}) <= set(found):
         what = "no column says which ball a row is"
         faults.append(
@@ -149,7 +149,9 @@ def jig_of_sheet(
             remedy = f"say --names '{one.name}=BALL'; the jig has {', '.join(before.balls)}"
             faults.append(Problem(file, one.line, 0, f"the jig has no ball `{name}`", remedy))
         elif name in balls:
-            faults.append(Problem(file, one.line, 0, f"the ball `{name}` comes a second time", "take one of them out"))
+            faults.append(
+                Problem(file, one.line, 0, f"the ball `{name}` is in the sheet a second time", "remove one of them")
+            )
         elif u_um is None:
             what = f"nothing states an uncertainty of `{name}`"
             faults.append(
@@ -158,7 +160,7 @@ def jig_of_sheet(
                     one.line,
                     0,
                     what,
-                    "give --u-um, the standard uncertainty of a coordinate, or name the column of them: --columns NAME=u",
+                    "give --u-um, the standard uncertainty of a coordinate, or name its column: --columns NAME=u",
                 )
             )
         elif not all(map(math.isfinite, one.centre_mm)):
@@ -222,7 +224,7 @@ def _bad_cells(table: TableFile, name: str) -> list[Problem]:
             lines[k],
             0,
             f"{name} is `{cells[k]}`, not a finite number",
-            "correct the cell or take the row out",
+            "correct the cell or remove the row",
         )
         for k in bad
     ]

@@ -184,7 +184,7 @@ def _check_values(numbers: dict[str, Floats], lines: list[int], file: str, fault
     for name, values in numbers.items():
         for index in np.flatnonzero(np.abs(values) > LARGEST[name])[:1]:
             what = f"{name} is {values[index]:g}, sizes up to {LARGEST[name]:g} are plausible"
-            faults.append(Problem(file, lines[index], 0, what, "check the unit, it is the end of the column's name"))
+            faults.append(Problem(file, lines[index], 0, what, "check the unit at the end of the column's name"))
 
 
 def compared_csv(columns: Mapping[str, Floats]) -> str:

@@ -183,7 +183,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
         raise OutputError(
             "the event log has disappeared: the session was moved or deleted during the measurement",
             where=str(log.path),
-            remedy=f"bring it back; runs in {log.path.parent / RUNS} go into its folder {RUNS}, in place of a .part of the same run",
+            remedy=f"restore it; then move the runs of {log.path.parent / RUNS} into its folder {RUNS}, where they replace a .part of the same run",
         ) from error
     except OSError as error:
         raise _refused(log, error) from error
@@ -258,7 +258,7 @@ def _refuse_another(log: EventLog, handle: int) -> None:
         raise OutputError(
             "another program has written into this session since it was read",
             where=str(log.path),
-            remedy="end it, then do this again",
+            remedy="end that program, then repeat the command",
         )
 
 

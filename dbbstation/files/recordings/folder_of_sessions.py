@@ -73,7 +73,7 @@ def files_of(folder: Path) -> FolderFiles:
         raise InputError.of(folder, what, "name a folder that holds session folders")
     if (folder / SESSION_FILE).is_file():
         what = "this folder is one session, a history is of a folder that holds several"
-        raise InputError.of(folder, what, f"name the folder around it: {real_path(folder).parent}")
+        raise InputError.of(folder, what, f"name the folder that contains it: {real_path(folder).parent}")
     look(folder, 1)
     if not sessions:
         raise InputError([_no_sessions(folder)])

@@ -52,7 +52,7 @@ def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str
     unknown = [name for name in names if name not in columns.COLUMNS and name != columns.STATUS]
     missing = [name for name in columns.REQUIRED if name not in names]
     if unknown or missing:
-        raise ValueError(f"columns of a run: {unknown} are not known, {missing} are missing")
+        raise ValueError(f"a run cannot have the columns {unknown}, and it lacks the columns {missing}")
     top = f"# test: {test}\n# direction: {direction}\n# repeat: {repeat}\n"
     return (top + ",".join([*names, columns.CRC]) + "\n").encode()
 

@@ -160,7 +160,7 @@ def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table")
     length = max((len(one) for one in arrays.values() if one.ndim), default=0)
     faults = _faults_of_names(list(arrays), needed, file, 0)
     faults += [
-        Problem(file, 0, 0, f"`{name}` has the shape {one.shape}, not ({length},)", "give columns of one length")
+        Problem(file, 0, 0, f"`{name}` has the shape {one.shape}, not ({length},)", "give columns of equal length")
         for name, one in arrays.items()
         if one.shape != (length,)
     ]

@@ -78,7 +78,7 @@ def _flow(value: object) -> str:  # noqa: PLR0911 - one kind of value each
         return "{" + ", ".join(f"{_flow(key)}: {_flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, Sequence | np.ndarray):
         return "[" + ", ".join(map(_flow, value)) + "]"
-    raise TypeError(f"{type(value).__name__} has no place in a file")
+    raise TypeError(f"{type(value).__name__} cannot be written into a file")
 
 
 def _number(value: float) -> str:

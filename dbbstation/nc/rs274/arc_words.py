@@ -73,5 +73,5 @@ def _turns(block: ProgramBlock) -> int:
     if word is None:
         return 1
     if word.value < 1.0 or word.value != int(word.value):
-        raise block.place.fault(word.column, f"P{word.value:g} is no number of turns", "give a whole number from 1")
+        raise block.place.fault(word.column, f"P{word.value:g} is not a number of turns", "give a whole number from 1")
     return int(word.value)

@@ -70,7 +70,9 @@ def block_of(line: str, place: Place, value_of: Callable[[int | str], float | No
             what = f"words with the letter {token.letter} are not read ({token.letter}{token.value:g})"
             raise place.fault(token.column, what, codes.remedy_of_letter(token.letter))
         elif token.letter == "N" and (block.words or block.codes or block.comments):
-            raise place.fault(token.column, "the line number N does not stand first", "write it at the line's begin")
+            raise place.fault(
+                token.column, "the line number N is not at the line's begin", "write it at the line's begin"
+            )
         elif token.letter in block.words:
             what = f"a second {token.letter} in one line"
             raise place.fault(token.column, what, "write one move per line")

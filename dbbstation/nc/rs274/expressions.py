@@ -121,9 +121,7 @@ class ValueReader:
         self._expect("[")
         self._depth += 1
         if self._depth > DEEPEST:
-            raise self._place.fault(
-                at + 1, f"more than {DEEPEST} brackets within each other", "write it in several lines"
-            )
+            raise self._place.fault(at + 1, f"more than {DEEPEST} nested brackets", "write it in several lines")
         value = self._level(0)
         self._expect("]")
         self._depth -= 1
@@ -137,7 +135,7 @@ class ValueReader:
         if self._peek() == "<":
             end = self._text.find(">", self.position)
             if end < 0:
-                raise self._place.fault(at + 1, "the name of a parameter without its >", "close it")
+                raise self._place.fault(at + 1, "the name of a parameter lacks its closing >", "close it")
             name = re.sub(r"[ \t]", "", self._text[self.position + 1 : end]).lower()
             self.position = end + 1
             return name
@@ -213,7 +211,7 @@ class ValueReader:
         except (ArithmeticError, ValueError):
             value = math.nan
         if not math.isfinite(value) or isinstance(value, complex):
-            raise self._place.fault(at + 1, "this has no value", "check what stands in the expression")
+            raise self._place.fault(at + 1, "this has no value", "check the expression")
         return value
 
     def _expect(self, letter: str) -> None:

@@ -287,7 +287,7 @@ class Flow:
         """Return the fault of a program without an end."""
         end = "the % that closes it" if self.percent else "M2 or M30"
         what = f"the program ends without {end}: it may have been cut short"
-        return Problem(self.files[0][1], self._own_lines, 0, what, "copy it again, or add its end where it is whole")
+        return Problem(self.files[0][1], self._own_lines, 0, what, "copy it again, or add its end if it is complete")
 
     @staticmethod
     def _o_line(match: re.Match[str], line: int) -> OLine:
@@ -316,7 +316,7 @@ class Flow:
         target = (_DO if macro.keyword == "WHILE" else _GOTO).search(rest)
         if target is None:
             raise place.fault(
-                macro.column + 1, f"{macro.keyword} without what follows it", "write WHILE [#1 LT 5] DO1, or GOTO 10"
+                macro.column + 1, f"{macro.keyword} is incomplete", "write WHILE [#1 LT 5] DO1, or GOTO 10"
             )
         number = int(target["number"])
         if macro.keyword == "WHILE":
@@ -361,8 +361,8 @@ class Flow:
         if word.rest:
             raise place.fault(
                 word.column + 1,
-                "there is more than the number of a program in this line",
-                "write it in a line of its own",
+                "the line has more than the number of a program",
+                "write the number in a separate line",
             )
         if self._begun:
             raise place.fault(1, f"the program runs into the subprogram O{word.label}", "end it with M2 or M30 before")
@@ -375,13 +375,13 @@ class Flow:
         if len(subs) != 1:
             what = f"the subprogram O{word.label} is {'not in this file' if not subs else 'in it more than once'}"
             raise place.fault(
-                1, what, "put it there, from its sub to its endsub, or give its folder with --subprograms"
+                1, what, "write it there once, from its sub to its endsub, or give its folder with --subprograms"
             )
         given, reader = [], self._reader(word, place)
         while reader.blanks() == "[":
             given.append(reader.bracket())
         if reader.blanks() or len(given) > LOCAL:
-            raise place.fault(reader.position + 1, "a call has values in brackets only", "write o100 call [1] [2]")
+            raise place.fault(reader.position + 1, "a call allows only values in brackets", "write o100 call [1] [2]")
         parameters: dict[int | str, float] = dict.fromkeys(range(1, LOCAL + 1), 0.0)
         self._enter(subs[0].line, 0, place, by_number=False, parameters=parameters | dict(enumerate(given, 1)))
 
@@ -389,14 +389,14 @@ class Flow:
         self, begin: int, again: int, place: Place, *, by_number: bool, parameters: dict[int | str, float]
     ) -> None:
         if len(self._frames) >= DEEPEST:
-            raise place.fault(1, f"more than {DEEPEST} subprograms within each other", "check what calls itself")
+            raise place.fault(1, f"more than {DEEPEST} nested subprograms", "check what calls itself")
         self._entered += 1
         self._frames.append(_Frame(self._next, begin, again, by_number, self._entered, parameters))
         self._next = begin
 
     def _leave(self, place: Place) -> None:
         if not self._frames:
-            raise place.fault(1, "an end of a subprogram that was not called", "remove it")
+            raise place.fault(1, "the end of a subprogram that was not called", "remove it")
         frame = self._frames[-1]
         if frame.again:
             frame.again -= 1

@@ -188,10 +188,10 @@ class Moves(Modes):
 
     def _check_machine(self, machine: Word, block: ProgramBlock, named: list[str]) -> None:
         if self._motion not in {RAPID, LINEAR} or not named:
-            raise block.place.fault(machine.column, "G53 goes with G0 and G1 only, and with axes", "remove it")
+            raise block.place.fault(machine.column, "G53 is allowed only with G0 or G1, and with axes", "remove it")
         if not self._absolute:
             raise block.place.fault(
-                machine.column, "G53 goes with absolute distances (G90) only", "write G90 before it"
+                machine.column, "G53 is allowed only with absolute distances (G90)", "write G90 before it"
             )
 
     def _check_feed(self, block: ProgramBlock, column: int) -> None:

@@ -144,7 +144,7 @@ class _Interpreter(Moves):
         changed += [stored.spindle_speed] if stored.spindle_speed != self._spindle_speed else []
         if self._cutter is not None or length != self._state.length or not all(changed):
             what = "stored modes would change a work system that no line names, a tool length or G41"
-            raise place.fault(1, what, "write the modes that hold from here on")
+            raise place.fault(1, what, "write the modes that apply from here on")
         for code in changed:
             self.run(block_of(code, place))
         self._speed, self.path.corner_mm, self._cycle.to_clear = speed, corner_mm, to_clear

@@ -186,7 +186,7 @@ class ControlState:
             what = (
                 f"{name('G', word.value)} counts from the place of {AXES[axis]}, which the program does not state yet"
             )
-            raise block.place.fault(word.column, what, f"move {AXES[axis]} to a place before, or give --start")
+            raise block.place.fault(word.column, what, f"move {AXES[axis]} to a known position first, or give --start")
         return float(self.pose[axis])
 
 

@@ -149,7 +149,7 @@ def _number(match: re.Match[str], place: Place) -> Word:
     letter, number = match.group("letter", "number")
     number = number.replace(" ", "").replace("\t", "")
     if letter in "Nn" and not number.isdecimal():
-        raise place.fault(match.start("letter") + 1, f"N{number} is no line number", "write a whole number, or none")
+        raise place.fault(match.start("letter") + 1, f"N{number} is not a line number", "write a whole number, or none")
     return _word(letter, float(number), match.start("letter") + 1, place)
 
 

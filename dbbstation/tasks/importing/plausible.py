@@ -144,7 +144,7 @@ def check_units(
         if len(numbers) > 1 and float(np.ptp(numbers)) == 0.0:
             raise UnusableTravelError(
                 f"column {table.names.index(name) + 1}, {name}: it is {float(numbers[0]):g} in every row of the run, which is impossible for a gauge",
-                "the column may hold nominal values: name another with --columns, or take the numbers as they are with --trust unit",
+                "the column may hold nominal values: name another with --columns, or accept the numbers with --trust unit",
             )
         return
     name = named[found.means]
@@ -152,7 +152,7 @@ def check_units(
     say = " or ".join(f"--columns '{name}={one}'" for one in found.others)
     raise UnusableTravelError(
         f"column {table.names.index(name) + 1}, {name}: {found.what}",
-        f"it may be {meant}: say {say}, or correct the mapping; --trust unit takes the numbers as they are",
+        f"it may be {meant}: give {say}, or correct the mapping; --trust unit accepts the numbers as they are",
     )
 
 

@@ -106,7 +106,7 @@ def check_span(theta_deg: Floats, stated_deg: float | None, circle: Circle) -> t
         path = "" if circle.overshoot_deg == 0.0 else f", with its overshoot {circle.swept_deg:g}"
         raise UnusableTravelError(
             f"the angles span {span:.0f} degrees, a turn of the plan has {FULL_TURN_DEG:g}{path}",
-            f"if that is right, give --angle-span-deg {span:.0f}; one turn of it counts. Else check plan and file",
+            f"if this span is right, give --angle-span-deg {span:.0f}; the import then uses one turn of it. Else check plan and file",
         )
     return (f"its angles span {span:.0f} degrees, as was confirmed: one turn of them counts",)
 
@@ -138,7 +138,7 @@ def _from_angles(theta_deg: Floats, circle: Circle) -> TravelledPath:
     still = np.flatnonzero(np.diff(progress) <= 0.0)
     if len(still):
         what = f"the angle stands still or turns back in row {still[0] + 2} of the run, and there are no times"
-        raise UnusableTravelError(what, "export the times too, or sort out these rows")
+        raise UnusableTravelError(what, "export the times too, or remove these rows")
     said = f"times: computed from the angles {_at(circle)}"
     return TravelledPath(progress / circle.turning_deg_s, theta_deg, np.arange(len(theta_deg)), (said,))
 
@@ -174,7 +174,7 @@ def _feed_note(t_s: Floats, theta_deg: Floats, circle: Circle) -> tuple[str, ...
     feed = circle.feed_mm_min * turned / float(t_s[-1] - t_s[0]) / circle.turning_deg_s
     if abs(feed / circle.feed_mm_min - 1.0) <= UNLIKE_FEED:
         return ()
-    return (f"note: times and angles make a feed of {feed:.0f} mm/min, the plan says {circle.feed_mm_min:g}",)
+    return (f"note: times and angles make a feed of {feed:.0f} mm/min, but the plan states {circle.feed_mm_min:g}",)
 
 
 def _at(circle: Circle) -> str:

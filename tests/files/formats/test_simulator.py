@@ -67,9 +67,9 @@ def test_what_is_wrong_in_the_file_is_said_with_its_line(tmp_path, old, new, lin
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("signals: {speed: m/s}", "signals: {t: s}", "is the time already"),
+        ("signals: {speed: m/s}", "signals: {t: s}", "already means the time"),
         ("inputs: {force: force_n}", "inputs: {t: force_n}", "the input `t`"),
-        ("inputs: {", "states: {mass: {value: 1.0}}\ninputs: {", "is a parameter and a state"),
+        ("inputs: {", "states: {mass: {value: 1.0}}\ninputs: {", "is both a parameter and a state"),
     ],
 )
 def test_names_that_are_taken_are_refused(tmp_path, old, new, said):

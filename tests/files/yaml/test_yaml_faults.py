@@ -206,7 +206,7 @@ def test_repeats_name_tests(tmp_path: Path) -> None:
         (
             "-64.059470920, 732.203103097",
             "-0.064, 0.732",
-            "base_joints_mm[0]: lies 0.734792 mm from the origin, expected 20 ",
+            "base_joints_mm[0]: is 0.734792 mm from the origin, expected 20 ",
         ),
         (
             "xy_radius_mm: 300",
@@ -216,13 +216,13 @@ def test_repeats_name_tests(tmp_path: Path) -> None:
         (
             "[-26, 26]",
             "[-0.4538, 0.4538]",
-            "travel.a_deg: the limits lie 0.9076 deg apart, which is not plausible (it looks",
+            "travel.a_deg: the limits are 0.9076 deg apart, which is not plausible (it looks",
         ),
         ("[-26, 26]", "[26, -26]", "travel.a_deg: the lower limit must come first"),
         (
             "z_mm: [-1208, -808]",
             "z_mm: [-1.208, -0.808]",
-            "travel.z_mm: the limits lie 0.4 mm apart, which is not plausible",
+            "travel.z_mm: the limits are 0.4 mm apart, which is not plausible",
         ),
         (
             "platform_kg: 400.0",
@@ -264,7 +264,7 @@ def test_a_jig_in_metres_is_caught(tmp_path: Path) -> None:
     path.write_text(text)
     faults = []
     parse_jig(path, faults)
-    assert any("bores 1 and 2 lie 0.1 mm apart" in str(fault) for fault in faults)
+    assert any("bores 1 and 2 are 0.1 mm apart" in str(fault) for fault in faults)
 
 
 def test_faults_of_a_plan_and_of_its_jig_file_come_together(tmp_path: Path) -> None:

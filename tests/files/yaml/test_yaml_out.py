@@ -62,7 +62,7 @@ def test_every_number_reads_back_to_the_last_bit(value: float) -> None:
 
 
 def test_what_has_no_place_in_a_file() -> None:
-    with pytest.raises(TypeError, match="set has no place in a file"):
+    with pytest.raises(TypeError, match="set cannot be written into a file"):
         yaml_text({"x": {1, 2}})
 
 

@@ -84,7 +84,7 @@ def test_times_of_a_clock_are_counted_from_the_first_sample():
 def test_another_feed_than_the_plans_is_told():
     t_s = np.arange(0.0, 20.0, 0.1)
     found = travel(t_s, 0.5 * SPEED_DEG_S * t_s, circle(), None)
-    assert found.computed == ("note: times and angles make a feed of 3000 mm/min, the plan says 6000",)
+    assert found.computed == ("note: times and angles make a feed of 3000 mm/min, but the plan states 6000",)
 
 
 @pytest.mark.parametrize(

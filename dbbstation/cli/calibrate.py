@@ -42,7 +42,7 @@ def print_currents(currents: CurrentsFigures | None) -> None:
         torques = ", ".join(_with_uncertainty(motor.torque_per_current)[0] for motor in currents.motors)
         echo(f"torque at the screws per current, 1 to 6: {torques} Nm/A")
     elif any(motor.force_per_current is not None for motor in currents.motors):
-        echo("torques are not given: the machine file has no screw_lead_mm; forces do not need it")
+        echo("torques are missing, because the machine file has no screw_lead_mm; forces do not need it")
     if currents.centre_of_gravity:
         echo()
         channels = {"circles": "circles alone", "currents": "currents alone", "both": "both"}

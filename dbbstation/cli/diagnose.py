@@ -166,7 +166,7 @@ def _print_curve(curve: Curve) -> None:
 
     points = curve.points
     echo(
-        f"cause unknown: it moves the readings by {curve.readings_um:.2f} µm rms, and kinematic parameters cannot imitate {curve.unconcealed_um:.2f} µm rms of this:"
+        f"an error of unknown cause moves the readings by {curve.readings_um:.2f} µm rms, and kinematic parameters cannot imitate {curve.unconcealed_um:.2f} µm rms of this:"
     )
     if curve.period_mm is not None:
         echo(

@@ -228,7 +228,7 @@ def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
 
             known = ", ".join(MEANINGS)
             raise click.UsageError(
-                f"--columns {text}: write NAME=MEANING or NAME=MEANING:UNIT; MEANING is one of {known}"
+                f"--columns {text}: write NAME=MEANING or NAME=MEANING:UNIT, with one of the meanings {known}"
             )
         if found[0] not in table.table.names:
             raise click.UsageError(f"--columns {text}: the columns are {', '.join(table.table.names)}")

@@ -323,9 +323,7 @@ def _reason_for(run: str, unusable: str) -> str:
         return ""
     asker = Asker()
     if not asker.terminal:
-        raise click.UsageError(
-            f"{run}: {unusable}\ngive the reason with --reason: later readers of the session will want it"
-        )
+        raise click.UsageError(f"{run}: {unusable}\ngive the reason with --reason, for later readers of the session")
     echo(f"{run}: {unusable}", err=True)
     while True:
         answer = asker.text("why is it to be accepted", "--reason").strip()

@@ -228,7 +228,7 @@ class Declared:
                 raise ArgumentError(name, f"`{name}` needs `{option.only_with}`")
             for other in option.not_with:
                 if other in there:
-                    raise ArgumentError(other, f"`{other}` does not go with `{name}`")
+                    raise ArgumentError(other, f"`{other}` cannot be combined with `{name}`")
         return bound
 
 

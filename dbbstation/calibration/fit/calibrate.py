@@ -460,7 +460,7 @@ def _check_enough(observations: Sequence[Observation]) -> None:
     tests = {(o.setup.session, o.test) for o in observations}
     if len(tests) < FEWEST_TESTS:
         raise CalibrationError(
-            f"{len(tests)} test{'s' if len(tests) != 1 else ''} cannot calibrate a machine: at least {FEWEST_TESTS} at different places are needed; the fifteen tests of the jig plan determine the most",
+            f"{len(tests)} test{'s' if len(tests) != 1 else ''} cannot calibrate a machine: at least {FEWEST_TESTS} at different places are needed, and the fifteen of the jig plan determine the most parameters",
             remedy="measure more tests, or evaluate these under an existing model",
         )
 

@@ -95,9 +95,9 @@ class ColumnSchema(Schema):
         if known is None and self.unit is not None:
             raise PydanticCustomError("unit", "a column that is `{means}` has no unit", {"means": self.means})
         if known is not None and self.unit not in known:
-            said = "it has no unit" if self.unit is None else f"`{self.unit}` is no unit of it"
+            said = "needs a unit" if self.unit is None else f"cannot have the unit `{self.unit}`"
             what = {"means": self.means, "said": said, "known": ", ".join(known)}
-            raise PydanticCustomError("unit", "a column that is `{means}`: {said}; give one of {known}", what)
+            raise PydanticCustomError("unit", "a column that is `{means}` {said}; give one of {known}", what)
         return self
 
 

@@ -13,13 +13,12 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
+from dbbstation.quality.beside import Beside, Readings, mean_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
-from dbbstation.quality.forms import SIZES as SHARES
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
-from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, LARGER, PlanEffects, key_of, log_diagonal
+from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, LARGER, PlanEffects, key_of
 from dbbstation.quality.stated import limit_along
 from dbbstation.quality.together import expected_um, read_um
 
@@ -27,17 +26,17 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from datetime import date
 
-    from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.quality.knowledge import Planned, Seen
 
 MISTAKE = LOG_ODDS_LIMIT
 """Negative log prior probability of a mistake: an operator makes one in a thousand circles."""
 
-SIZES = np.append(0.0, SHARES)
-"""Machine errors relative to their usual size. A simulated machine may have zero errors; every circle then fits any run equally well."""
-
 WIDE = 3
 """Number of assignments that the search extends at once."""
+
+AT_ONCE = 64
+"""Number of assignments that are scored at once; it affects only the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,32 +75,19 @@ class Assigned:
 
     Args:
         effects: on the plan's circles, relative to the same reference.
-        before: result for the first runs of the same plan; assignments that were very improbable are not computed again.
+        runs: the last is the new one, whose circle `finding` decides.
     """
 
-    def __init__(
-        self,
-        effects: PlanEffects,
-        runs: Sequence[Seen],
-        reference: FormerSitting | None = None,
-        before: Assigned | None = None,
-    ) -> None:
+    def __init__(self, effects: PlanEffects, runs: Sequence[Seen], reference: FormerSitting | None = None) -> None:
         self.reference, self.effects, self.circles = reference, effects, effects.circles
         self.runs = [one for one in runs if one.analysis is not None]
         self.read = [self.effects.run(one) for one in self.runs]
-        self._planned = [one.planned for one in self.read]
-        # Log densities, or their upper bounds, by differences from the plan.
-        self.most: dict[_Changes, float] = {}
-        past = before if before is not None and before.runs == self.runs[: len(before.runs)] else None
-        self._known_before = {} if past is None else past.most
-        self._fresh = range(0 if past is None else len(past.runs), len(self.runs))
+        self.planned = [one.planned for one in self.read]
 
     def odds(self, one: Seen) -> float:
         """Return the log odds against a run's planned circle."""
-        at, known = self.runs.index(one), self._looked_up
-        own = max(score for changes, score in known.items() if at not in dict(changes))
-        others = (score for changes, score in known.items() if at in dict(changes))
-        return max(others, default=-np.inf) - own
+        others, own = _odds(self._looked_up, self.runs.index(one))
+        return others - own
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
         """Return the finding that a run shows its planned circle, or `undecided` if all runs together cannot decide."""
@@ -113,10 +99,7 @@ class Assigned:
 
     def suspects(self) -> dict[Seen, Finding]:
         """Return the runs that contradict the others, with findings that name the circles shown instead."""
-        known = self._looked_up
-        floor, top = known[()], max(known.values())
-        scored = [one for one in known.items() if one[1] > floor and one[1] >= top - LOG_ODDS_LIMIT]
-        likely = [dict(changes) for changes, _ in sorted(scored, key=lambda one: one[1], reverse=True)]
+        likely = [dict(changes) for changes in _likely(self._looked_up)]
         found = {}
         for at, one in enumerate(self.runs):
             changed = [labels[at] for labels in likely if at in labels]
@@ -145,76 +128,66 @@ class Assigned:
 
     @cached_property
     def _looked_up(self) -> Mapping[_Changes, float]:
-        known: dict[_Changes, float] = {(): self.score(())}
-        least = known[()] - self._cost
+        known: dict[_Changes, float] = {}
         followed: set[_Changes] = set()
         best: list[_Changes] = [()]
         while any(changes not in followed for changes in best):
             for changes in [each for each in best if each not in followed]:
                 followed.add(changes)
-                known.update(self._follow(changes, least))
+                self._follow(changes, known)
             best = sorted(known, key=known.__getitem__, reverse=True)[:WIDE]
             # If one mistake alone loses more than its cost, a further one cannot repay it.
-            best = [changes for changes in best if known[changes] >= least]
+            best = [changes for changes in best if known[changes] >= known[()] - self._cost]
         return known
 
-    def _follow(self, base: _Changes, least: float) -> dict[_Changes, float]:
-        beside = _Beside(self, self._labels(base))
-        found: dict[_Changes, float] = {}
-        for runs, instead in self._changes:
-            asked = {}
-            for other in instead:
-                changes = self._with(base, runs, other)
-                if changes not in self.most:
-                    self.most[changes] = self._at_most(changes)
-                    if self._is_asked(changes, least):
-                        asked[changes] = other
-            if asked:
-                for changes, log in zip(asked, beside.changed(runs, list(asked.values())), strict=True):
-                    self.most[changes] = float(log)
-                    found[changes] = self.score(changes)
-        return found
-
-    def _is_asked(self, changes: _Changes, least: float) -> bool:
-        """Return whether an assignment can affect a decision: by extension, or by doubt about a new run."""
-        if any(run in self._fresh for run, _ in changes):
-            least -= 2.0 * LOG_ODDS_LIMIT - self._cost
-        spare = self.most[changes] - least
-        return spare >= self._cost and spare >= self._mistakes(changes)
-
-    def _at_most(self, changes: _Changes) -> float:
-        """Return an upper bound of a log density, from its value before the last runs."""
-        # However well a run is predicted, its readings scatter by their own part.
-        count = self._fresh.start
-        most = self._known_before.get(tuple(each for each in changes if each[0] < count), np.inf)
-        labels = dict(changes)
-        for run in self._fresh:
-            most -= float(self.read[run].half_log_determinants[labels.get(run, self._planned[run])])
-        return most
+    def _follow(self, base: _Changes, known: dict[_Changes, float]) -> None:
+        """Add assignments near a given one, the most probable first, until the rest cannot affect a decision."""
+        beside = Beside(self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels))
+        known.setdefault(base, beside.log - self._mistakes(base))
+        least = known[()] + self._cost - 2.0 * LOG_ODDS_LIMIT
+        asked = [_Asked(self, base, beside, *each, least) for each in self._changes]
+        while True:
+            limits = _Limits.of(known, self._cost, len(self.runs) - 1)
+            wanted = [each.wanted(limits) for each in asked]
+            ranked = np.sort(np.concatenate(wanted, axis=None))[-AT_ONCE:]
+            if ranked[-1] == -np.inf:
+                return
+            first = ranked[ranked > -np.inf][0]
+            for each, most in zip(asked, wanted, strict=True):
+                places = np.nonzero(most >= first)
+                for runs, instead, log in each.scored(places) if len(places[0]) else ():
+                    changes = self._with(base, runs, instead)
+                    known.setdefault(changes, log - self._mistakes(changes))
 
     def _labels(self, changes: _Changes) -> list[int]:
         labels = dict(changes)
-        return [labels.get(run, planned) for run, planned in enumerate(self._planned)]
+        return [labels.get(run, planned) for run, planned in enumerate(self.planned)]
 
     def _with(self, base: _Changes, runs: Sequence[int], other: Sequence[int]) -> _Changes:
         changed = {**dict(base), **dict(zip(runs, other, strict=True))}
-        return tuple(sorted(each for each in changed.items() if each[1] != self._planned[each[0]]))
+        return tuple(sorted(each for each in changed.items() if each[1] != self.planned[each[0]]))
 
     @cached_property
-    def _changes(self) -> tuple[tuple[Sequence[int], Sequence[Sequence[int]]], ...]:
-        return tuple(self._all_changes())
+    def _changes(self) -> tuple[tuple[Integers, Integers], ...]:
+        """Return runs, shape (m, k), and their other labels, (m, j, k), grouped by k and j."""
+        alike: dict[tuple[int, int], list[tuple[Sequence[int], Sequence[Sequence[int]]]]] = {}
+        for runs, instead in self._all_changes():
+            alike.setdefault((len(runs), len(instead)), []).append((runs, instead))
+        return tuple(
+            (np.array([runs for runs, _ in each]), np.array([labels for _, labels in each])) for each in alike.values()
+        )
 
     def _all_changes(self) -> Iterator[tuple[Sequence[int], Sequence[Sequence[int]]]]:
         yield from (([run], [[label] for label in self._everything]) for run in range(len(self.runs)))
-        groups = self._groups
-        for group in groups:
-            tests = dict.fromkeys(one.test for one in self.circles)
-            yield group, [each for test in tests if (each := self._as_test(group, test)) is not None]
-        for one, other in combinations(groups, 2):
-            first = self._as_test(one, self.runs[other[0]].run.test)
-            second = self._as_test(other, self.runs[one[0]].run.test)
-            if first is not None and second is not None:
-                yield [*one, *other], [[*first, *second]]
+        tests = dict.fromkeys(one.test for one in self.circles)
+        shown = [({test: self._as_test(group, test) for test in tests}, group) for group in self._groups]
+        for by_test, group in shown:
+            if len(group) > 1:
+                yield group, [each for each in by_test.values() if each]
+        for (first, one), (second, other) in combinations(shown, 2):
+            exchanged = first[self.runs[other[0]].run.test], second[self.runs[one[0]].run.test]
+            if all(exchanged):
+                yield [*one, *other], [[*exchanged[0], *exchanged[1]]]
 
     @cached_property
     def _everything(self) -> tuple[int, ...]:
@@ -227,17 +200,23 @@ class Assigned:
             found.setdefault((one.run.test, one.run.mounting), []).append(k)
         return list(found.values())
 
-    def _as_test(self, group: Sequence[int], test: str) -> list[int] | None:
-        try:
-            return [self.effects.label(test, self.runs[k].run.circle.direction) for k in group]
-        except StopIteration:
-            return None
+    def _as_test(self, group: Sequence[int], test: str) -> list[int]:
+        """Return the labels of a group's runs as runs of a test; empty if the plan lacks such a circle."""
+        labels = [self.effects.labels.get((test, self.runs[k].run.circle.direction)) for k in group]
+        known = [label for label in labels if label is not None]
+        return known if len(known) == len(labels) else []
 
-    def score(self, changes: _Changes) -> float:
-        """Return the log posterior density of an assignment: likelihood less cost of mistakes."""
-        if changes not in self.most:
-            self.most[changes] = _Beside(self, self._labels(changes)).log
-        return self.most[changes] - self._mistakes(changes)
+    def fewest_mistakes(self, base: _Changes, runs: Integers, instead: Integers) -> Floats:
+        """Return lower bounds of the cost of mistakes near a given assignment; arguments as of `Beside.most`."""
+        tests = {test: k for k, test in enumerate(dict.fromkeys(one.test for one in self.circles))}
+        of_label = np.array([*(tests[one.test] for one in self.circles), *[len(tests)] * 3])
+        of_run = np.array([tests[one.run.test] for one in self.runs])
+        involved = np.zeros(len(tests) + 1, dtype=bool)
+        involved[[*(of_run[run] for run, _ in base), *(of_label[label] for _, label in base)]] = True
+        involved[-1] = False
+        shared = involved[of_run[runs]].any(axis=1)[:, None] | involved[of_label[instead]].any(axis=2)
+        # Changes of the same tests may count as one mistake.
+        return np.where(shared, self._cost, self._mistakes(base) + self._cost)
 
     def _mistakes(self, changes: _Changes) -> float:
         """Return the cost of mistakes; a mounting filed under another test, or an exchange of two mountings, counts as one."""
@@ -261,13 +240,29 @@ class Assigned:
 
     def information(self, labels: Sequence[int]) -> Floats:
         """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1)."""
-        return np.sum([one.product(label) for one, label in zip(self.read, labels, strict=True)], axis=0)
+        found = self._information.copy()
+        for one, label, planned in zip(self.read, labels, self.planned, strict=True):
+            if label != planned:
+                found += one.product(label) - one.product(planned)
+        return found
+
+    @cached_property
+    def _information(self) -> Floats:
+        found = np.zeros_like(self.read[0].product(self.planned[0]))
+        for one, planned in zip(self.read, self.planned, strict=True):
+            found += one.product(planned)
+        return found
+
+    @cached_property
+    def readings(self) -> Readings:
+        """Return the readings of all runs under every label."""
+        return Readings.of(self.read)
 
     def since(self, one: Seen) -> Finding | None:
         """Return the finding on changes since the previous session; None without one."""
         if self.reference is None:
             return None
-        label = self._planned[self.runs.index(one)]
+        label = self.planned[self.runs.index(one)]
         off = read_um(one) - expected_um(self.circles[label])
         session = self.effects.of_session[label]
         covariance = self.effects.own[label] + one.u_um**2 * np.eye(COEFFICIENTS) + 2.0 * session @ session.T
@@ -279,69 +274,83 @@ class Assigned:
         return Finding(Name.SINCE, value, limit, "µm", verdict, stated)
 
 
-class _Beside:
-    """Log densities of assignments that differ in few runs from a given one.
+class _Asked:
+    """Assignments near a given one, with upper bounds of their log posterior densities."""
 
-    The posterior of the shared effects, given all runs, is computed once. Runs are removed and inserted by blocks
-    [Rasmussen and Williams (2006), section 5.4.2].
+    def __init__(
+        self, sitting: Assigned, base: _Changes, beside: Beside, runs: Integers, instead: Integers, least: float
+    ) -> None:
+        self._beside, self._base, self._planned = beside, dict(base), sitting.planned
+        self._runs, self._instead = runs, instead
+        self._logs = beside.most(runs, instead, least)
+        self._fewest = sitting.fewest_mistakes(base, runs, instead)
+        given = (instead == beside.labels[runs][:, None, :]).all(axis=2)
+        self._most = np.where(given, -np.inf, mean_of(self._logs) - self._fewest)
+
+    def wanted(self, limits: _Limits) -> Floats:
+        """Return upper bounds of assignments that can affect a decision, shape (m, j); minus infinity for the others."""
+        limit = np.full(self._most.shape, limits.any_run)
+        for run, own in limits.suspects.items():
+            limit = np.where(self._changed(run), limit, np.minimum(limit, own))
+        new = len(self._planned) - 1
+        self._limit = np.where(self._changed(new), np.minimum(limit, limits.new), limit)
+        return np.where(self._most >= self._limit, self._most, -np.inf)
+
+    def scored(self, places: tuple[Integers, ...]) -> Iterator[tuple[list[int], list[int], float]]:
+        """Yield runs, labels and log densities of assignments that reach their limit; each place is scored once."""
+        runs, instead = self._runs[places[0]], self._instead[places]
+        self._most[places] = -np.inf
+        limit = self._limit[places] + self._fewest[places]
+        logs = self._beside.changed(runs, instead, self._logs[:, places[0], places[1]], limit)
+        for k in np.flatnonzero(logs >= limit):
+            yield runs[k].tolist(), instead[k].tolist(), float(logs[k])
+
+    def _changed(self, run: int) -> Flags:
+        """Return whether assignments change a run's planned circle, shape (m, j)."""
+        here = (self._runs == run)[:, None, :]
+        other = (here & (self._instead != self._planned[run])).any(axis=2)
+        return np.where(here.any(axis=2), other, run in self._base)
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """Log posterior densities below which an assignment cannot affect a decision.
 
     Attributes:
-        log: log density of all readings under the given labels, with equal prior probability for all sizes of machine errors.
+        any_run: below, it is neither extended nor makes a run suspect.
+        suspects: by suspect run, for assignments that keep its planned circle; the odds compare them.
+        new: for assignments that change the new run's planned circle.
     """
 
-    def __init__(self, sitting: Assigned, labels: Sequence[int]) -> None:
-        self._read, self._labels = sitting.read, labels
-        known, shared = sitting.information(labels), sitting.effects.shared
-        wide = shared.shape[2]
-        rows = shared.reshape(-1, wide)
-        logs, covariances, means = [], [], []
-        for size in SIZES:
-            scale = sitting.effects.scale(size)
-            root = np.linalg.cholesky(np.eye(wide) + scale[:, None] * known[:-1, :-1] * scale)
-            right = (np.vstack([known[-1:, :-1], rows]) * scale).T
-            white = solve_triangular(root, right, lower=True, overwrite_b=True, check_finite=False)
-            logs.append(0.5 * (white[:, 0] @ white[:, 0] - known[-1, -1]) - log_diagonal(root))
-            covariances.append(white[:, 1:].T @ white[:, 1:])
-            means.append(white[:, 1:].T @ white[:, 0])
-        count = len(shared)
-        self._logs = np.array(logs)[:, None]
-        self._covariance = np.reshape(covariances, (len(SIZES), count, COEFFICIENTS, count, COEFFICIENTS))
-        self._mean = np.reshape(means, (len(SIZES), count, COEFFICIENTS))
-        self.log = float(_mean_of(self._logs)[0])
+    any_run: float
+    suspects: Mapping[int, float]
+    new: float
 
-    def changed(self, runs: Sequence[int], instead: Sequence[Sequence[int]]) -> Floats:
-        """Return the log densities with other labels of some runs, one for each item of `instead`."""
-        circles, off, scatter = self._of(runs, np.array([[self._labels[run] for run in runs]]))
-        shared = self._between(circles, circles)
-        root = np.linalg.cholesky(scatter - shared)
-        pull = np.linalg.solve(root, (off - self._means(circles))[..., None])
-        logs = self._logs + 0.5 * np.sum(pull**2, axis=(2, 3)) - log_diagonal(root)
-        logs += log_diagonal(np.linalg.cholesky(scatter)) * 2.0
-        others, off, scatter = self._of(runs, np.array(instead))
-        turned = np.linalg.solve(root, self._between(circles, others))
-        root = np.linalg.cholesky(scatter + self._between(others, others) + np.swapaxes(turned, -1, -2) @ turned)
-        apart = (off - self._means(others))[..., None] + np.swapaxes(turned, -1, -2) @ pull
-        white = np.linalg.solve(root, apart)
-        return _mean_of(logs - 0.5 * np.sum(white**2, axis=(2, 3)) - log_diagonal(root))
+    @classmethod
+    def of(cls, known: Mapping[_Changes, float], cost: float, new: int) -> _Limits:
+        """Return the limits that follow from known log posterior densities."""
+        scores, floor = sorted(known.values(), reverse=True), known[()]
+        followed = scores[WIDE - 1] if len(scores) >= WIDE else -np.inf
+        suspects = {run for changes in _likely(known) for run, _ in changes}
+        others, own = _odds(known, new)
+        return cls(
+            max(floor - cost, min(followed, max(floor, scores[0] - LOG_ODDS_LIMIT))),
+            {run: _odds(known, run)[1] for run in suspects},
+            max(others, own - 2.0 * LOG_ODDS_LIMIT),
+        )
 
-    def _of(self, runs: Sequence[int], labels: Integers) -> tuple[Integers, Floats, Floats]:
-        """Return circles, shape (m, k), readings minus expectation, (m, 7 k), and their own covariance, (m, 7 k, 7 k)."""
-        circles = np.column_stack([self._read[run].shows(labels[:, k]) for k, run in enumerate(runs)])
-        off = np.hstack([self._read[run].off[labels[:, k]] for k, run in enumerate(runs)])
-        scatter = np.zeros((*off.shape, off.shape[1]))
-        for k, run in enumerate(runs):
-            rows = slice(COEFFICIENTS * k, COEFFICIENTS * (k + 1))
-            scatter[:, rows, rows] = self._read[run].scatter[labels[:, k]]
-        return circles, off, scatter
 
-    def _between(self, one: Integers, other: Integers) -> Floats:
-        """Return covariances of circles, shape (9, m, 7 k, 7 k) [µm²]."""
-        found = self._covariance[:, one[:, :, None], :, other[:, None, :], :]
-        wide = COEFFICIENTS * one.shape[1]
-        return found.transpose(3, 0, 1, 4, 2, 5).reshape(len(SIZES), -1, wide, wide)
+def _odds(known: Mapping[_Changes, float], run: int) -> tuple[float, float]:
+    """Return the greatest log posterior densities with another circle of a run, and with its planned one."""
+    others = max((score for changes, score in known.items() if run in dict(changes)), default=-np.inf)
+    return others, max(score for changes, score in known.items() if run not in dict(changes))
 
-    def _means(self, circles: Integers) -> Floats:
-        return self._mean[:, circles].reshape(len(SIZES), len(circles), -1)
+
+def _likely(known: Mapping[_Changes, float]) -> list[_Changes]:
+    """Return assignments more probable than the plan and nearly as probable as the best, in descending order."""
+    floor, top = known[()], max(known.values())
+    scored = [one for one in known.items() if one[1] > floor and one[1] >= top - LOG_ODDS_LIMIT]
+    return [changes for changes, _ in sorted(scored, key=lambda one: one[1], reverse=True)]
 
 
 _OTHERWISE = {
@@ -349,8 +358,3 @@ _OTHERWISE = {
     BESIDE: (Name.BORE, "its ball stands elsewhere"),
     LARGER: (Name.RADIUS, "its radius is another"),
 }
-
-
-def _mean_of(logs: Floats) -> Floats:
-    """Return the log of the mean density over SIZES, shape (m,)."""
-    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(SIZES)))

@@ -12,7 +12,7 @@ from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.together import expected_um, read_um
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -47,13 +47,10 @@ class PlanEffects:
             self._runs[one] = RunEffects(self, one)
         return self._runs[one]
 
-    def label(self, test: str, direction: str) -> int:
-        """Return the index of a circle in the plan.
-
-        Raises:
-            StopIteration: the plan has no such circle.
-        """
-        return next(k for k, one in enumerate(self.circles) if key_of(one) == (test, direction))
+    @cached_property
+    def labels(self) -> Mapping[tuple[str, str], int]:
+        """Return the indices of the plan's circles by test and direction."""
+        return {key_of(one): k for k, one in enumerate(self.circles)}
 
     @cached_property
     def shared(self) -> Floats:
@@ -125,7 +122,7 @@ class RunEffects:
 
     def __init__(self, plan: PlanEffects, one: Seen) -> None:
         self._plan, self._one = plan, one
-        self.planned = plan.label(one.run.test, one.run.circle.direction)
+        self.planned = plan.labels[one.run.test, one.run.circle.direction]
         self._products: dict[int, Floats] = {}
 
     def shows(self, labels: ArrayLike) -> Integers:

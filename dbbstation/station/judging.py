@@ -68,7 +68,6 @@ class RunJudge:
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}
         self._together = SessionRuns([])
         self._former = former
-        self._before: Assigned | None = None
         self._doubted: dict[events.RunId, Finding] = {}
         kept = {RunState.ACCEPTED: self._counting, RunState.REJECTED: self._rejected}
         for entry in writer.runs:
@@ -141,8 +140,7 @@ class RunJudge:
         known = {(one.test, one.circle.direction) for one in self._circles}
         if any((one.run.test, one.run.circle.direction) not in known for one in runs):
             return None
-        self._before = Assigned(self._effects, runs, self._reference, self._before)
-        return self._before
+        return Assigned(self._effects, runs, self._reference)
 
     @cached_property
     def _effects(self) -> PlanEffects:

@@ -17,7 +17,8 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.assigned import SIZES, Assigned, FormerSitting, effects_of
+from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, effects_of
+from dbbstation.quality.beside import SIZES, Beside, mean_of
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER
@@ -82,9 +83,12 @@ def test_a_sound_sitting_has_no_suspect_and_decides_every_circle(sitting) -> Non
     for count in range(1, 7):
         assert suspected(shown(sitting, {}, count)) == {}
     assigned = shown(sitting, {})
-    for one in assigned.runs:
+    for last in range(6):
+        # The circle of the last run is asked about.
+        runs = [*assigned.runs[:last], *assigned.runs[last + 1 :], assigned.runs[last]]
         for name in (Name.TEST, Name.DIRECTION):
-            assert assigned.finding(one, undecided(name, "")).verdict is FindingVerdict.GOOD
+            found = Assigned(assigned.effects, runs).finding(runs[-1], undecided(name, ""))
+            assert found.verdict is FindingVerdict.GOOD
 
 
 def test_a_machine_without_errors_has_no_suspect(sitting) -> None:
@@ -147,30 +151,45 @@ def test_a_circle_the_wrong_way_round_is_found_in_the_end(sitting, asked: tuple[
         {("side", way): ("high", way) for way in (CCW, CW)},
     ],
 )
-def test_runs_judged_one_after_the_other_are_judged_as_all_at_once(sitting, instead) -> None:
-    """What was improbable is not asked again; a sitting without a past asks everything."""
-    circles, whole, before = sitting[0], shown(sitting, instead), None
-    asked = []
-    for count in range(1, 7):
-        alone = Assigned(effects_of(circles), whole.runs[:count])
-        before = Assigned(effects_of(circles), whole.runs[:count], before=before)
-        assert suspected(before) == suspected(alone)
+def test_answers_are_those_of_all_assignments_written_out(sitting, instead) -> None:
+    """The likeliest are scored first; a search that scores every one, by the whole covariance, answers alike."""
+    for count in range(1, 5):
+        assigned = shown(sitting, instead, count)
+        written = shown(sitting, instead, count)
+        written.__dict__["_looked_up"] = every_score(written)
+        assert suspected(assigned) == suspected(written)
+        one = assigned.runs[-1]
         for name in (Name.TEST, Name.DIRECTION):
-            one, blank = whole.runs[count - 1], undecided(name, "")
-            assert before.finding(one, blank) == alone.finding(one, blank)
-        asked.append(len(before._looked_up) - len(alone._looked_up))
-    # Runs of which one was taken away have no past.
-    fewer = whole.runs[1:]
-    assert suspected(Assigned(effects_of(circles), fewer, before=before)) == suspected(
-        Assigned(effects_of(circles), fewer)
-    )
-    assert min(asked) < 0
+            found, wanted = (each.finding(each.runs[-1], undecided(name, "")) for each in (assigned, written))
+            assert (found.verdict, found.text) == (wanted.verdict, wanted.text)
+        for one, finding in written.suspects().items():
+            (other,) = (f for o, f in assigned.suspects().items() if o.run.label == one.run.label)
+            assert other.value == pytest.approx(finding.value, rel=1e-6, abs=1e-2)
+
+
+def every_score(assigned: Assigned) -> dict[tuple[tuple[int, int], ...], float]:
+    """Log densities with mistakes of all assignments beside the best three, and beside those that they lead to."""
+    known = {(): log_density(assigned, assigned._labels(()))}
+    followed: set[tuple[tuple[int, int], ...]] = set()
+    while True:
+        ranked = sorted(known, key=known.__getitem__, reverse=True)[:WIDE]
+        best = [each for each in ranked if known[each] >= known[()] - assigned._cost and each not in followed]
+        if not best:
+            return known
+        for base in best:
+            followed.add(base)
+            for runs, others in assigned._all_changes():
+                for other in others:
+                    changes = assigned._with(base, runs, other)
+                    if changes not in known:
+                        log = log_density(assigned, assigned._labels(changes))
+                        known[changes] = log - assigned._mistakes(changes)
 
 
 def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
     """Against the density of all readings under the whole covariance, one size at a time."""
     assigned = shown(sitting, {}, 4)
-    labels = tuple(assigned._planned)
+    labels = tuple(assigned.planned)
     circles = [assigned.circles[k] for k in labels]
     logs = []
     from scipy.special import logsumexp  # noqa: PLC0415
@@ -186,20 +205,28 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
             whole[rows, rows] += assigned.effects.own[labels[k]] + one.u_um**2 * np.eye(7)
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
-    assert assigned.score(()) == pytest.approx(wanted, abs=1e-3)
+    assert assigned._looked_up[()] == pytest.approx(wanted, abs=1e-3)
 
 
 def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) -> None:
-    """Every assignment that was looked up, among them swaps and runs of no circle, against the density of all readings."""
-    for instead in ({}, {PLANNED[0]: ("side", CCW)}):
-        assigned = shown(sitting, instead, 4)
-        scores = assigned._looked_up
-        assert {BESIDE, LARGER, ELSEWHERE} < {label for changes in scores for _, label in changes}
-        assert {len(changes) for changes in scores} >= {0, 1, 2, 4}
-        for changes, score in scores.items():
-            assert score + assigned._mistakes(changes) == pytest.approx(
-                log_density(assigned, assigned._labels(changes)), rel=1e-7, abs=1e-3
-            )
+    """Every assignment beside two, among them swaps and runs of no circle, against the density of all readings."""
+    for given in ((), ((0, 2),)):
+        assigned = shown(sitting, {}, 4)
+        labels = assigned._labels(given)
+        beside = Beside(assigned.effects, assigned.readings, assigned.information(labels), np.array(labels))
+        assert beside.log == pytest.approx(log_density(assigned, labels), rel=1e-7, abs=1e-3)
+        widths = set()
+        for runs, instead in assigned._changes:
+            most = beside.most(runs, instead, -np.inf)
+            places = np.nonzero(np.ones(instead.shape[:2]))
+            logs = beside.changed(runs[places[0]], instead[places], most[:, *places], np.full(len(places[0]), -np.inf))
+            for at, other, log, bound in zip(*places, logs, mean_of(most)[places], strict=True):
+                changes = assigned._with(given, runs[at].tolist(), instead[at, other].tolist())
+                assert log == pytest.approx(log_density(assigned, assigned._labels(changes)), rel=1e-7, abs=1e-3)
+                assert bound >= log - 1e-6
+                widths.add((runs.shape[1], *{-1, -2, -3} & {label for _, label in changes}))
+        assert {one[0] for one in widths} >= {1, 2, 4}
+        assert {ELSEWHERE, BESIDE, LARGER} <= {label for one in widths for label in one[1:]}
 
 
 def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
@@ -209,7 +236,7 @@ def log_density(assigned: Assigned, labels: tuple[int, ...]) -> float:
     session = np.zeros((count, 7, assigned.effects.of_session.shape[2]))
     own, off = np.zeros((7 * count, 7 * count)), np.zeros((count, 7))
     for k, (one, label) in enumerate(zip(assigned.runs, labels, strict=True)):
-        circle = assigned._planned[k] if label < 0 else label
+        circle = assigned.planned[k] if label < 0 else label
         off[k] = read_um(one) - read_um_expected(assigned.circles[circle])
         rows = slice(7 * k, 7 * k + 7)
         own[rows, rows] = ELSEWHERE_UM**2 * np.eye(7)

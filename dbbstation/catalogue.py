@@ -61,7 +61,7 @@ def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
     return MappingProxyType(dict(sorted(found.items())))
 
 
-def classes_of(module: ModuleType, base: type[Base]) -> list[type[Base]]:
+def classes_of(module: ModuleType, base: type[Base] | tuple[type[Base], ...]) -> list[type[Base]]:
     """Return the public classes defined in a module, abstract ones too."""
     members = [member for _, member in getmembers(module, isclass) if member.__module__ == module.__name__]
     return [member for member in members if issubclass(member, base) and not member.__name__.startswith("_")]

@@ -26,12 +26,12 @@ Base = TypeVar("Base")
 
 
 def classes_in_files(
-    files: Iterable[Path], base: type[Base], contract: str, faults: list[Problem]
+    files: Iterable[Path], base: type[Base] | tuple[type[Base], ...], contract: str, faults: list[Problem]
 ) -> list[FoundClass[Base]]:
     """Return classes that derive from `base`, each with its place.
 
     Args:
-        base: abstract bases of others and names with an underscore do not count.
+        base: one or several; abstract bases of others and names with an underscore do not count.
         faults: grows by files that are missing, not Python, or lack such a class.
     """
     found = []
@@ -43,7 +43,8 @@ def classes_in_files(
         lines = {node.name: node.lineno for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
         kinds = classes_of(module, base)
         if not kinds:
-            faults.append(Problem(str(path), 0, 0, f"no class in it derives from {base.__name__}", contract))
+            names = " or ".join(one.__name__ for one in (base if isinstance(base, tuple) else (base,)))
+            faults.append(Problem(str(path), 0, 0, f"no class in it derives from {names}", contract))
         for kind in kinds:
             others = any(issubclass(other, kind) for other in kinds if other is not kind)
             if not (isabstract(kind) and others):  # what others derive from may leave things to them

@@ -27,7 +27,7 @@ def dialect_given(name_or_file: str) -> Dialect:
     if not name_or_file.endswith(".py"):
         return dialect_named(name_or_file)
     faults: list[Problem] = []
-    found = classes_in_files([Path(name_or_file)], Dialect, CONTRACT, faults)  # type: ignore[type-abstract]  # never made
+    found = classes_in_files([Path(name_or_file)], Dialect, CONTRACT, faults)  # never made
     if len(found) > 1:
         names = ", ".join(one.kind.__name__ for one in found)
         faults.append(Problem(name_or_file, 0, 0, f"there are several dialects in it: {names}", "leave one"))

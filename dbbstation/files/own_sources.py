@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from dbbstation.catalogue import FoundClass
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.own_classes import classes_in_files, module_name
+from dbbstation.laws.contract import MOVING, TableSource
 from dbbstation.sources.contract import ErrorSource
+from dbbstation.sources.of_struts import of_struts
 from dbbstation.sources.registry import known_sources, known_with
 
 if TYPE_CHECKING:
+    from abc import ABC
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
@@ -26,11 +30,26 @@ def every_source(files: Sequence[Path] = ()) -> Mapping[str, ErrorSource]:
     if not files:
         return known_sources()
     faults: list[Problem] = []
-    own = classes_in_files(files, ErrorSource, CONTRACT, faults)  # type: ignore[type-abstract]  # what derives from it is made
-    found = known_with(own, faults)
+    own = classes_in_files(files, (ErrorSource, TableSource), CONTRACT, faults)
+    found = known_with([_of_struts(one) for one in own if _has_columns(one, faults)], faults)
     if faults:
         raise InputError(faults)
     return found
+
+
+def _has_columns(found: FoundClass[ABC], faults: list[Problem]) -> bool:
+    missing = [
+        name for name in getattr(found.kind, "needs", ()) if issubclass(found.kind, TableSource) and name not in MOVING
+    ]
+    if missing:
+        what = f"{found.kind.__name__} needs {', '.join(missing)}, which a strut does not have"
+        faults.append(Problem(found.place.file, found.place.line, 0, what, f"a strut has {', '.join(MOVING)}"))
+    return not missing
+
+
+def _of_struts(found: FoundClass[ABC]) -> FoundClass[ErrorSource]:
+    kind = of_struts(found.kind) if issubclass(found.kind, TableSource) else cast("type[ErrorSource]", found.kind)
+    return FoundClass(kind, found.place, found.remedy)
 
 
 def sources_of(files: Sequence[Path], known: Mapping[str, ErrorSource]) -> tuple[str, ...]:

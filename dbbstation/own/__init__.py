@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dbbstation.diagnosis.simulator.contract import Simulator
-from dbbstation.diagnosis.simulator.own import PortSource
-from dbbstation.diagnosis.table.contract import TableSource
+from dbbstation.laws.contract import PortSource, TableSource
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.words import WordDialect

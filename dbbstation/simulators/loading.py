@@ -15,7 +15,6 @@ import numpy as np
 from dbbstation.catalogue import FOREIGN, in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
-from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
@@ -23,6 +22,7 @@ from dbbstation.files.keys import digests_of, key_of
 from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.places import real_path
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.laws.contract import PortSource, TableSource
 from dbbstation.simulators.allowed import files_of_simulator
 from dbbstation.simulators.fmu import FmuSimulator, fault_of_fmu
 from dbbstation.simulators.program import ProgramSimulator, whole_command
@@ -130,7 +130,7 @@ def simulator_of(python: Path) -> Simulator:
 @lru_cache(maxsize=4)
 def _simulator_of(python: Path, _content: bytes) -> Simulator:
     faults: list[Problem] = []
-    found = classes_in_files([python], Simulator, CONTRACT, faults)  # type: ignore[type-abstract]
+    found = classes_in_files([python], Simulator, CONTRACT, faults)
     if len(found) > 1 and not faults:
         faults.append(Problem(str(python), found[1].place.line, 0, "there are two simulators in one file", CONTRACT))
     if faults:
@@ -147,20 +147,26 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
 
 def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
     def fault_of(one: PortSource) -> tuple[str, str] | None:
+        if not one.port and len(file.ports) == 1:
+            one.port = next(iter(file.ports))
         if one.port not in file.ports:
             there = ", ".join(file.ports)
             return f"`{one.port}` of {type(one).__name__} is no port; there are {there}", "name one of them"
-        _try_once(one, file.ports[one.port].signals)
+        signals = file.ports[one.port].signals
+        needed = one.needs if isinstance(one, TableSource) else ()
+        if missing := [name for name in needed if name not in {"t_s", *signals}]:
+            return f"the port `{one.port}` has no signal {', '.join(missing)}", f"it has {', '.join(signals) or 'none'}"
+        _try_once(one, signals)
         return None
 
-    return own_instances(files, PortSource, CONTRACT, ("name", "port"), fault_of)  # type: ignore[type-abstract]
+    return own_instances(files, PortSource, CONTRACT, ("name",), fault_of)  # type: ignore[type-abstract]
 
 
 def know(files: Sequence[Path]) -> None:
     """Run the user's own physics once in this process, so that its terms can be unpickled."""
     for path in files:
         if module_name(path) not in sys.modules:
-            classes_in_files([path], PortSource, CONTRACT, [])  # type: ignore[type-abstract]  # faults were told where it was loaded
+            classes_in_files([path], PortSource, CONTRACT, [])  # faults were told where it was loaded
 
 
 def _try_once(one: PortSource, signals: Iterable[str]) -> None:

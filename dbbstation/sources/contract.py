@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
 import numpy as np
 
 from dbbstation.errors import ModelError
+from dbbstation.laws.contract import Parameter as Parameter  # noqa: PLC0414 - part of the contract: sources take it from here
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import Struts, inverse
 from dbbstation.machine.rotation import Frames
@@ -208,64 +209,6 @@ class Motion(WithLogged):
         given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
         given[Need.READING] = self.reading_mm is not None
         return frozenset(need for need, there in given.items() if there)
-
-
-BEYOND_PLAUSIBLE = 100.0
-"""Largest value in usual sizes: 20 mm on a strut's reference length, 5 mm on a joint, 0.3 mm of play. A kinematic fit
-without gravity shifts joints up to 0.27 mm, with a usual size of 0.05 mm, so ten would be too few. Usual values with a
-misplaced decimal point, or in micrometres for millimetres, mostly exceed the limit."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of a source.
-
-    Attributes:
-        name: unique in the source, ending with its unit.
-        plausible: usual size, one standard deviation, in the unit.
-        grid: search values of a nonlinear parameter (time constant, phase); empty for an amplitude.
-        tolerance: the machine file's standard deviation, used as prior; or None.
-        newer: True if older models lack it; there it is zero.
-        positive: cannot be negative; a significant negative fit indicates another cause.
-        listed: only values of `grid` are possible.
-        part: label of amplitudes that may be wrong alone; empty for struts and for sources without parts.
-        strut: 1 to 6; one strut's amplitudes may be wrong alone. None if of no strut.
-    """
-
-    name: str
-    unit: str
-    plausible: float
-    meaning: str
-    grid: tuple[float, ...] = ()
-    tolerance: float | None = None
-    newer: bool = False
-    positive: bool = False
-    listed: bool = False
-    part: str = ""
-    strut: int | None = None
-
-    @property
-    def alone_with(self) -> str:
-        """Return the label of the part that may be wrong alone."""
-        return self.part or (f"strut {self.strut}" if self.strut else "")
-
-    @property
-    def largest(self) -> float:
-        """Return the largest value allowed in a model, in the parameter's unit."""
-        return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.grid), 0.0)
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Return a nonlinear parameter's limits in a fit; infinite for amplitudes and listed values.
-
-        Positive parameters may exceed their grid by one step (ratio), others by its length.
-        """
-        grid = sorted(self.grid)
-        if len(grid) < 2 or self.listed:  # noqa: PLR2004 - a step needs two values
-            return -math.inf, math.inf
-        if grid[0] > 0.0:
-            return grid[0] ** 2 / grid[1], grid[-1] ** 2 / grid[-2]
-        return 2.0 * grid[0] - grid[-1], 2.0 * grid[-1] - grid[0]
 
 
 def of_each_strut(

@@ -70,16 +70,17 @@ def identify(
         StoppedError: `stop` returned True.
     """
     from dbbstation.diagnosis.drive.identify import identify as identified_drive
-    from dbbstation.diagnosis.drive.own import COLUMNS, own_force
+    from dbbstation.diagnosis.drive.own import own_force
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
     from dbbstation.files.recordings.drive_csv import read_drive
+    from dbbstation.laws.contract import MOVING
     from dbbstation.results.drive import drive_result
     from dbbstation.tasks.load import paths_of
     from dbbstation.tasks.tables import load_sources
 
     telling = Telling(progress, stop, say)
     named = drive_sources_named(known_drive_sources() if sources is None else tuple(sources))
-    own, lacking = load_sources(paths_of(source_files), COLUMNS, "a recording of a drive")
+    own, lacking = load_sources(paths_of(source_files), MOVING, "a recording of a drive")
     replaced = {source.name for source in own}
     named = (*(source for source in named if source.name not in replaced), *map(own_force, own))
     telling.note(*(f"{name} is not compared: {why}" for name, why in lacking.items()))

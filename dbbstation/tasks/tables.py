@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.table.contract import TableSource
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
 from dbbstation.errors import ArgumentError, InputError, Problem
@@ -19,6 +18,7 @@ from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, given_
 from dbbstation.files.table_sources import own_table_sources
 from dbbstation.inference.triangle import left_by
 from dbbstation.inference.variables import Kind, Variable
+from dbbstation.laws.contract import TableSource
 
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence

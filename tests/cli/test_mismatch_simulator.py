@@ -181,7 +181,7 @@ def test_json_is_what_its_schema_says_and_simulations_are_run_once_only(run, dec
     assert second["parameters"] == first["parameters"]
 
 
-OUTLET = """from dbbstation.diagnosis.simulator.own import Parameter, PortSource
+OUTLET = """from dbbstation.own import Parameter, PortSource
 
 
 class Outlet(PortSource):

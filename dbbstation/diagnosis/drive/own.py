@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale
+from dbbstation.laws.contract import MOVING
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
-    from dbbstation.diagnosis.table.contract import TableSource
+    from dbbstation.laws.contract import TableSource
 
 
 def drive_columns(signals: Signals) -> dict[str, Floats]:
-    """Return columns available to a source, shape (n,) each, for all samples of a recording.
-
-    `direction` is +1, -1, or 0 at standstill; `since_reversal_mm` is infinite before the first reversal.
-    """
+    """Return the columns of `MOVING`, shape (n,) each, for all samples of a recording."""
     return {
         "t_s": signals.t_s,
         "position_mm": 1e3 * signals.position_m,
@@ -29,19 +27,8 @@ def drive_columns(signals: Signals) -> dict[str, Floats]:
     }
 
 
-COLUMNS = {
-    "t_s": "time",
-    "position_mm": "position",
-    "speed_mm_s": "speed",
-    "acceleration_mm_s2": "acceleration",
-    "direction": "speed",
-    "since_reversal_mm": "travel since reversal",
-}
-"""Names of these columns, and of their variables."""
-
-
 def own_force(source: TableSource) -> DriveSource:
-    """Return a cause of force [N] from a source that uses `COLUMNS`."""
+    """Return a cause of force [N] from a source that uses columns of `MOVING`."""
     shapes = [p.name for p in source.parameters() if p.grid]
 
     def columns(signals: Signals, values: tuple[float, ...]) -> Floats:
@@ -53,7 +40,7 @@ def own_force(source: TableSource) -> DriveSource:
         """The source as a cause of force."""
 
         name = source.name
-        varies_with = COLUMNS[source.follows or source.needs[0]]
+        varies_with = MOVING[source.follows or source.needs[0]]
         texts = source.texts
         form_uncertainty = source.form_uncertainty
 

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import Model
     from dbbstation.diagnosis.simulator.nodes import Challenge, Node
-    from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.separate import SeparatingInput
     from dbbstation.diagnosis.simulator.terms import Term
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
+    from dbbstation.laws.contract import PortSource
 
 
 @dataclass(frozen=True)

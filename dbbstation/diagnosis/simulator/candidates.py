@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.model import SimulatorPort
-    from dbbstation.diagnosis.simulator.own import PortSource
+    from dbbstation.laws.contract import PortSource
 
 ROUNDINGS = (0.01, 0.1)
 """Widths of a sign's transition over the signal's greatest value; integrators step over sharper ones, and wider ones

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.fit import Weigh
     from dbbstation.diagnosis.simulator.laws import Departures
-    from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
+    from dbbstation.laws.contract import PortSource
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.simulator.own import PortSource
+    from dbbstation.laws.contract import PortSource
 
     Evaluate = Callable[[float, Mapping[str, float]], float]
 

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.table.contract import TableSource
     from dbbstation.diagnosis.table.data import Table
     from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.patterns import Pattern
+    from dbbstation.laws.contract import TableSource
 
 
 @dataclass(frozen=True, eq=False)

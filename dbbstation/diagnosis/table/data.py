@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.table.contract import TableSource
+    from dbbstation.laws.contract import TableSource
 
 REFITTED = 2.0
 """Prior standard deviation of a free parameter's effect, over the rms error as simulated. Half or double changes no

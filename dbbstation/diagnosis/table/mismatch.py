@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats
-    from dbbstation.diagnosis.table.contract import TableSource
     from dbbstation.diagnosis.table.data import Table
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.channel import Channel
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
+    from dbbstation.laws.contract import TableSource
     from dbbstation.text.texts import Texts
 
 FAR_STATED = 3.0

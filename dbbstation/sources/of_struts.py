@@ -1,0 +1,138 @@
+"""A law over columns as an error source: it makes every strut longer or shorter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from dbbstation.laws.contract import MOVING, TableSource
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import Effect, ErrorSource, Need, Owner, Parameter
+from dbbstation.sources.laws.rates import SHORTEST_S
+from dbbstation.sources.laws.turning import since_turning
+
+if TYPE_CHECKING:
+    from dbbstation.computing.arrays import Floats
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Motion
+
+MM_PER_UM = 1e-3
+
+SHAPE_STEP = 1e-4
+"""Half step of the derivative by a nonlinear number, relative to its usual size."""
+
+_NEEDS = {
+    "t_s": {Need.TIME},
+    "position_mm": set(),
+    "speed_mm_s": {Need.PATH, Need.TIME},
+    "acceleration_mm_s2": {Need.PATH, Need.TIME},
+    "direction": {Need.PATH},
+    "since_reversal_mm": {Need.PATH},
+}
+_VARIES_WITH = {"position": "strut-length", "speed": "strut-speed", "acceleration": "strut-acceleration"}
+
+
+def of_struts(law: type[TableSource]) -> type[ErrorSource]:
+    """Return the class of an error source by a law that has the columns of `MOVING`.
+
+    The law's effect is in µm of a strut's length; each strut has amplitudes of its own, all share the nonlinear numbers.
+    """
+    needs = getattr(law, "needs", ())
+    variable = MOVING[getattr(law, "follows", "") or next(iter(needs), "t_s")]
+    own = {
+        "__module__": law.__module__,
+        "__doc__": law.__doc__,
+        "of": law,
+        "name": getattr(law, "name", ""),
+        "texts": getattr(law, "texts", None),
+        "form_uncertainty": law.form_uncertainty,
+        "needs": frozenset({Need.POSE}.union(*(_NEEDS[name] for name in needs))),
+        "varies_with": _VARIES_WITH.get(variable, variable),
+    }
+    return type(law.__name__, (_OfStruts,), own)
+
+
+class _OfStruts(ErrorSource):
+    of: ClassVar[type[TableSource]]
+    belongs_to = Owner.MACHINE
+
+    def __init__(self) -> None:
+        self._law = self.of()
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        sizes = [
+            replace(p, name=f"strut_{k}_{p.name}", meaning=f"{p.meaning}, strut {k}", strut=k)
+            for p in self._law.parameters()
+            if not p.grid
+            for k in range(1, STRUTS + 1)
+        ]
+        return (*sizes, *self._shapes)
+
+    def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        self.require(motion)
+        count = len(values) - len(self._shapes)
+        effects = self._effects(motion, machine, values[count:])
+        return Effect(strut_mm=np.einsum("nsp,ps->ns", effects, values[:count].reshape(-1, STRUTS)))
+
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        self.require(motion)
+        count = len(values) - len(self._shapes)
+        effects = self._effects(motion, machine, values[count:])
+        by_size = (effects[:, :, :, None] * np.eye(STRUTS)[:, None, :]).reshape(len(motion), STRUTS, count)
+        by_shape = [self._by_shape(motion, machine, values, count + k) for k in range(len(self._shapes))]
+        return Effect(strut_mm=np.concatenate([by_size, *(each[:, :, None] for each in by_shape)], axis=2))
+
+    @property
+    def _shapes(self) -> tuple[Parameter, ...]:
+        return tuple(p for p in self._law.parameters() if p.grid)
+
+    def _by_shape(self, motion: Motion, machine: Machine, values: Floats, which: int) -> Floats:
+        step = np.zeros(len(values))
+        step[which] = SHAPE_STEP * self.parameters(machine)[which].plausible
+        more, less = (self.effect(motion, machine, values + way * step).strut_mm for way in (1.0, -1.0))
+        return np.asarray((more - less) / (2.0 * step[which]))  # type: ignore[operator] # an effect of this class has lengths
+
+    def _effects(self, motion: Motion, machine: Machine, shapes: Floats) -> Floats:
+        """Return the effect of unit amplitudes, shape (n, 6, p) [mm]; a number beyond its limits is at the limit."""
+        columns = motion.once("moving columns", machine, lambda: moving_columns(motion, machine))
+        numbers = {p.name: float(np.clip(value, *p.limits)) for p, value in zip(self._shapes, shapes, strict=True)}
+        needed = [{name: columns[name][:, k] for name in self._law.needs} for k in range(STRUTS)]
+        return MM_PER_UM * np.stack([self._law.columns(one, numbers) for one in needed], axis=1)
+
+
+def moving_columns(motion: Motion, machine: Machine) -> dict[str, Floats]:
+    """Return the columns of `MOVING` that a motion has, shape (n, 6) each, from the rows so far.
+
+    Rates are backward differences. A strut at rest keeps its last direction.
+    """
+    length = motion.struts(machine).length_mm
+    found = {"position_mm": length}
+    if motion.is_path:
+        since = np.abs(since_turning(length))
+        found["since_reversal_mm"] = np.where(np.maximum.accumulate(since, axis=0) > 0.0, since, np.inf)
+        found["direction"] = _held(np.sign(np.diff(length, axis=0, prepend=length[:1])))
+    if motion.time_s is not None:
+        found["t_s"] = np.repeat(motion.time_s[:, None], STRUTS, axis=1)
+    if motion.is_path and motion.time_s is not None:
+        found["speed_mm_s"] = _rate(motion.time_s, length)
+        found["acceleration_mm_s2"] = _rate(motion.time_s, found["speed_mm_s"])
+    return found
+
+
+def _rate(time_s: Floats, values: Floats) -> Floats:
+    step = np.diff(time_s)
+    later = step > SHORTEST_S
+    rate = np.full_like(values, np.nan)
+    rate[1:][later] = np.diff(values, axis=0)[later] / step[later, None]
+    return _held(np.nan_to_num(rate, nan=0.0), ~np.isnan(rate))
+
+
+def _held(values: Floats, known: Floats | None = None) -> Floats:
+    """Return values in which an unknown row has the last known one, or the first before it, shape (n, m)."""
+    there = values != 0.0 if known is None else known
+    rows = np.arange(len(values))[:, None]
+    last = np.maximum.accumulate(np.where(there, rows, -1), axis=0)
+    first = np.where(there.any(axis=0), there.argmax(axis=0), 0)
+    return np.take_along_axis(values, np.where(last < 0, first, last), axis=0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.cli.output import echo
 from dbbstation.errors import OutputError
 
 if TYPE_CHECKING:
@@ -11,9 +12,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.inference.cancelling import Cancelling
-    from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
+    from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.verdict import Gains
+    from dbbstation.results.mismatch import MismatchResult
+    from dbbstation.results.simulator import PortTerm, SimulatorResult
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")
 """Verdicts of effects that the recording proves."""
@@ -42,12 +45,31 @@ def cancelling_text(cancelling: Cancelling) -> str:
     return f"Effects cancel each other: {parts}, together {cancelling.rms_of_sum:.2g} {cancelling.unit} rms."
 
 
-def residual_text(left: LeftOver, unit: str) -> str:
-    """Return the residual beyond noise as a sentence."""
-    if left.is_noise:
-        return "Nothing is left beyond noise."
-    where = f", {left.worst.where}" if left.worst.where else ""
-    return f"Something is left beyond noise: {left.worst.name}{where}, {left.worst.rms:.2g} {unit}."
+def print_finding(finding: CauseFinding | PortTerm, most_values: int, about: str = "") -> None:
+    """Print an effect with its values, unless there are more than `most_values`, and its text."""
+    echo(f"\n{finding.name}{about}")
+    values = ", ".join(f"{name} {value.in_words}" for name, value in finding.values.items())
+    if values and len(finding.values) <= most_values:
+        echo(f"  {values}")
+    if finding.text:
+        echo(f"  {finding.text}")
+
+
+def print_left(result: MismatchResult | SimulatorResult, beyond: str = "") -> None:
+    """Print the residual beyond noise, effects that are not there, and the next measurements."""
+    left, text = result.left, "Nothing is left beyond noise."
+    if not left.is_noise:
+        where = f", {left.worst.where}" if left.worst.where else ""
+        text = f"Something is left beyond noise: {left.worst.name}{where}, {left.worst.rms:.2g} {result.unit}."
+    echo(f"\n{text}{beyond}")
+    for verdict in ("not-testable", "ruled-out"):
+        names = [f.name for f in result.findings if f.verdict == verdict]
+        if names:
+            echo(f"{verdict}: {first_names(names)}")
+    if result.next:
+        echo("\nmeasure next:")
+        for step in result.next:
+            echo(f"  {step.text}")
 
 
 def not_written(out: Path, levels: Levels) -> OutputError:

@@ -110,7 +110,7 @@ def emulate(
 
 def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, seed: int) -> MachineModel:
     from dbbstation.errors import InputError
-    from dbbstation.files.formats.machine import machine_data, machine_parts
+    from dbbstation.files.formats.machine import machine_data
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
     from dbbstation.model.machine_model import MachineModel
@@ -119,7 +119,7 @@ def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, see
     if file is None:
         return MachineModel(machine, random_kinematics(machine, seed))
     model = read_model(file, every_source(source_files)).model.of_the_machine()
-    if machine_data(machine_parts(model.machine)) != machine_data(machine_parts(machine)):
+    if machine_data(model.machine) != machine_data(machine):
         what = f"its nominal machine ({model.machine.name}) is not the one given with --machine ({machine.name})"
         raise InputError.of(file, what, "give the machine file that the model was made for")
     return model

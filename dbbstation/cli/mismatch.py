@@ -9,10 +9,10 @@ from dbbstation.cli.effects import (
     LIKELY,
     SURELY_FOUND,
     cancelling_text,
-    first_names,
     not_written,
     parts_with_gain,
-    residual_text,
+    print_finding,
+    print_left,
 )
 from dbbstation.cli.output import echo
 from dbbstation.cli.shop import shop_settings
@@ -102,16 +102,7 @@ def _print(result: MismatchResult) -> None:
         )
     elif any(f.verdict == "identified" for f in there):
         echo("\nno parts were held out: predictions of the identified causes were not tested.")
-    echo()
-    _print_left(result)
-    for verdict in ("not-testable", "ruled-out"):
-        names = [f.name for f in result.findings if f.verdict == verdict]
-        if names:
-            echo(f"{verdict}: {first_names(names)}")
-    if result.next:
-        echo("\nmeasure next:")
-        for step in result.next:
-            echo(f"  {step.text}")
+    print_left(result)
 
 
 def _print_first(result: MismatchResult) -> None:
@@ -170,11 +161,7 @@ def _print_findings(there: Sequence[CauseFinding], unit: str) -> None:
     for f in there:
         if f.verdict == "ambiguous" and len(there) > MOST_TOLD:
             continue
-        echo(f"\n{f.name}")
-        values = ", ".join(f"{name} {value.in_words}" for name, value in f.values.items())
-        if values and len(f.values) <= MOST_VALUES:
-            echo(f"  {values}")
-        echo(f"  {f.text}")
+        print_finding(f, MOST_VALUES)
 
 
 MOST_TOLD = 12
@@ -203,7 +190,3 @@ TOO_FAR = (
 TOO_FAR_STATED = (
     "It is more than three of its stated standard uncertainties away: check what was stated, and simulate anew."
 )
-
-
-def _print_left(result: MismatchResult) -> None:
-    echo(residual_text(result.left, result.unit))

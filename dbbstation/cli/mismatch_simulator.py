@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.cli.effects import LIKELY, SURELY_FOUND, first_names, parts_with_gain, residual_text
+from dbbstation.cli.effects import LIKELY, SURELY_FOUND, parts_with_gain, print_finding, print_left
 from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
@@ -33,12 +33,7 @@ def show_simulator(result: SimulatorResult) -> None:
         )
     elif there:
         echo("\nno parts were held out, or the search ended before: predictions were not tested.")
-    echo()
-    _print_left(result)
-    if result.next:
-        echo("\nmeasure next:")
-        for step in result.next:
-            echo(f"  {step.text}")
+    print_left(result, "" if result.left.is_noise else " No term at a port says it.")
 
 
 def _print_whether(result: SimulatorResult) -> None:
@@ -72,15 +67,6 @@ def _print_whether(result: SimulatorResult) -> None:
         echo("The search did not converge: it found several sets of terms.")
 
 
-def _print_left(result: SimulatorResult) -> None:
-    beyond = "" if result.left.is_noise else " No term at a port says it."
-    echo(residual_text(result.left, result.unit) + beyond)
-    for verdict in ("not-testable", "ruled-out"):
-        names = [f.name for f in result.findings if f.verdict == verdict]
-        if names:
-            echo(f"{verdict}: {first_names(names)}")
-
-
 MOST_VALUES = 4
 
 
@@ -100,12 +86,7 @@ def _print_findings(there: Sequence[PortTerm]) -> None:
     ]
     print_table(["term", "verdict", "probability", "log Bayes factor", "concealed", "parts with a gain"], rows)
     for f in there:
-        echo(f"\n{f.name}" + (f" ({f.about})" if f.about else ""))
-        values = ", ".join(f"{name} {value.in_words}" for name, value in f.values.items())
-        if values and len(f.values) <= MOST_VALUES:
-            echo(f"  {values}")
-        if f.text:
-            echo(f"  {f.text}")
+        print_finding(f, MOST_VALUES, f" ({f.about})" if f.about else "")
 
 
 def _print_parameters(parameters: Sequence[RefittedOfSimulator]) -> None:

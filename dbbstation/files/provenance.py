@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import json
 import textwrap
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation import __version__
+from dbbstation.facts.record import Record, Sha256Hex
+from dbbstation.facts.serialise import adapter
 from dbbstation.files.atomic import refuse_existing, write_folder
 from dbbstation.files.inputs import inputs_so_far, virtual_so_far
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
 
 BESIDE_TABLE = ".provenance.json"
@@ -29,24 +31,21 @@ _COMMENT = 170
 
 
 @dataclass(frozen=True)
-class Provenance:
-    """Origin of an output.
-
-    Attributes:
-        command: without options that only direct the result.
-        inputs: SHA-256 of every file read, by name.
-        virtual: names of inputs that come from a virtual machine.
-    """
+class Provenance(Record):
+    """Origin of an output. It has no date, so the same inputs and command give the same file."""
 
     program: str
+    """Name and version of the program that wrote it."""
     command: str
-    inputs: Mapping[str, str] = field(default_factory=dict)
+    """The command, with files without their folders."""
+    inputs: Mapping[str, Sha256Hex]
+    """SHA-256 of every input file, by name; the session file has the hashes of recordings."""
     virtual: tuple[str, ...] = ()
+    """Inputs from a virtual machine; the model then describes no real one."""
 
     def data(self) -> dict[str, object]:
         """Return the provenance for JSON and YAML."""
-        virtual = {"virtual": list(self.virtual)} if self.virtual else {}
-        return {"program": self.program, "command": self.command, "inputs": dict(self.inputs), **virtual}
+        return adapter(Provenance).dump_python(self, mode="json", exclude_defaults=True)
 
     def comments(self, said: Mapping[str, str]) -> dict[str, str]:
         """Return the provenance as comments of an NC program, text by title.

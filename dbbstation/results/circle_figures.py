@@ -61,7 +61,7 @@ class RunWithoutCircle(OfRunInSession):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CircleFiguresResult:
+class CircleFiguresResult(OfRunInSession):
     """Figures of one circle.
 
     Attributes:
@@ -71,10 +71,6 @@ class CircleFiguresResult:
         drift_um_per_turn: None without a second pass.
     """
 
-    session: str
-    test: str
-    direction: str
-    repeat: int
     problem: str | None
     tilt_deg: tuple[float, ...]
     elevation_deg: float

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from dbbstation.facts.serialise import Absent
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, picked
 
 State = Literal["done", "up-to-date", "failed"]
 """State of a session: computed now; known from an earlier call with the same inputs, options and program; failed."""
@@ -32,6 +31,11 @@ class FleetValue:
     uncertainty: float | None = None
     of: str = ""
     logarithmic: bool = False
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Return what it is, within a session."""
+        return self.kind, self.quantity, self.of
 
 
 @dataclass(frozen=True)
@@ -172,51 +176,24 @@ class FleetResult(Framed):
         """Return one row per value with its score; a session without values has one row."""
         scored = {} if self.comparison is None else {one.key: one for one in self.comparison.scored}
         return [
-            dict(zip(TABLE, _row(session, value, scored), strict=True))
+            _row(session, value, None if value is None else scored.get((session.session, *value.key)))
             for session in self.sessions
             for value in session.values or (None,)
         ]
 
 
-TABLE = (
-    "machine",
-    "session",
-    "started",
-    "state",
-    "problem",
-    "headline",
-    "kind",
-    "quantity",
-    "of",
-    "unit",
-    "value",
-    "u",
-    "sisters",
-    "usual",
-    "scatter",
-    "score",
-    "smallest_seen",
-    "unlike",
-)
+_OF_SESSION = ("machine", "session", "started", "state", "problem", "headline")
+_OF_VALUE = ("kind", "quantity", "of", "unit", "value")
+_SCORE = ("sisters", "usual", "scatter", "score", "smallest_seen", "unlike")
+TABLE = (*_OF_SESSION, *_OF_VALUE, "u", *_SCORE)
 """Columns of the table."""
 
 
-def _row(session: FleetSession, value: FleetValue | None, scored: Mapping[tuple[str, ...], Scored]) -> list[object]:
-    about: list[object] = [
-        session.machine,
-        session.session,
-        session.started,
-        session.state,
-        session.problem,
-        session.headline,
-    ]
-    if value is None:
-        return about + [None] * (len(TABLE) - len(about))
-    about += [value.kind, value.quantity, value.of, value.unit, value.value, value.uncertainty]
-    one = scored.get((session.session, value.kind, value.quantity, value.of))
-    if one is None:
-        return about + [None] * (len(TABLE) - len(about))
-    return [*about, one.sisters, one.usual, one.scatter, one.score, one.smallest_seen, one.unlike]
+def _row(session: FleetSession, value: FleetValue | None, one: Scored | None) -> dict[str, object]:
+    row: dict[str, object] = dict.fromkeys(TABLE) | picked(session, *_OF_SESSION)
+    if value is not None:
+        row |= picked(value, *_OF_VALUE) | {"u": value.uncertainty}
+    return row if one is None else row | picked(one, *_SCORE)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.formats.machine import machine_data, machine_parts
+from dbbstation.files.formats.machine import machine_data
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import CLOCK_S, EVENTS_FILE
@@ -41,7 +41,7 @@ def check_session(
         InputError: everything that differs.
     """
     faults = []
-    if machine_data(machine_parts(machine)) != machine_data(machine_parts(session.machine)):
+    if machine_data(machine) != machine_data(session.machine):
         what = "the machine of this session is another one"
         faults.append(Problem(str(session.machine_path), 0, 0, what, "give its machine file, or another --out"))
     if plan_data(plan) != plan_data(read_inline_plan(session.plan_path)):

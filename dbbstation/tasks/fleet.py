@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.results.fleet import State
     from dbbstation.tasks.load import Sessions
     from dbbstation.tasks.telling import Progress
 
@@ -227,35 +228,30 @@ def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> 
 def _known(one: _Named, kept: FleetFolder, data: dict[str, object], *, fresh: bool) -> _Outcome:
     found, stored = read_plain(FleetFound, data), read_plain(StoredFiles, data)
     files = (kept.file_of(one.name, stored.key), *stored.files)
-    about = FleetSession(
-        session=one.name,
-        machine=one.machine,
-        started=one.started,
-        state="done" if fresh else "up-to-date",
-        problem="",
-        files=files,
-        headline=found.headline,
-        compared=False,
-        notes=found.notes,
-        values=found.values,
-    )
-    return _Outcome(about, found)
+    return _outcome(one, "done" if fresh else "up-to-date", found, files=files)
 
 
 def _failed(one: _Named, problem: str) -> _Outcome:
+    return _outcome(one, "failed", problem=problem)
+
+
+def _outcome(
+    one: _Named, state: State, found: FleetFound | None = None, *, problem: str = "", files: tuple[str, ...] = ()
+) -> _Outcome:
+    told = found or FleetFound((), (), "", ())
     about = FleetSession(
         session=one.name,
         machine=one.machine,
         started=one.started,
-        state="failed",
+        state=state,
         problem=problem,
-        files=(),
-        headline="",
+        files=files,
+        headline=told.headline,
         compared=False,
-        notes=(),
-        values=(),
+        notes=told.notes,
+        values=told.values,
     )
-    return _Outcome(about, None)
+    return _Outcome(about, found)
 
 
 def _without_number(named: Sequence[_Named]) -> tuple[str, ...]:

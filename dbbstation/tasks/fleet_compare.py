@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.results.fleet import FleetFound, FleetValue
 
+SCORED = ("kind", "quantity", "of", "unit", "value", "uncertainty")
+"""Fields of a value that its score has, too."""
+
 MOST_NAMED = 5
 """Greatest number of machines that a note names."""
 
@@ -70,12 +73,7 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
                 Scored(
                     machine=sisters[place].name,
                     session=sisters[place].session,
-                    kind=value.kind,
-                    quantity=value.quantity,
-                    of=value.of,
-                    unit=value.unit,
-                    value=value.value,
-                    uncertainty=value.uncertainty,
+                    **{name: getattr(value, name) for name in SCORED},
                     sisters=len(rows[key]) - 1,
                     usual=middle if known else None,
                     scatter=scatter if known else None,

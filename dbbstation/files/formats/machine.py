@@ -80,21 +80,16 @@ class MachineParts(Schema):
 _ALIKE = tuple(one.name for one in fields(Machine) if one.name != "hexapod")
 
 
-def machine_parts(machine: Machine) -> MachineParts:
-    """Return a machine in the form of files, the exact inverse of `MachineParts.to_domain`."""
-    own: dict[str, Any] = {name: getattr(machine, name) for name in _ALIKE}
-    return MachineParts.model_validate(vars(machine.hexapod) | {"rotation": machine.hexapod.rotation.value} | own)
-
-
 def machine_text(machine: Machine) -> str:
     """Return the text of a machine's file."""
-    data = machine_data(machine_parts(machine))
-    return yaml_text({"format": format_of(MachineFile), **data})
+    return yaml_text({"format": format_of(MachineFile), **machine_data(machine)})
 
 
-def machine_data(parts: MachineParts) -> dict[str, object]:
-    """Return the keys of a machine in the format's order, without empty ones."""
-    return parts.model_dump(exclude_none=True, exclude={"format"})
+def machine_data(machine: Machine) -> dict[str, object]:
+    """Return the keys of a machine in the format's order, without empty ones; the inverse of `MachineParts.to_domain`."""
+    own: dict[str, Any] = {name: getattr(machine, name) for name in _ALIKE}
+    joints = vars(machine.hexapod) | {"rotation": machine.hexapod.rotation.value}
+    return MachineParts.model_validate(joints | own).model_dump(exclude_none=True)
 
 
 class MachineFile(MachineParts):

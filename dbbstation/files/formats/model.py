@@ -13,7 +13,7 @@ from dbbstation.catalogue import nearest
 from dbbstation.errors import ModelError, Problem
 from dbbstation.facts.quantities import Quantity
 from dbbstation.files.atomic import refuse_existing, write_text
-from dbbstation.files.formats.machine import machine_data, machine_parts
+from dbbstation.files.formats.machine import machine_data
 from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, SourceSchema
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.source_text import without_faults
@@ -264,7 +264,7 @@ def model_data(model: IdentifiedModel) -> dict[str, object]:
     machine = model.model.machine
     own = [one for one in model.model.sources if one.source.belongs_to is Owner.MACHINE]
     others = [one for one in model.model.sources if one.source.belongs_to is not Owner.MACHINE]
-    nominal = machine_data(machine_parts(machine))
+    nominal = machine_data(machine)
     of_formulas, unseen = model.formula_variance, model.null_space
     data = {
         "machine": nominal,

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from dbbstation.facts.record import Sha256Hex
 from dbbstation.files.formats.machine import MachineParts
+from dbbstation.files.provenance import Provenance
 from dbbstation.files.yaml.schema import Schema
 
 
@@ -47,19 +48,6 @@ class CovarianceSchema(Schema):
     absent if all are zero."""
 
 
-class ProvenanceSchema(Schema):
-    """Origin of a file, without date, so that the same inputs and command make the same file."""
-
-    program: str
-    """Name and version of the program that wrote it."""
-    command: str
-    """The command, with files without their folders."""
-    inputs: dict[str, Sha256Hex]
-    """SHA-256 of every input file, by name; the session file has the hashes of recordings."""
-    virtual: tuple[str, ...] = ()
-    """Inputs from a virtual machine; the model then describes no real one."""
-
-
 class ModelFile(Schema):
     """The nominal machine, the errors of the real one, and their uncertainty.
 
@@ -86,5 +74,5 @@ class ModelFile(Schema):
     """Results of the fit, by name."""
     sessions: dict[str, Sha256Hex]
     """SHA-256 of each session file of the fit, by folder name."""
-    provenance: ProvenanceSchema | None = None
+    provenance: Provenance | None = None
     """Origin of the model; absent in models that were written by hand."""

@@ -97,14 +97,8 @@ def circles_of_plan(session: SessionFolder, model: IdentifiedModel | None) -> tu
                 test=name,
                 direction=direction,
                 repeat=0,
-                mounting=None,
                 state=RunState.RECORDING,
-                reason="",
-                started=None,
                 path=session.folder,
-                sha256="",
-                program=None,
-                centre_mm=None,
             )
             with suppress(MachineError):
                 found.append(

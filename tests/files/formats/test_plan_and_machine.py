@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dbbstation.errors import InputError
-from dbbstation.files.formats.machine import machine_data, machine_parts, read_machine
+from dbbstation.files.formats.machine import machine_data, read_machine
 from dbbstation.files.formats.plan import plan_data, read_inline_plan, read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.out import yaml_text
@@ -91,7 +91,7 @@ def test_a_machine_survives_writing_and_reading_to_the_last_bit(tmp_path_factory
         joint_axes=JointAxes(*(axes / np.linalg.norm(axes, axis=2, keepdims=True))),
     )
     path = tmp_path_factory.mktemp("machine") / "machine.yaml"
-    path.write_text(yaml_text({"format": "dbb-machine/1", **machine_data(machine_parts(machine))}))
+    path.write_text(yaml_text({"format": "dbb-machine/1", **machine_data(machine)}))
     same_machine(read_machine(path), machine)
 
 

@@ -26,7 +26,9 @@ def test_poses_and_further_columns(tmp_path: Path) -> None:
     assert table.poses.tolist() == [[1, 2, -1000, 0.5, 0, 0], [1, 2, -1001, 0, 0, 0.1]]
     assert table.others == {"name": ["p1", "p2"]}
     u_mm = np.array([[0.001, 0.002, np.nan], [0.001, 0.002, 0.003]])
-    write_poses(tmp_path / "out.csv", table.poses, u_mm, table.others, Provenance("p 1", "p"), why_unknown="no, not Z")
+    write_poses(
+        tmp_path / "out.csv", table.poses, u_mm, table.others, Provenance("p 1", "p", {}), why_unknown="no, not Z"
+    )
     with (tmp_path / "out.csv").open(newline="") as file:
         first, second, third = csv.reader(file)
     assert ",".join(first) == f"{HEADER},u_x_mm,u_y_mm,u_z_mm,u_not_known_because,name"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -185,6 +185,23 @@ def write_csv(
     return rows
 
 
+def pyarrow_for(path: Path) -> tuple[Any, Any]:
+    """Return pyarrow and its module for Parquet.
+
+    Raises:
+        OutputError: it is not installed.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
+        raise OutputError(
+            "Parquet is written by pyarrow, which is not installed", where=str(path), remedy=remedy
+        ) from error
+    return pa, parquet
+
+
 def write_parquet(
     path: Path,
     what: Exporting,
@@ -200,16 +217,9 @@ def write_parquet(
         InputError: a run cannot be read.
         OutputError: pyarrow is missing; or as `write_csv`.
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError as error:
-        remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
-        raise OutputError(
-            "Parquet is written by pyarrow, which is not installed", where=str(path), remedy=remedy
-        ) from error
+    pa, parquet = pyarrow_for(path)
 
-    def kind(name: str) -> pa.DataType:
+    def kind(name: str) -> Any:  # noqa: ANN401 - a type of pyarrow
         if what.is_text(name):
             return pa.string()
         return pa.int64() if name in _WHOLE else pa.float64()

@@ -10,6 +10,7 @@ from dbbstation.files.atomic import streamed
 from dbbstation.files.provenance import write_table
 from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.results.fleet import TABLE
+from dbbstation.tasks.exporting import pyarrow_for
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,14 +39,7 @@ def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *
         return
     if path.suffix.lower() != FORMATS[1]:
         raise OutputError("a table is written as .csv or .parquet", where=str(path), remedy="name such a file")
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError as error:
-        remedy = "install it with `pip install 'dbbstation[parquet]'`, or name a .csv file"
-        raise OutputError(
-            "Parquet is written by pyarrow, which is not installed", where=str(path), remedy=remedy
-        ) from error
+    pa, parquet = pyarrow_for(path)
     kinds = {
         name: pa.float64()
         if name in _NUMBERS

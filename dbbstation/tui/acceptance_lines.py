@@ -8,6 +8,7 @@ from textual.content import Content
 
 from dbbstation.quality.conformity import Conformity
 from dbbstation.tui import texts
+from dbbstation.tui.panel import cut
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,7 +32,7 @@ _DIGEST = 8
 def test_line(one: ToleranceOfTest) -> Content:
     """Return the row of a test and figure: worst circle before and now, limit, U, and verdict."""
     row = _ROW.format(
-        test=_short(one.test),
+        test=cut(one.test, _WIDE),
         figure=texts.FIGURE_NAMES[one.quantity],
         before=_um(one.before),
         now=_um(one),
@@ -91,7 +92,3 @@ def _expanded(worst: WorstCircle | None) -> str:
 
 def _um(held: HeldTolerance | None) -> str:
     return texts.NOT_BEFORE if held is None or held.worst is None else f"{held.worst.um:.1f}"
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= _WIDE else f"{name[: _WIDE - 1]}…"

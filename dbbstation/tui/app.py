@@ -206,19 +206,19 @@ class StationApp(App[None]):
         elif self._leaving and not alive:
             self._end()
 
+    def _note_fault(self, error: Exception) -> None:
+        self.board.messages.append(Message(Weight.FAULT, str(error)))
+
     def _answer_job(self, operated: Operated) -> None:
         self._answering = True
         folder = Path(self.board.session)
         missing = self.board.finished.missing if self.board.finished is not None else ()
 
-        def failed(error: Exception) -> None:
-            self.board.messages.append(Message(Weight.FAULT, str(error)))
-
         def show(answer: JobAnswer) -> None:
             self.push_screen(AnswerScreen(answer, lambda: self.leave(sure=True), virtual=self.board.virtual))
 
         def work_out() -> None:
-            self.do(lambda: JobAnswer(operated, folder, missing), show, failed)
+            self.do(lambda: JobAnswer(operated, folder, missing), show, self._note_fault)
 
         if self.board.temperature_due and "temperature" in operated.job.may_change:
             self._ask_temperature(work_out, back=work_out)
@@ -345,10 +345,7 @@ class StationApp(App[None]):
             self.board.messages.append(Message(Weight.NOTE, f"{run} {word}{why}"))
             runner.start()
 
-        def failed(error: Exception) -> None:
-            self.board.messages.append(Message(Weight.FAULT, str(error)))
-
-        self.do(write, written, failed)
+        self.do(write, written, self._note_fault)
 
     def _drop_stale_question(self) -> None:
         question = self.screen_stack[-1] if self.screen_stack else None  # none: the last look may come while it closes
@@ -478,10 +475,7 @@ class StationApp(App[None]):
             self.board.take(Noted(text, degc))
             then()
 
-        def failed(error: Exception) -> None:
-            self.board.messages.append(Message(Weight.FAULT, str(error)))
-
-        self.do(write, written, failed)
+        self.do(write, written, self._note_fault)
 
     def close_down(self) -> None:
         self._wholly = True

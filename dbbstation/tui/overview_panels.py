@@ -16,7 +16,7 @@ from dbbstation.station.commands import GoTo
 from dbbstation.station.states import State
 from dbbstation.tui import texts
 from dbbstation.tui.findings_panel import STYLES as FINDING_STYLES
-from dbbstation.tui.panel import Panel, lines
+from dbbstation.tui.panel import Panel, cut, lines, window
 from dbbstation.tui.run_list import SIGNS
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ class PlateMap(Panel):
 
     def _titled(self, name: str) -> Content:
         chosen = name == self._choice.test
-        text = f"{'▸' if chosen else ' '}{_cut(name, self._name_room):{self._name_room}} "
+        text = f"{'▸' if chosen else ' '}{cut(name, self._name_room):{self._name_room}} "
         return Content.styled(text, "reverse bold" if chosen else "")
 
 
@@ -195,15 +195,13 @@ class TestList(Panel):
             at = len(rows) if chosen else at
             title = name if occurrence == 1 else f"{name} again"
             row = [
-                Content.styled(f"{'▸' if chosen else ' '}{_cut(title, room - 1):{room - 1}}", "bold" if chosen else "")
+                Content.styled(f"{'▸' if chosen else ' '}{cut(title, room - 1):{room - 1}}", "bold" if chosen else "")
             ]
             for way, (task, mark) in enumerate(group):
                 marked = chosen and way == min(self._choice.way, len(group) - 1)
                 row.append(_run(board, task, mark, marked=marked, wide=wide))
             rows.append(Content("").join(row))
-        height = max(self.content_size.height, 1)
-        first = min(max(at - height // 2, 0), max(len(rows) - height, 0))
-        return lines(*rows[first : first + height])
+        return window(rows, at, self.content_size.height)
 
 
 class ChosenRun(Panel):
@@ -283,7 +281,3 @@ def _rows_needed(shown: Shown, per_test: int) -> int:
             sum(test.ball.bore == number for test in shown.tests.values()) for number in in_row
         )
     return deepest
-
-
-def _cut(name: str, room: int) -> str:
-    return name if len(name) <= room else f"{name[: room - 1]}…"

@@ -8,6 +8,8 @@ from textual.content import Content
 from textual.widgets import Static
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from dbbstation.service.board import Board
 
 
@@ -34,3 +36,15 @@ class Panel(Static):
 def lines(*rows: Content) -> Content:
     """Return rows as one text, one below the other."""
     return Content("\n").join(rows)
+
+
+def window(rows: Sequence[Content], at: int, height: int) -> Content:
+    """Return the rows about one of them that fit into a height."""
+    height = max(height, 1)
+    first = min(max(at - height // 2, 0), max(len(rows) - height, 0))
+    return lines(*rows[first : first + height])
+
+
+def cut(text: str, room: int) -> str:
+    """Return a text with an ellipsis instead of what does not fit."""
+    return text if len(text) <= room else f"{text[: room - 1]}…"

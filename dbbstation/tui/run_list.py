@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from dbbstation.service.board import Mark
-from dbbstation.tui.panel import Panel, lines
+from dbbstation.tui.panel import Panel, cut, window
 
 if TYPE_CHECKING:
     from dbbstation.service.board import Board
@@ -44,16 +44,10 @@ class RunList(Panel):
                 current = len(rows) if number == here else current
                 cells.append(_cell(task.direction.value, mark, doubted=board.in_doubt(task.test, task.direction)))
             title = name if occurrence == 1 else f"{name} again"
-            rows.append(Content(f"{_cut(title, room):{room}} ") + Content(" ").join(cells))
-        height = max(self.size.height, 1)
-        first = min(max(current - height // 2, 0), max(len(rows) - height, 0))
-        return lines(*rows[first : first + height])
+            rows.append(Content(f"{cut(title, room):{room}} ") + Content(" ").join(cells))
+        return window(rows, current, self.size.height)
 
 
 def _cell(direction: str, mark: Mark, *, doubted: bool = False) -> Content:
     (sign, style), word = (("!", "bold $text-error"), "doubted") if doubted else (SIGNS[mark], mark.value)
     return Content.assemble(f"{direction:3} ", (f"{sign} {word}".ljust(_CELL - 4), style))
-
-
-def _cut(name: str, room: int) -> str:
-    return name if len(name) <= room else f"{name[: room - 1]}…"

@@ -9,6 +9,7 @@ from textual.content import Content
 from dbbstation.tui import texts
 from dbbstation.tui.durations import duration
 from dbbstation.tui.new_screen import NewScreen
+from dbbstation.tui.panel import cut
 from dbbstation.tui.prepare_screen import PrepareScreen
 from dbbstation.tui.row_screen import RowScreen
 
@@ -130,9 +131,9 @@ class StartScreen(RowScreen):
 
 def _row(line: SessionLine) -> Content:
     when = f"{line.changed.astimezone():%m-%d %H:%M}"
-    name = f"{_cut(line.folder.name, _NAME):{_NAME}}"
+    name = f"{cut(line.folder.name, _NAME):{_NAME}}"
     if line.problem:
-        return Content.assemble((f"! {name} ", "$text-error"), f"{_cut(line.problem, 52)}")
+        return Content.assemble((f"! {name} ", "$text-error"), f"{cut(line.problem, 52)}")
     if line.complete:
         state = texts.START_COMPLETE
     else:
@@ -142,7 +143,3 @@ def _row(line: SessionLine) -> Content:
     state += texts.START_UNJUDGED.format(count=line.unjudged) if line.unjudged else ""
     sign = "✓" if line.complete else "◐"
     return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"))
-
-
-def _cut(text: str, width: int) -> str:
-    return text if len(text) <= width else f"{text[: width - 1]}…"

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.programs import ProgramText
 
-    Source = File | ProgramText
+    Source: TypeAlias = File | ProgramText
     Numbers = ArrayLike
     Offsets = Mapping[str, Sequence[float]]
     Lengths = Mapping[int, float]

@@ -201,12 +201,12 @@ BLOCKS = 4
 def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> Estimate:
     """Return a range without the contribution of noise.
 
-    One recording cannot separate correlated noise from short form. If the spectrum rises above its end, the interval covers the results of the whole spectrum and of its end.
-
     Args:
         paths: one or both directions, from one circle.
         statistic: figure of extremes, shape (draws, s), at angles, shape (s,); homogeneous of degree one.
     """
+    # One recording cannot separate correlated noise from short form. If the spectrum rises above its end, the interval
+    # covers the results of the whole spectrum and of its end.
     if not max(path.sigma_um for path in paths) > 0.0:
         return Estimate(as_read_um, 0.0, as_read_um)
     with_all = _interval(paths, statistic, as_read_um)

@@ -44,12 +44,11 @@ class FormAndNoise:
 def form_and_noise(deviation_um: Floats) -> FormAndNoise:
     """Separate form and noise of a series of deviations.
 
-    Noise is measured above 30 undulations per revolution and extrapolated below (`dbbstation.inference.harmonics`).
-    There, a line of power P over noise S has the form share 1 - S / P. Outstanding lines above are form.
-
     Args:
         deviation_um: about equally spaced over a turn, shape (n,).
     """
+    # Noise is measured above 30 undulations per revolution and extrapolated below (`dbbstation.inference.harmonics`).
+    # There, a line of power P over noise S has the form share 1 - S / P. Outstanding lines above are form.
     count = len(deviation_um)
     low, high = bands(count)
     above = np.fft.rfft(deviation_um)

@@ -15,12 +15,10 @@ AXES = 2
 
 
 def without_noise(length: float, u: float) -> tuple[float, float]:
-    """Return the true length whose median measured length is the given one, with standard uncertainty.
-
-    With uncertainty u per axis the length has Rice's distribution [Rice, Bell System Technical Journal 24 (1945) 46,
-    sec. 3.10]. Inverting the percentiles 2.5 and 97.5 gives the 95 % interval [confidence interval by inversion of a
-    test, Casella and Berger, Statistical Inference, 9.2.1]. The uncertainty is its longer side over 1.96, at least u.
-    """
+    """Return the true length whose median measured length is the given one, with standard uncertainty."""
+    # With uncertainty u per axis the length has Rice's distribution [Rice, Bell System Technical Journal 24 (1945) 46,
+    # sec. 3.10]. Inverting the percentiles 2.5 and 97.5 gives the 95 % interval [confidence interval by inversion of a
+    # test, Casella and Berger, Statistical Inference, 9.2.1]. The uncertainty is its longer side over 1.96, at least u.
     if not u > 0.0 or length > LONG * u:
         return float(np.sqrt(length**2 - u**2)), u
     square = (length / u) ** 2

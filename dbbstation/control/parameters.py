@@ -1,6 +1,6 @@
 """Fit parameters and joint tables of LinuxCNC's genhexkins to a model over a volume.
 
-genhexkins drives joint i to |T + R a_i - b_i|, with joints a of the platform and b of the base; a table adds to a
+LinuxCNC's genhexkins drives joint i to |T + R a_i - b_i|, with platform joints a and base joints b; a table adds to a
 joint's position. Wrong joints imitate other errors, so fitted values describe a control, never the machine.
 """
 

@@ -135,11 +135,9 @@ def without_doubtful(explained: Explained) -> Explained:
 
 
 def doubtful(explained: Explained) -> set[str]:
-    """Return improbable named causes of the best set.
-
-    The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous
-    causes remain.
-    """
+    """Return improbable named causes of the best set."""
+    # The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous
+    # causes remain.
     settled, found = explained.settled, set()
     of = partial(form_uncertainty, explained.channel.sources)
     every = Alternatives(settled.comparison, settled.causes, settled.posterior, settled.best, of, settled.members)

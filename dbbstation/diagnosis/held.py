@@ -18,11 +18,9 @@ def uncertainties(calibration: Calibration, held: Floats) -> Floats:
 
 
 def held_variance(calibration: Calibration, held: Floats) -> Floats:
-    """Return every column's variance along held directions, shape (k,).
-
-    A source may have its found or plausible size there, whichever is greater: a ball displaced by 70 µm in determined
-    directions may be displaced by 20 µm in others.
-    """
+    """Return every column's variance along held directions, shape (k,)."""
+    # A source may have its found or plausible size there, whichever is greater. For example, a ball displaced by 70 µm
+    # in determined directions may be displaced by 20 µm in others.
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     amplitudes = calibration.x[fitted] / known.scale[fitted]

@@ -97,11 +97,9 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
 
 
 def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
-    """Return the finding with its wave fitted exactly.
-
-    Joints absorb part of a long wave, which biases the search by some per cent. Without convergence the finding is
-    unchanged.
-    """
+    """Return the finding with its wave fitted exactly."""
+    # Joints absorb part of a long wave, which biases the search by some per cent. Without convergence the finding is
+    # unchanged.
     curve = rest.curve
     if curve is None or curve.period_mm is None or curve.strut is None:
         return rest

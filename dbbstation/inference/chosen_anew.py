@@ -140,13 +140,12 @@ def selection_frequency(
 ) -> dict[str, float]:
     """Return how often each cause is selected.
 
-    Each draw keeps seven tenths of the groups without replacement, because repeated groups look certain [Meinshausen
-    and Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw halves]. Groups, such as tests, are kept together.
-
     Args:
         groups: number of each run's group.
         without: function from omitted runs, shape (r,), to a comparison.
     """
+    # Each draw keeps seven tenths of the groups without replacement, because repeated groups look certain [Meinshausen
+    # and Bühlmann, J. R. Stat. Soc. B 72 (2010) 417, sec. 2, draw halves]. Groups, such as tests, are kept together.
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))
     times = dict.fromkeys((cause.name for cause in causes), 0)

@@ -275,11 +275,9 @@ def bands_of(rows: Floats, stretches: Sequence[slice]) -> Bands | None:
 
 
 def autoregressive(rows: Floats, stretches: Sequence[slice]) -> Coloured:
-    """Fit autoregressive noise by forward and backward prediction.
-
-    [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5], order by Akaike's
-    criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
-    """
+    """Fit autoregressive noise by forward and backward prediction."""
+    # [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5], order by
+    # Akaike's criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
     ahead = [rows[stretch] for stretch in stretches if stretch.stop - stretch.start > 1]
     count = sum(len(own) for own in ahead)
     power = sum(float(own @ own) for own in ahead) / max(count, 1)

@@ -27,11 +27,9 @@ CARRIES = 0.5
 
 
 def may_result(variable: Variable, channel: Channel) -> bool:
-    """Return whether a column may be a consequence of the difference as well as its cause.
-
-    A measured torque follows the actual motion and so contains the difference. A cause also contains it. These rows
-    cannot distinguish both.
-    """
+    """Return whether a column may be a consequence of the difference as well as its cause."""
+    # A measured torque follows the actual motion and so contains the difference. A cause also contains it. These rows
+    # cannot distinguish both.
     if channel.simulated is None or channel.time is None:
         return False
     kept, values = channel.kept, variable.values[channel.kept]

@@ -102,12 +102,11 @@ def _detectable(
 def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: float) -> float | None:
     """Return the least rms at which the share `POWER` of random effects is surely found, or None.
 
-    Amplitudes a and noise e, both N(0, 1), give z = L a + L^(1/2) e for the information L. The evidence is averaged
-    over `SCALES`, as for any cause.
-
     Args:
         products: information given base and others, shape (p, p).
     """
+    # Amplitudes a and noise e, both N(0, 1), give z = L a + L^(1/2) e for the information L. The evidence is averaged
+    # over `SCALES`, as for any cause.
     rng = np.random.default_rng(0)
     directions = rng.standard_normal((BOUNDS.detectable_draws, len(plausible)))
     size = np.sqrt(np.mean(np.square(directions @ samples.T), axis=1))

@@ -170,10 +170,9 @@ def parts_of(channel: Channel) -> list[tuple[str, Flags]]:
 
 
 def part_numbers(lengths: Sequence[int]) -> Integers:
-    """Return the number of each row's part, shape (n,); parts have similar size and whole blocks.
-
-    Long blocks are split evenly. Short neighbouring blocks are joined, to at most `FOLDS` parts of at least half an equal share.
-    """
+    """Return the number of each row's part, shape (n,); parts have similar size and whole blocks."""
+    # Long blocks are split evenly. Short neighbouring blocks are joined, to at most `FOLDS` parts of at least half an
+    # equal share.
     share = sum(lengths) / (min(FOLDS, len(lengths)) if len(lengths) >= ENOUGH_BLOCKS else FOLDS)
     sizes: list[int] = []
     for length in lengths:

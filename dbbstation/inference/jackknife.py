@@ -30,13 +30,12 @@ def weighted_jackknife(
 ) -> Floats:
     """Return jackknife standard uncertainties, shape (p,), weighted by remaining information.
 
-    If the stated variance is correct, it equals the expected square [weighted jackknife, Wu, Annals of Statistics 14
-    (1986) 1261, eq. 5.1, by value].
-
     Args:
         without: values fitted without each part, shape (k, p).
         variances_without: their stated variances, shape (k, p); infinite if a part alone determines the value.
     """
+    # If the stated variance is correct, it equals the expected square [weighted jackknife, Wu, Annals of Statistics 14
+    # (1986) 1261, eq. 5.1, by value].
     with np.errstate(all="ignore"):
         squares = variances / variances_without * np.square(without - values)
     return np.asarray(np.sqrt(np.sum(np.where(np.isfinite(squares), squares, 0.0), axis=0)))

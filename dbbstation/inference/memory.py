@@ -129,12 +129,11 @@ def _middle(variable: Variable) -> float:
 def lagging(values: Floats, time: Floats, constant: float) -> Floats:
     """Return values after a first-order lag, less the values, shape (n,); the initial state is steady.
 
-    The result is exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital
-    Control of Dynamic Systems, 3rd ed., sec. 6.3.2].
-
     Args:
         constant: in `time`'s unit.
     """
+    # The result is exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital
+    # Control of Dynamic Systems, 3rd ed., sec. 6.3.2].
     steps = np.diff(time)
     fades = np.exp(-steps / constant)
     falls = np.diff(values) * (constant / steps) * -np.expm1(-steps / constant)

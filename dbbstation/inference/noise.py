@@ -34,11 +34,9 @@ class Noise:
 
 
 def noise_of(residuals: Sequence[Floats], freedom_used: float) -> Noise:
-    """Estimate noise from the residuals of runs.
-
-    The autocorrelation is integrated over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo,
-    Statistical Science 7 (1992), sec. 3.3].
-    """
+    """Estimate noise from the residuals of runs."""
+    # The autocorrelation is integrated over positive pairs of lags [Geyer, Practical Markov Chain Monte Carlo,
+    # Statistical Science 7 (1992), sec. 3.3].
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
     sigma = float(np.sqrt(square / max(count - freedom_used, 1.0)))
@@ -55,12 +53,11 @@ def noise_of(residuals: Sequence[Floats], freedom_used: float) -> Noise:
 def noise_of_turns(residuals: Sequence[Floats], freedom_used: float) -> Noise:
     """Estimate noise from residuals of whole turns.
 
-    Misfit and absorption are smooth, so high harmonics give the noise, which is extrapolated
-    (`dbbstation.inference.harmonics`). Other residuals count as white noise.
-
     Args:
         freedom_used: degrees of freedom of smooth columns.
     """
+    # Misfit and absorption are smooth, so high harmonics give the noise, which is extrapolated
+    # (`dbbstation.inference.harmonics`). Other residuals count as white noise.
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
     turns = [residual for residual in residuals if len(residual) >= FEWEST_SAMPLES]

@@ -206,11 +206,9 @@ def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Fl
 
 
 def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, held: Floats) -> Floats:
-    """Return combinations that blocks do not determine, with sizes by scale, shape (h, k).
-
-    Directions lost at the first linearisation change until the solution, so other columns are adjusted by least
-    squares. Combinations are orthonormal in scaled columns, with zero random effects.
-    """
+    """Return combinations that blocks do not determine, with sizes by scale, shape (h, k)."""
+    # Directions lost at the first linearisation change until the solution, so other columns are adjusted by least
+    # squares. Combinations are orthonormal in scaled columns, with zero random effects.
     combinations = np.zeros((len(held), len(known.prior)))
     if len(held):
         arrow = arrow_of(blocks, known, noise)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class Sums:
     """Sums over one variable's bins for d directions.
 
-    Gains are in prior standard deviations of an amplitude over noise.
+    A gain is the effect of one prior standard deviation, over noise.
 
     Attributes:
         at: mean values of bins, shape (b,) or (b, c).

@@ -42,7 +42,7 @@ class Verdict(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Return its place in lists."""
+        """Return the verdict's place in lists."""
         return tuple(Verdict).index(self)
 
 

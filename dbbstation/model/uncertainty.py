@@ -104,7 +104,7 @@ def predicted_poses(
     poses: ArrayLike,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[Floats, Floats]:
-    """Return actual poses for single commanded poses, shape (n, 6) [mm, deg], and standard uncertainties of X, Y, Z, shape (n, 3) [mm], NaN if unknown.
+    """Return actual poses, shape (n, 6) [mm, deg], of single commands, and standard uncertainties of X, Y, Z, shape (n, 3) [mm]; NaN if unknown.
 
     Args:
         poses: shape (n, 6) [mm, deg], any numeric type.

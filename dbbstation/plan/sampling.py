@@ -40,7 +40,7 @@ class Sampling:
 
 
 def sampling(circle: Circle, rate_hz: float) -> Sampling:
-    """Return a circle's sampling at a sample rate."""
+    """Return how densely a sample rate covers a circle."""
     points = rate_hz * FULL_TURN_DEG / circle.turning_deg_s
     return Sampling(points, FULL_TURN_DEG / points, int(points / POINTS_PER_UNDULATION))
 

@@ -1,8 +1,8 @@
 """Detect faults common to all runs: mirrored, turned or reversed programs, and a wrong bar length.
 
-The runs of such a session agree with each other, but no hexapod has mirrored forms in several tests, and a uniformly
-oversized machine has further errors. Likelihoods compare the possible ways of running the programs. Sound runs favour
-another way by a factor f or more with a probability of at most 1 / f [Markov's inequality].
+Such runs agree with each other, but no hexapod has mirrored forms in several tests, and a uniformly oversized machine
+has further errors. Likelihoods compare the possible ways of running the programs. Sound runs favour another way by a
+factor f or more with a probability of at most 1 / f [Markov's inequality].
 """
 
 from __future__ import annotations

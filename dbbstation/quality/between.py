@@ -19,13 +19,11 @@ if TYPE_CHECKING:
 
 
 def direction(one: Seen, others: Others, expected: Expected | None = None) -> Finding:
-    """Judge whether the circle ran in its named direction.
-
-    A bar does not measure the direction. A reversed circle has its form mirrored about the axis through the start. The
-    mirrored form is visible if the circle is off this axis and the expected centre, the other direction or a repeat
-    gives the side. Lag and friction change sign with direction too, but repeat after half a turn: linear in speed or
-    its sign, they have only even undulations. Only odd undulations are compared.
-    """
+    """Judge whether the circle ran in its named direction."""
+    # A bar does not measure the direction. A reversed circle has its form mirrored about the axis through the start.
+    # The mirrored form is visible if the circle is off this axis and the expected centre, the other direction or a
+    # repeat gives the side. Lag and friction change sign with direction too, but repeat after half a turn: linear in
+    # speed or its sign, they have only even undulations. Only odd undulations are compared.
     by_place = _by_place(one, expected)
     if by_place is not None:
         return by_place

@@ -73,11 +73,9 @@ _MANY = 1e6
 
 
 def scale_of(values: Sequence[float]) -> tuple[float, float]:
-    """Return a robust standard deviation about zero, and its degrees of freedom.
-
-    The estimate is the median absolute value, divided by the median for a standard normal variable. It is as precise as
-    the standard deviation of 0.37 times as many sound values [Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993)].
-    """
+    """Return a robust standard deviation about zero, and its degrees of freedom."""
+    # The estimate is the median absolute value, divided by the median for a standard normal variable. It is as precise
+    # as the standard deviation of 0.37 times as many sound values [Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993)].
     if not values:
         return 0.0, 0.0
     return float(np.median(np.abs(values))) / _NORMAL_MEDIAN, ROBUST_SHARE * len(values)

@@ -33,12 +33,10 @@ ORDERS = np.concatenate([[0], np.arange(1, LOCAL_HARMONIC + 1), np.arange(1, LOC
 
 
 def local_difference(one: Seen, others: Others) -> Finding:
-    """Judge local differences in 3 to 29 undulations.
-
-    The limit is the sum of three parts: the ellipsoid of noise and known causes along the difference, a share of the
-    reversals' even undulations, and drift. A drift D over a turn is a sawtooth whose k-th undulation is D / (pi k).
-    Enough other pairs with larger differences widen the limit.
-    """
+    """Judge local differences in 3 to 29 undulations."""
+    # The limit is the sum of three parts: the ellipsoid of noise and known causes along the difference, a share of the
+    # reversals' even undulations, and drift. A drift D over a turn is a sawtooth whose k-th undulation is D / (pi k).
+    # Enough other pairs with larger differences widen the limit.
     against = others.opposite or others.earlier
     if against is None or one.analysis is None or against.analysis is None:
         return undecided(Name.LOCAL, "no other run of this test has been measured", "µm")

@@ -16,13 +16,11 @@ if TYPE_CHECKING:
 
 
 def scale(one: Seen, others: Others) -> Finding:
-    """Judge the excess of measured over programmed feed-in and feed-out.
-
-    Effects on the feed-in follow from effects on the circle. Over a distance w, a cause that depends on pose or time
-    changes by the share w / R. A cause that depends on the path acts fully, because it acts only in motion, at the
-    corner. Lag and play change sign with direction and cancel in the mean of both directions. The smaller of both
-    results counts.
-    """
+    """Judge the excess of measured over programmed feed-in and feed-out."""
+    # Effects on the feed-in follow from effects on the circle. Over a distance w, a cause that depends on pose or time
+    # changes by the share w / R. A cause that depends on the path acts fully, because it acts only in motion, at the
+    # corner. Lag and play change sign with direction and cancel in the mean of both directions. The smaller of both
+    # results counts.
     expected, feed_in_um = one.run.expected, 1e3 * one.run.circle.feed_in_mm
     if one.ways is None:
         return undecided(Name.SCALE, "feed-in and feed-out are not in the recording, or have too few samples", "%")

@@ -177,11 +177,9 @@ scatter would make the limit useless."""
 
 
 def feed(one: Seen, others: Others) -> Finding:
-    """Judge the overlap's feed by the same limits as `cut`.
-
-    If the overlap has too little shape, the duration decides. Stops at corners are assumed as long as in other runs, or
-    at most `LONGEST_STOP_S`.
-    """
+    """Judge the overlap's feed by the same limits as `cut`."""
+    # If the overlap has too little shape, the duration decides. Stops at corners are assumed as long as in other runs,
+    # or at most `LONGEST_STOP_S`.
     if one.feed_mm_min is None:
         return _feed_by_duration(one, others)
     shown, u = one.feed_mm_min

@@ -38,13 +38,11 @@ UNEVEN = 1.5
 
 
 def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
-    """Judge the reading that differs most from its neighbours.
-
-    Each reading is compared with the median of two readings before and two after. The scatter of differences is the
-    larger of the turn's scatter and the local scatter; single spikes do not raise it. The reading step is added to the
-    limit. Near reversals the limit follows from the turn's other reversals. A sound normal run has a finding with
-    probability `limits.SHARE`.
-    """
+    """Judge the reading that differs most from its neighbours."""
+    # Each reading is compared with the median of two readings before and two after. The scatter of differences is the
+    # larger of the turn's scatter and the local scatter; single spikes do not raise it. The reading step is added to
+    # the limit. Near reversals the limit follows from the turn's other reversals. A sound normal run has a finding with
+    # probability `limits.SHARE`.
     apart, sound = _apart(one.residual_um, one.raw.phi_deg)
     if int(sound.sum()) < LARGEST_BLOCK:
         return undecided(Name.SPIKE, "too few samples to hold single readings against their neighbours", "µm")

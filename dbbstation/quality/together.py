@@ -73,12 +73,11 @@ def together(one: Seen, runs: Sequence[Seen], forms: Forms) -> Together | None:
 def expected_beside(both: Together | None) -> Expected | None:
     """Return the first run's expected circle given the others.
 
-    Sizes of machine errors are weighted by likelihood. Each other test is compared with its prediction by the remaining
-    tests [R. and W., section 5.4.2]. If they disagree, causes may be missing, so the covariance grows.
-
     Args:
         both: None returns None.
     """
+    # Sizes of machine errors are weighted by likelihood. Each other test is compared with its prediction by the
+    # remaining tests [R. and W., section 5.4.2]. If they disagree, causes may be missing, so the covariance grows.
     if both is None or (own := both.runs[0].run.expected) is None:
         return None
     of_others = both.others.log_likelihoods()[:, 0]

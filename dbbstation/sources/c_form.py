@@ -18,7 +18,7 @@ class CForm:
     """Statements of C that add a source's effect at one pose.
 
     They may use names of `control/kernel.c`: `at`, the source's struts; `e`, the sum of effects; `v`, the values;
-    `EACH`, a loop over struts i. `warmer[thermometer[k]]` is thermometer k's excess over its zero [K].
+    `EACH`, a loop over struts i. The expression `warmer[thermometer[k]]` is thermometer k's excess over its zero [K].
 
     Attributes:
         by_pose: False if it uses only lengths of `at`, so the pose need not be computed.

@@ -106,13 +106,12 @@ class BallPath:
 def path_about_ball(theta_deg: Floats, radius_mm: Floats) -> BallPath:
     """Return a path's least-squares circle, with points at their angles about the fixed ball.
 
-    Commanded angles refer to the commanded centre. If the ball is off this centre by c, angles about the ball differ by
-    up to c/R. At commanded angles a perfect circle would show the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13 µm at
-    2 mm.
-
     Raises:
         TraceError: the points do not determine a circle.
     """
+    # Commanded angles refer to the commanded centre. If the ball is off this centre by c, angles about the ball differ
+    # by up to c/R. At commanded angles a perfect circle would show the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13
+    # µm at 2 mm.
     theta = np.radians(theta_deg)
     about_ball_deg = theta_deg
     centre, radius, deviation = best_circle(theta_deg, radius_mm)

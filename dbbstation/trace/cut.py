@@ -162,12 +162,11 @@ def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
 def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
     """Return the times of feed-in and feed-out [s].
 
-    Each edge is halfway between the lengths on its sides: a common threshold would shift them by the machine's error,
-    0.02 degrees for a tenth of a millimetre.
-
     Raises:
         TraceError: one is missing, or less than a turn lies between.
     """
+    # Each edge is halfway between the lengths on its sides: a common threshold would shift them by the machine's error,
+    # 0.02 degrees for a tenth of a millimetre.
     t, length = recording.good.t_s, recording.good.length_mm
     if not len(t):
         raise TraceError("no sample of it can be used", where=recording.name, remedy="repeat the run")

@@ -3,7 +3,7 @@
 In time t the length changes by at most F t (triangle inequality). On the full turn only errors change it. Errors below
 the feed-in A with at most n undulations change by at most n A per radian (Bernstein's inequality). With A = 1.5 mm, n =
 3, F = 1000 mm/min, radius 150 mm and override, the limit is 0.6 mm/s: 43 um between readings at 14 per second, 2.4 um
-at 250. `SUDDEN_MM` is added. A reading beyond is doubtful unless later readings agree with it.
+at 250. To each limit `SUDDEN_MM` is added. A reading beyond is doubtful unless later readings agree with it.
 """
 
 from __future__ import annotations

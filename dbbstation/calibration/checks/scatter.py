@@ -79,11 +79,9 @@ class ScatterCheck:
 
 
 def seats_of(calibration: Calibration) -> list[MountingOffset]:
-    """Return every ball's place, with a chi-square for its displacement.
-
-    A best linear unbiased prediction m with stated covariance P and remaining covariance V has the covariance P - V
-    [Henderson, Biometrics 31 (1975) 423]. Over the determined coordinates m (P - V)^-1 m is chi-square.
-    """
+    """Return every ball's place, with a chi-square for its displacement."""
+    # A best linear unbiased prediction m with stated covariance P and remaining covariance V has the covariance P - V
+    # [Henderson, Biometrics 31 (1975) 423]. Over the determined coordinates m (P - V)^-1 m is chi-square.
     layout, covariance = calibration.layout, calibration.solution.covariance
     terms = {(term.source.name, term.shared): term for term in layout.terms}
     seats = []

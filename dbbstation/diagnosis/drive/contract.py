@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Scale:
-    """Sizes over all recordings, for comparable amplitudes.
+    """Sizes of signals over all recordings, which make amplitudes comparable.
 
     Attributes:
         mean_m: mean position of compared samples.

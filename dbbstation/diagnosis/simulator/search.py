@@ -147,11 +147,9 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
 
 
 def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str]:
-    """Return members smaller than the slack of other terms at their port.
-
-    Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, because
-    similar effects may cancel.
-    """
+    """Return members smaller than the slack of other terms at their port."""
+    # Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, because
+    # similar effects may cancel.
     every = {one.name: one for one in (*node.inside, *node.outside)}
     members = [every[member.cause.name] for member in settled.best.members]
     channel, bank = settled.channel, settled.bank

@@ -40,8 +40,8 @@ class DriveFriction(ErrorSource):
     """A motor's current balances load and drive friction.
 
     I = k (F - s (F_c + e |F|) - b v - a). The load F is positive if the platform pulls, speed v and direction s if the
-    strut grows. The screw's loss e is 1 / efficiency - 1 against the load and 1 - efficiency with it. a is half the
-    asymmetry of Coulomb friction, or a zero offset of the current.
+    strut grows. The screw's loss e is 1 / efficiency - 1 against the load and 1 - efficiency with it. The offset a is
+    half the asymmetry of Coulomb friction, or a zero offset of the current.
 
     The load follows from stated weights and the centre of gravity at the actual pose. Currents determine only gain
     times weight, so the stated weight is assumed. After a reversal friction changes sign linearly over TURNED_OVER_MM;

@@ -44,7 +44,7 @@ and 22 % with a factor of 1.5, 16, 16 and 16 % with 6."""
 class JointFriction(SourceWithHistory):
     """Friction in a base joint makes its strut pull on the platform, which stretches all six struts.
 
-    A universal joint has two axes. e1 is fixed in the base, level, and perpendicular to the strut at mid-travel; e2 is
+    A universal joint has the axes e1, fixed in the base, level, and perpendicular to the strut at mid-travel, and e2,
     perpendicular to e1 and strut. The moment about an axis is M z, with z from -1 (growing angle) to +1 over a small
     wind-up (stop operator). By virtual work f = M (z_1 dq_1/dp + z_2 dq_2/dp) for platform joint p and angles q.
     Tensions follow from J^T T = [sum f, sum (R P) x f]. Circles show only friction times the machine file's compliance.

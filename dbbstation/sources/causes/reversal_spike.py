@@ -45,7 +45,7 @@ class ReversalSpike(ErrorSource):
 
     d is the travel since the turning point, s the new direction. The position loop reduces the error as exp(-t / T) at
     the time t since then (`_InTime`). For d = A t^2 / 2 this is exp(-sqrt(d / l)) with l = A T^2 / 2, which needs no
-    clock. l changes with the square of the feed, and with the acceleration A at the turning point.
+    clock. The length l changes with the square of the feed, and with the acceleration A at the turning point.
 
     The rise limits the lag to the drive's motion; c = 1 is full sticking. With c = `RISE` the sum of travel and error
     is monotonic and can be compensated. Near a = 0 the error is proportional to a.

@@ -16,11 +16,9 @@ TURNED_MM = 1e-3
 
 
 def since_turning(travel: Floats) -> Floats:
-    """Return each column's signed travel since its last reversal, shape (n, m); zero before the first.
-
-    The turning point is the vertex of the parabola through the extreme row and its neighbours, over the travel of all
-    columns. At corners and straight returns it is the extreme row.
-    """
+    """Return each column's signed travel since its last reversal, shape (n, m); zero before the first."""
+    # The turning point is the vertex of the parabola through the extreme row and its neighbours, over the travel of all
+    # columns. At corners and straight returns it is the extreme row.
     return since_turning_in_time(travel, np.zeros(len(travel)))[0]
 
 

@@ -5,7 +5,7 @@ except in pauses:
 
 g(t) = a (1 - exp(-t / tau)) - b p(t),    tau dp/dt = [1 in a pause, else 0] - p,    p(0) = 0
 
-a is the remaining growth at the session's start, negative if the part only cools. b is the loss in an infinite pause:
+The remaining growth at the session's start is a, negative if the part only cools. The loss in an infinite pause is b:
 zero if the drives stay warm, different from a if the part was warm at the start. This is Newton's law of cooling with
 intermittent heat. A part heated through another one follows two such bodies (`InTwoStages`).
 """

@@ -73,7 +73,7 @@ def main() -> None:
             sys.stderr.write(f"{key}: {columns[key]}\n")
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
-        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5, 2 and 0.3.",
+        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5, 2 and 0.3 ms.",
         "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,

@@ -94,7 +94,7 @@ class Reach:
     distance: Quantity
 
     def __call__(self, point: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the point, or raise with its distance."""
+        """Return the point; raise an error with its distance if it is too far."""
         distance = math.hypot(*point)
         if not self.distance.fits(distance):
             raise PydanticCustomError(
@@ -117,7 +117,7 @@ class Rising:
     span: Quantity
 
     def __call__(self, pair: tuple[float, float]) -> tuple[float, float]:
-        """Return the pair, or raise with its span."""
+        """Return the pair; raise an error with its span if this is implausible."""
         low, high = pair
         if high < low:
             raise PydanticCustomError("falling", "the lower limit must come first", {})

@@ -24,18 +24,18 @@ from pydantic_core import CoreSchema, PydanticCustomError, PydanticKnownError, c
 from dbbstation.facts.serialise import adapter
 
 STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
-"""Of every part of a file: no other types, no unknown keys, finite numbers; the text under a field tells its unit and sign."""
+"""Options of every part of a file: strict types, no unknown keys, finite numbers; the text under a field states unit and sign."""
 
 
 class Record:
-    """Base of dataclasses that are their own schema. A program makes them unchecked; reading a file checks them."""
+    """Base of dataclasses that are their own schema. Reading a file checks them, but constructing them in a program does not."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
         schema = handler(source)
-        # Of itself a strict dataclass takes no mapping; its fields remain strict.
+        # A strict dataclass accepts no mapping by default; its fields remain strict.
         inner: Any = schema["schema"] if schema["type"] == "definitions" else schema
         inner["strict"] = False
         return schema
@@ -99,7 +99,7 @@ Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$"), AfterValidator(_day)
 Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 _null_is_empty = WrapValidator(lambda text, check: "" if text is None else check(text))
 LEFT_OUT_EMPTY = Field(exclude_if=lambda value: not value)
-"""Marks a field whose key is left out where it is empty."""
+"""Marks a field whose key is omitted if it is empty."""
 OrEmpty = Annotated[str, _null_is_empty, LEFT_OUT_EMPTY]
-"""A text that is empty where its key is absent."""
+"""A text that is empty if its key is absent."""
 Sha256OrEmpty = Annotated[Sha256Hex, _null_is_empty, LEFT_OUT_EMPTY]

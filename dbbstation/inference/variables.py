@@ -74,7 +74,7 @@ class Variable:
 
     @property
     def distinct(self) -> int:
-        """Return the number of different values; of other rows than the fitted ones it says nothing."""
+        """Return the number of different values; for rows that were not fitted it has no meaning."""
         return len(np.unique(self.values)) if self.range is None else len(self.values) + MANY
 
     @property

@@ -1,1 +1,1 @@
-"""Laws over columns, which a table, a drive, a port of a simulator and the struts of a hexapod share."""
+"""Laws over columns of tables, drives, simulators' ports and hexapods' struts."""

@@ -130,5 +130,5 @@ MOVING = {
     "direction": "speed",
     "since_reversal_mm": "travel since reversal",
 }
-"""Columns of what moves, and the variables that they stand for. `direction` is +1, -1, or 0 at standstill of a drive;
+"""Columns of a moving drive or strut, with their variables. `direction` is +1, -1, or 0 at standstill of a drive;
 `since_reversal_mm` is infinite before the first reversal. A strut's position is its length."""

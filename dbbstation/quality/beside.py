@@ -49,7 +49,7 @@ class Readings:
 
     @classmethod
     def of(cls, read: Sequence[RunEffects]) -> Readings:
-        """Return these runs as arrays."""
+        """Return the readings of runs as arrays."""
         labels = np.append(np.arange(read[0].off.shape[0] - 3), [LARGER, BESIDE, ELSEWHERE])
         return cls(
             np.array([one.shows(labels) for one in read]),

@@ -1,4 +1,4 @@
-"""A law over columns as an error source: it makes every strut longer or shorter."""
+"""Error sources made of laws over columns, which lengthen or shorten every strut."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 SHAPE_STEP = 1e-4
-"""Half step of the derivative by a nonlinear number, relative to its usual size."""
+"""Half step of the derivative by a nonlinear parameter, relative to its usual size."""
 
 _NEEDS = {
     "t_s": {Need.TIME},
@@ -35,9 +35,9 @@ _VARIES_WITH = {"position": "strut-length", "speed": "strut-speed", "acceleratio
 
 
 def of_struts(law: type[TableSource]) -> type[ErrorSource]:
-    """Return the class of an error source by a law that has the columns of `MOVING`.
+    """Return an error source's class for a law over the columns of `MOVING`.
 
-    The law's effect is in µm of a strut's length; each strut has amplitudes of its own, all share the nonlinear numbers.
+    The law's effect is in µm of a strut's length; struts have separate amplitudes, but common nonlinear parameters.
     """
     needs = getattr(law, "needs", ())
     variable = MOVING[getattr(law, "follows", "") or next(iter(needs), "t_s")]
@@ -95,7 +95,7 @@ class _OfStruts(ErrorSource):
         return np.asarray((more - less) / (2.0 * step[which]))  # type: ignore[operator] # an effect of this class has lengths
 
     def _effects(self, motion: Motion, machine: Machine, shapes: Floats) -> Floats:
-        """Return the effect of unit amplitudes, shape (n, 6, p) [mm]; a number beyond its limits is at the limit."""
+        """Return the effect of unit amplitudes, shape (n, 6, p) [mm]; parameters beyond a limit are set to it."""
         columns = motion.once("moving columns", machine, lambda: moving_columns(motion, machine))
         numbers = {p.name: float(np.clip(value, *p.limits)) for p, value in zip(self._shapes, shapes, strict=True)}
         needed = [{name: columns[name][:, k] for name in self._law.needs} for k in range(STRUTS)]
@@ -103,7 +103,7 @@ class _OfStruts(ErrorSource):
 
 
 def moving_columns(motion: Motion, machine: Machine) -> dict[str, Floats]:
-    """Return the columns of `MOVING` that a motion has, shape (n, 6) each, from the rows so far.
+    """Return a motion's columns of `MOVING`, shape (n, 6) each, computed from earlier rows only.
 
     Rates are backward differences. A strut at rest keeps its last direction.
     """
@@ -130,7 +130,7 @@ def _rate(time_s: Floats, values: Floats) -> Floats:
 
 
 def _held(values: Floats, known: Floats | None = None) -> Floats:
-    """Return values in which an unknown row has the last known one, or the first before it, shape (n, m)."""
+    """Fill unknown rows with the last known value, initially with the first known one, shape (n, m)."""
     there = values != 0.0 if known is None else known
     rows = np.arange(len(values))[:, None]
     last = np.maximum.accumulate(np.where(there, rows, -1), axis=0)

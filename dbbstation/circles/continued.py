@@ -67,11 +67,9 @@ class ContinuedNoise:
         return np.asarray(self.weights @ self.powers)
 
     def drawn(self, rng: np.random.Generator, draws: int) -> Floats:
-        """Return drawn powers, shape (draws, low + 1) [µm²].
-
-        Each draw has one model, and a strength with a flat log prior [scaled inverse chi-square; Gelman et al.,
-        Bayesian Data Analysis, sec. 2.6].
-        """
+        """Return drawn powers, shape (draws, low + 1) [µm²]."""
+        # Each draw has one model, and a strength with a flat log prior [scaled inverse chi-square; Gelman et al.,
+        # Bayesian Data Analysis, sec. 2.6].
         which = rng.choice(len(self.weights), draws, p=self.weights)
         strength = self.freedoms[which] / rng.chisquare(self.freedoms[which])
         return np.asarray(self.powers[which] * strength[:, None])

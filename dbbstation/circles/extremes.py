@@ -51,7 +51,7 @@ SEED = 4
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure without the noise's contribution.
+    """Estimate of a figure, without the widening by noise.
 
     Attributes:
         u_um: standard uncertainty due to noise: the longer half of the 95 % interval over 1.96.

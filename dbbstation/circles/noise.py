@@ -59,14 +59,13 @@ class CircleNoise:
 def noise_of(deviation_um: Floats, phi_deg: Floats, reading_mm: Floats) -> CircleNoise:
     """Return a circle's noise.
 
-    A floor and a first-order process are fitted above 30 undulations per revolution and extrapolated below
-    (`dbbstation.inference.harmonics`), because correlation makes slow figures noisier.
-
     Args:
         deviation_um: in time order, without drift, shape (n,).
         phi_deg: about equally spaced, shape (n,).
         reading_mm: for the reading step, shape (n,).
     """
+    # A floor and a first-order process are fitted above 30 undulations per revolution and extrapolated below
+    # (`dbbstation.inference.harmonics`), because correlation makes slow figures noisier.
     resolution_um = 1e3 * _step_mm(reading_mm)
     if len(deviation_um) < FEWEST_SAMPLES:
         return CircleNoise(float("nan"), float("nan"), resolution_um, 1.0, 1.0)

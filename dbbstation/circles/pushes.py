@@ -48,10 +48,8 @@ class Pushes:
     excess: float = 0.0
 
     def drawn(self, rng: np.random.Generator, draws: int, count: int) -> Floats:
-        """Draw innovations, shape (draws, count); each series has one kind of tails.
-
-        Shorter tails are drawn from the symmetrical beta distribution with excess -6 / (2 a + 3) [Pearson's type II].
-        """
+        """Draw innovations, shape (draws, count); each series has one kind of tails."""
+        # Shorter tails are drawn from the symmetrical beta distribution with excess -6 / (2 a + 3) [Pearson's type II].
         if self.excess < 0.0:
             shape = max(-3.0 / self.excess - 1.5, LEAST_BETA)
             return np.asarray((2.0 * rng.beta(shape, shape, (draws, count)) - 1.0) * np.sqrt(2.0 * shape + 1.0))

@@ -35,7 +35,7 @@ STAGES_APART = 2
 
 @dataclass(frozen=True, eq=False)
 class Effects:
-    """Effects of a source on one run.
+    """A source's effect on one run, with its derivative.
 
     Attributes:
         derivative: of the reading, shape (n, p).

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class CircleBank(Bank):
-    """Existing columns of circles, in white noise."""
+    """A bank of columns that circles already have, in white noise."""
 
     def __init__(self, rows: Channel, circles: CircleChannel, settled: SettledCircles) -> None:
         self.channel, self.patterns, self.laws = rows, {}, {law.name: law for law in rows.laws}

@@ -27,7 +27,7 @@ is outside the other, which decides for very large effects alone."""
 
 
 class Alternatives:
-    """Classes of equivalent causes and ambiguities of a comparison.
+    """Sets of equivalent causes, and of ambiguous causes, in a comparison.
 
     Args:
         form_uncertainty: relative inaccuracy of a member's formula.

@@ -144,7 +144,7 @@ class Bank:
             del self.patterns[name], self._of_patterns[name]
 
     def samples(self, columns: Integers) -> Floats:
-        """Return columns over all rows, shape (n, p)."""
+        """Return unwhitened columns over all rows, shape (n, p)."""
         starts = np.cumsum([0, *(part.shape[1] for part in self._everywhere)])
         found = np.empty((len(self.channel.residual), len(columns)))
         for k, column in enumerate(columns):

@@ -150,11 +150,9 @@ class Coloured:
         return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
 
     def independent_samples(self, stretches: Sequence[slice]) -> float:
-        """Return the effective number of independent squared rows in stretches.
-
-        n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98 (1935)
-        536; Priestley 1981, sec. 5.3.2].
-        """
+        """Return the effective number of independent squared rows in stretches."""
+        # n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98
+        # (1935) 536; Priestley 1981, sec. 5.3.2].
         power = np.exp(
             self.log_power((np.arange(BOUNDS.frequencies, dtype=np.float64) + 0.5) / (2.0 * BOUNDS.frequencies))
             - 2.0 * np.log(self.innovation)

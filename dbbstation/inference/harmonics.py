@@ -170,7 +170,7 @@ AT_ONCE = 16
 
 
 def bands(samples: int) -> tuple[int, int]:
-    """Return the highest harmonics of smooth misfit and of noise."""
+    """Return two harmonics: the highest of smooth misfit, and the highest used for noise."""
     high = min(HIGH, max(samples // SAMPLES_PER_HARMONIC, 2))
     return min(LOW, max(high // 4, 1)), high
 

@@ -90,7 +90,7 @@ class Assigned:
         return others - own
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
-        """Return the finding that a run shows its planned circle, or `undecided` if all runs together cannot decide."""
+        """Return a good finding if all runs together show that a run is its planned circle, else `undecided`."""
         against = self.odds(one) + self._cost
         if against > self._cost - 2.0 * LOG_ODDS_LIMIT:
             return undecided

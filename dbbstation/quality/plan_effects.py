@@ -126,7 +126,7 @@ class RunEffects:
         self._products: dict[int, Floats] = {}
 
     def shows(self, labels: ArrayLike) -> Integers:
-        """Return, for labels, the circles whose effects the run has; the last index means no circle."""
+        """Return each label's circle, whose effects the run then has; the last index means no circle."""
         labels = np.asarray(labels)
         own = np.where(labels == ELSEWHERE, len(self._plan.circles), self.planned)
         return np.where(labels >= 0, labels, own)

@@ -20,11 +20,9 @@ TILTED_DEG = 2.0
 
 
 def gaps(calibration: Calibration) -> tuple[str, ...]:
-    """Return texts on the measurements that would determine lost directions; may be empty.
-
-    The fifteen circles of [CAL Table II] lose only the common height, which raised bars determine. Circles at one
-    height lose three directions; circles in one orientation lose most of the others.
-    """
+    """Return texts on the measurements that would determine lost directions; may be empty."""
+    # The fifteen circles of [CAL Table II] lose only the common height, which raised bars determine. Circles at one
+    # height lose three directions; circles in one orientation lose most of the others.
     lost = len(calibration.directions_lost) + len(calibration.directions_regularised)
     if lost == 0:
         return ()

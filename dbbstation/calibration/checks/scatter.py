@@ -114,11 +114,9 @@ def seats_of(calibration: Calibration) -> list[MountingOffset]:
 
 
 def check_scatter(seats: Sequence[MountingOffset]) -> list[ScatterCheck]:
-    """Compare found and stated scatter by stated size.
-
-    The sum of squares over the true variance is chi-square. Errors of the fitted machine are common to neighbouring
-    balls, which makes the interval slightly too narrow for few balls.
-    """
+    """Compare found and stated scatter by stated size."""
+    # The sum of squares over the true variance is chi-square. Errors of the fitted machine are common to neighbouring
+    # balls, which makes the interval slightly too narrow for few balls.
     groups: dict[float, list[MountingOffset]] = {}
     for seat in seats:
         if seat.stated_mm[0] >= LEAST_STATED_MM:

@@ -182,5 +182,5 @@ def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
 
 
 def with_set_up(follows: Sequence[Followed], sides: Sides, settled: Settled) -> tuple[Followed, ...]:
-    """Return classes; classes equal in all tests are attributed to the set-up."""
+    """Attribute classes that are equal in all tests to the set-up, and return all classes."""
     return tuple(replace(one, where=ALIKE) if alike_in_all(one, sides, settled) else one for one in follows)

@@ -1,7 +1,7 @@
 """Residuals and derivatives of simulations.
 
-Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side]. A
-dose's effect is a hundredth of the residual, or less if both responses disagree.
+Doses h and 2 h give (4 f(h) - f(2h) - 3 f(0)) / 2h, second order [Abramowitz and Stegun, eq. 25.3.4 for one side].
+Doses are chosen for an effect of a hundredth of the residual, or less if both responses disagree.
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ class JointRunout(LinearSource):
     joints has three numbers.
 
     If the strut's end is offset transversely and rotates about the first axis like a crank, dL = f_v d_v + f_h d_h,
-    like a displaced joint. In the base this is `base-joints`. In the platform it needs two more numbers per strut,
-    which tests hardly separate from `platform-joints`.
+    like a displaced joint. In the base, the source `base-joints` covers this effect. In the platform it needs two more
+    numbers per strut, which tests hardly separate from `platform-joints`.
     """
 
     name = "joint-runout"

@@ -114,7 +114,7 @@ class FollowsTemperature(LinearSource):
 
 
 def following_thermometers(sources: Sequence[ErrorSource], motions: Iterable[Motion]) -> tuple[ErrorSource, ...]:
-    """Return sources, with the law by thermometers if all runs have them."""
+    """Replace sources by their laws over thermometers, if all runs have these thermometers."""
     return tuple(_logged(source, motions) or source for source in sources)
 
 

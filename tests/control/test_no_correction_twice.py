@@ -73,7 +73,7 @@ def test_a_source_that_follows_thermometers_is_refused(truth: MachineModel) -> N
     law = known_sources()["thermal-struts"].by_temperature()
     assert law is not None
     under = corrected(truth.machine, (Fitted(law, np.array([11.0])),))
-    with pytest.raises(ModelError, match=r"has the source thermal-struts, which"):
+    with pytest.raises(ModelError, match=r"corrects the source thermal-struts, which"):
         nominal_commands(under, poses(truth.machine, 2, 1), known_sources())
 
 

@@ -89,7 +89,7 @@ def test_statements_that_fit_nothing_are_refused(path):
     for asked in ({"known": {"mass": 1.0}}, {"free": ("mass",)}):
         with pytest.raises(InputError, match="`mass` is no parameter of this table"):
             load_tables([path], TableOptions("measured_mm", "simulated_mm", **asked))
-    with pytest.raises(InputError, match="stated with --known, too"):
+    with pytest.raises(InputError, match="is also stated with --known"):
         load_tables([path], TableOptions("measured_mm", "simulated_mm", known={"stiffness": 1.0}, free=("stiffness",)))
 
 

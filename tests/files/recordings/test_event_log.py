@@ -375,7 +375,7 @@ def test_a_session_that_is_moved_in_mid_run_says_so_and_takes_the_run_when_it_is
         if when == "while it is recorded":
             folder.rename(away)
             journal.sync()
-            with pytest.raises(OutputError, match="was moved or deleted during the measurement; bring it back"):
+            with pytest.raises(OutputError, match="was moved or deleted during the measurement; restore it"):
                 writer.finish_run(journal)
         else:
             writer.finish_run(journal)

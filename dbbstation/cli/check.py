@@ -68,7 +68,7 @@ def check(
     path of every program that `dbbstation program` would write.
 
     The summary of a session ends with its anchor, the hash of the last event of its log. Note the anchor elsewhere, as
-    reports do. With --anchor HASH, at least its first sixteen digits, the command reports later changes.
+    reports do. With --anchor HASH the command reports later changes; sixteen digits of the anchor are enough.
 
     With --instrument, the command states the points per turn at each plan's feeds, and the figures that these points do
     not resolve.

@@ -127,8 +127,8 @@ def reject(folder: _Folder, run: _Run, *, reason: _Reason) -> Answer:
 def take_in(folder: _Folder) -> Answer:
     r"""Add runs to the session's list: sealed recordings in its folder that the list lacks.
 
-    `dbbstation check` names such runs. They may come from a second program that wrote into the folder, or from before
-    the session file was restored. Their state becomes `complete`: accept or reject each run.
+    `dbbstation check` names such runs. A second program may have recorded them, or an old session file may have been
+    restored. Their state becomes `complete`: accept or reject each run.
 
     \b
     Examples:

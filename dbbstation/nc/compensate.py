@@ -194,8 +194,7 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: Floats, lar
     raise StationError(
         f"the model asks for a correction of {shift_mm[worst]:.3f} mm here, more than {largest_mm:g} mm",
         where=toolpath.where(int(pieces.row[worst])),
-        remedy="check that the model is of this machine and its values are right; a machine that is that far off needs "
-        "--largest-correction-mm",
+        remedy="check that the model is of this machine and its values are right; for a machine with such large errors, give --largest-correction-mm",
     )
 
 

@@ -74,7 +74,7 @@ REFUSED = {
     ),
     "a name twice": (
         ("angle_deg,deviation_um,deviation_um\n" + "".join(f"{a:g},{d:g},0\n" for a, d in PAIRS)).encode(),
-        "old.csv:1: the column `deviation_um` stands here more than once",
+        "old.csv:1: the column `deviation_um` appears here more than once",
     ),
     "the same value in every row": (
         ("angle_deg,length_mm\n" + "".join(f"{a:g},150.0\n" for a, _ in PAIRS)).encode(),

@@ -39,7 +39,7 @@ def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
 
 
 def impossible_day(at: datetime) -> str:
-    """Return a run's day with the reason if it is impossible, or an empty text."""
+    """Return the day of a run and why it is impossible; empty if it is possible."""
     if at > datetime.now(UTC) + timedelta(days=1):  # zones differ by up to 26 hours
         return f"{at:%Y-%m-%d}, which is still to come"
     return f"{at:%Y-%m-%d}, before there were ball bars" if at.year < FIRST_BARS else ""

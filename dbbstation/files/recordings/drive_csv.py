@@ -134,7 +134,7 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
     if FORCE not in names and CURRENT not in names:
         faults.append(Problem(file, line, 0, f"neither `{FORCE}` nor `{CURRENT}` is there", shown))
     faults.extend(
-        Problem(file, line, 0, f"the column `{name}` stands here more than once", "remove one")
+        Problem(file, line, 0, f"the column `{name}` appears here more than once", "remove one")
         for name, times in sorted(Counter(names).items())
         if times > 1
     )

@@ -101,7 +101,9 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     near = [k for k in above if k >= first - _NAMES_WITHIN]
     if not near:
         what = "no line above the numbers names the columns"
-        raise InputError.of(path, what, f"write one name per column in a line above them{stated}", line=first + 1)
+        raise InputError.of(
+            path, what, f"write one name per column in a line above the numbers{stated}", line=first + 1
+        )
     # A line of units may stand below the names.
     has_units = len(near) > 1 and all(_UNIT.fullmatch(cell) for cell in rows[near[-1]] if cell)
     names = near[-2] if has_units else near[-1]

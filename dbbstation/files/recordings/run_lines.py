@@ -243,7 +243,7 @@ def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Pr
         unit = columns.COLUMNS[missing].unit
         faults.append(Problem(file, line, 0, f"the column `{missing}` [{unit}] is missing", remedy))
     faults.extend(
-        Problem(file, line, 0, f"the column `{name}` stands here more than once", "remove one")
+        Problem(file, line, 0, f"the column `{name}` appears here more than once", "remove one")
         for name in sorted({name for name in names if names.count(name) > 1})
     )
     if columns.CRC in names and names[-1] != columns.CRC:

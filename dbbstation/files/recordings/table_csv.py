@@ -204,7 +204,7 @@ def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
 
 def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> list[Problem]:
     faults = [
-        Problem(file, line, 0, f"the column `{name}` stands here more than once", "rename one")
+        Problem(file, line, 0, f"the column `{name}` appears here more than once", "rename one")
         for name, times in sorted(Counter(filter(None, names)).items())
         if times > 1
     ]

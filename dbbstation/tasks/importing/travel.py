@@ -159,7 +159,7 @@ def _turn(t_s: Floats, circle: Circle, computed: tuple[str, ...]) -> TravelledPa
     if progress[-1] < LEAST_TURN * FULL_TURN_DEG:
         turn_s = FULL_TURN_DEG / circle.turning_deg_s
         what = f"the times span {t_s[-1] - t_s[0]:.2f} s, a turn takes {turn_s:.2f} s {_at(circle)}"
-        raise UnusableTravelError(what, "set the feed of the plan to the one that was run, check the unit of the times")
+        raise UnusableTravelError(what, "set the plan's feed to the actual feed, or check the unit of the times")
     rows = np.flatnonzero(progress < FULL_TURN_DEG)
     said = f"angles: computed from the times {_at(circle)}, the first sample at {circle.start_deg:g} degrees"
     beyond = len(t_s) - len(rows)

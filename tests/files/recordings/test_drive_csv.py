@@ -53,7 +53,7 @@ def test_a_last_line_that_was_cut_off_costs_that_line_alone():
         ("t_s,pos_mm,force_n\n0,1,2\n", "x.csv:1: the column `position_mm` is missing; is it `pos_mm`?"),
         ("t_s,position_mm,torque\n0,1,2\n", "x.csv:1: neither `force_n` nor `motor_current_a` is there"),
         ("t_s;position_mm;force_n\n0;1;2\n", "commas stand between columns"),
-        (f"{HEADER},force_n\n0,1,2,3\n", "x.csv:1: the column `force_n` stands here more than once"),
+        (f"{HEADER},force_n\n0,1,2,3\n", "x.csv:1: the column `force_n` appears here more than once"),
         (f"{HEADER}\n0,1,2\n0.001,1,5,2\n", "x.csv:3: 4 values in 3 columns"),
         (f"# c\n{HEADER}\n0,1,2\n0.001,nan,2\n", "x.csv:4: position_mm is `nan`, not a finite number"),
         (f"{HEADER}\n0,1,2\n0.001,1,two\n", "x.csv:3: force_n is `two`, not a finite number"),

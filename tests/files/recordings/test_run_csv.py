@@ -83,7 +83,7 @@ def test_unknown_columns_are_kept_and_named() -> None:
         (HEADER + "t_s,length_mm\n", ["a.csv:4: there are no samples below this line"]),
         ("0.0,150.1\n", ["a.csv:1: the column `length_mm` [mm] is missing", "a.csv:1: the column `t_s` [s] is missing"]),
         ("t_s,length_um\n0,1\n", ["a.csv:1: the column `length_mm` [mm] is missing; is it `length_um`?"]),
-        ("t_s,length_mm,t_s\n0,1,0\n", ["a.csv:1: the column `t_s` stands here more than once"]),
+        ("t_s,length_mm,t_s\n0,1,0\n", ["a.csv:1: the column `t_s` appears here more than once"]),
         ("t_s,crc,length_mm\n0,1,0\n", ["a.csv:1: the column `crc` must be the last"]),
         (GOOD.replace("150.2", "nan"), ["a.csv:6: length_mm is `nan`, not a finite number"]),
         (GOOD.replace("150.2", "-inf"), ["a.csv:6: length_mm is `-inf`, not a finite number"]),

@@ -51,7 +51,7 @@ def test_a_cell_that_a_spreadsheet_could_not_compute_is_an_empty_one():
         ("measured,simulated\n", "x.csv:1: there are no rows below this line"),
         ("measurd,simulated\n1,2\n", "x.csv:1: there is no column `measured`; did you mean `measurd`?"),
         ("a,simulated\n1,2\n", "x.csv:1: there is no column `measured`; columns here: a, simulated"),
-        ("measured,simulated,simulated\n1,2,3\n", "x.csv:1: the column `simulated` stands here more than once"),
+        ("measured,simulated,simulated\n1,2,3\n", "x.csv:1: the column `simulated` appears here more than once"),
         ("measured,,simulated\n1,2,3\n", "x.csv:1: column 2 has no name"),
         ("measured,simulated\n1,2\n1,2,3\n", "x.csv:3: 3 values in 2 columns"),
     ],

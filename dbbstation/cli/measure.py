@@ -199,12 +199,12 @@ class VirtualHands:
         self._client = ControlClient(url)
 
     def standing(self) -> str | None:
-        """Return the name of the ball that stands on the virtual table."""
+        """Return the name of the ball on the virtual table."""
         ball = self._client.ask("status").get("ball")
         return None if ball is None else str(ball)
 
     def stands_since_s(self) -> float:
-        """Return the machine time since which it stands [s]; minus infinity if it does not wait."""
+        """Return the machine time at which it stopped to wait [s]; minus infinity if it never waits."""
         return float(str(self._client.ask("status").get("stands_since_s", -math.inf)))
 
     def mount(self, test: str) -> None:

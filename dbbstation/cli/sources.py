@@ -1,4 +1,4 @@
-"""`dbbstation sources`: the causes that are known, and what each says of itself."""
+"""`dbbstation sources`: the known causes and their descriptions."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ _STREAMS = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))
 
 
 def open_missing() -> None:
-    """Open missing streams onto nothing, lest later files take their place."""
+    """Open missing streams on the null device, so that no later file replaces them."""
     for number, (name, mode) in enumerate(_STREAMS):
         try:
             os.fstat(number)

@@ -100,7 +100,7 @@ def write_folder(
     own: bool = False,
     read_only: Callable[[str], bool] = lambda _name: False,
 ) -> None:
-    """Write all or none of several files into a folder, which is made if missing.
+    """Write several files into a folder, all or none; a missing folder is made.
 
     Args:
         files: content by path; a path that ends with a slash is an empty folder.

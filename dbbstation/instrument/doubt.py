@@ -3,8 +3,8 @@
 A device writes all numbers in one form: unit, decimals, and digits before the point as needed or zero-padded. A lost or
 inserted digit, a moved point or another unit changes this form. Two changes of form are genuine:
 
-- A number passes a power of ten. A digit lost before the point takes at least 0.8 of 10^d from a number of d + 1 digits,
-  which is at least 10^d; an inserted digit adds as much. So a step below half of 10^d is genuine.
+- A number passes a power of ten. A number of d + 1 digits is at least 10^d. A digit lost before the point reduces it by
+at least 0.8 of 10^d; an inserted digit adds as much. So a step below half of 10^d is genuine.
 - The device was set to another form. All following lines then have the new form. If one line in a thousand is damaged, three in a
   row occur once in 10^9 lines (two years at 14 lines a second), so the third is accepted.
 """

@@ -109,7 +109,7 @@ class Ask(Schema):
 
     @property
     def asked(self) -> bool:
-        """Whether each reading is asked for."""
+        """Return whether each reading is requested."""
         return self.mode != "stream"
 
 

@@ -78,7 +78,7 @@ class _Decoding:
                 yield Replayed(chunk.t_s, heard.raw, None, "joined in the middle" if heard.joining else heard.why)
 
     def ended(self) -> Iterator[Replayed]:
-        """Return the rest at the end of the log."""
+        """Return the pending bytes at the end of the log."""
         for one in self._sequence.left():
             yield Replayed(one.sample[1], one.sample[0].raw, None, one.why)
         yield from self._unfinished("the log ends within it")

@@ -36,7 +36,7 @@ BAR_OFF = "stop recording, take the bar off, then continue"
 
 @dataclass(frozen=True)
 class Approach:
-    """Where the machine reaches the first point and leaves the last.
+    """Rapids to the first point and from the last one.
 
     Attributes:
         clear_mm: height of rapids above these points, clear of ball, holder and bar [mm].

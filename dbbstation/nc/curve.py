@@ -145,7 +145,7 @@ def felt_mm(off: Floats) -> Floats:
 
 
 def rounding_mm(decimals: Sequence[int]) -> float:
-    """Return the largest effect of rounding X to C to these decimals, at the tip or the lever [mm]."""
+    """Return the largest motion at the tip or the lever if all six axes are rounded to these decimals [mm]."""
     return float(felt_mm(0.5 / 10.0 ** np.array([decimals]))[0])
 
 

@@ -66,7 +66,7 @@ class HeldLine:
         self._thread.start()
 
     def is_of(self, protocol: Protocol, port: str, baud: int | None) -> bool:
-        """Return whether the held instrument is this one at this port."""
+        """Return whether the held instrument has this protocol, port and baud rate."""
         return (protocol, port, baud) == (self.protocol, self._port, self._baud)
 
     @contextmanager

@@ -44,7 +44,7 @@ class _Marked(logging.Formatter):
 
 
 def main() -> None:
-    """Do the job on standard input and exit with a code."""
+    """Read a job from standard input, do it, and exit with a code."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Marked())
     logging.basicConfig(level=logging.INFO, handlers=[handler])

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Task:
-    """One run that the plan asks for.
+    """One run that the plan requires.
 
     Attributes:
         occurrence: 1, or 2 if the plan repeats the test at its end.

@@ -107,7 +107,7 @@ class Storage:
         )
 
     def sync_if_due(self) -> None:
-        """Write data to the disk that has waited for a second, also without new readings.
+        """Write all data to the disk once it has waited for a second, even without new readings.
 
         Raises:
             OutputError: the disk refuses.

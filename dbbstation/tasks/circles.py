@@ -51,8 +51,8 @@ def circles(
     \b
     polar      deviation from the least-squares circle, rings one division apart
     deviation  the same over the angle
-    spectrum   amplitude by undulations per revolution, beside what noise alone would show
-    map        centres of the circles where their balls stand
+    spectrum   amplitude by undulations per revolution, beside the amplitude of noise alone
+    map        centres of the circles at the positions of their balls
     compare    the same tests in two sessions or more, to one scale
 
     \b

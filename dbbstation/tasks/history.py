@@ -38,9 +38,9 @@ def history(
 ) -> HistoryResult:
     r"""Show the figures of a folder of sessions over time, machine by machine, and changes beyond uncertainty.
 
-    The figures are G, centre X and Y, mean radial error R and centre distance C of every test and direction. Parameters
-    are added of each model in the folder that was fitted to one of its sessions. Limits come from the shop's settings.
-    A two-sided CUSUM watches each quantity from its second session on, with a further limit for single sessions.
+    The figures are G, centre X and Y, mean radial error R and centre distance C of every test and direction. Models in
+    the folder add their parameters, if they were fitted to its sessions. Limits come from the shop's settings. A
+    two-sided CUSUM watches each quantity from its second session on, with a further limit for single sessions.
     --false-alarms is the probability per session, over all quantities of a machine together. No model is fitted. An
     index in the user's cache folder keeps the results.
 

@@ -22,7 +22,7 @@ _KEY = 8
 
 
 class HelpScreen(ModalScreen[None]):
-    """Screen over the screen that it explains."""
+    """Help, drawn over the screen that it explains."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
 

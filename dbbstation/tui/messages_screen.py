@@ -45,7 +45,7 @@ def _line(message: Message, width: int) -> Content:
 
 
 class MessagesScreen(ModalScreen[None]):
-    """Screen over the screen whose messages it shows."""
+    """All messages, drawn over the screen that they belong to."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,j,q", "dismiss", "Close")]
 

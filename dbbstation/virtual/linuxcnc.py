@@ -4,9 +4,9 @@ This needs the Debian packages `linuxcnc-uspace` and, for a kinematics, `linuxcn
 as root. If root calls this module, it starts LinuxCNC as the user who called sudo, else as the user `nobody`.
 
 LinuxCNC runs in real time. `faster` speeds up its clock: the servo period and all times are divided by it, speeds are
-multiplied by it, and accelerations by its square. So every servo cycle computes the same distance per cycle and the
-same change of it. Samples have the times of the usual clock. The interpreter does not use this clock. If the
-interpreter falls behind the planner, the program runs again with a slower clock.
+multiplied by it, and accelerations by its square. So the distance and its change in a servo cycle stay the same.
+Samples have the times of the usual clock. The interpreter does not use this clock. If the interpreter falls behind the
+planner, the program runs again with a slower clock.
 """
 
 from __future__ import annotations

@@ -255,7 +255,7 @@ class Note(Record):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SessionDetails(Record):
-    """What a session notes beside its runs."""
+    """Facts that a session notes in addition to its runs."""
 
     serial_number: str = ""
     """Of the machine."""

@@ -54,7 +54,7 @@ class LimitSettings(Schema):
 
 
 class NumberSettings(Schema):
-    """How numbers are written in tables from elsewhere."""
+    """Number format of tables from other programs."""
 
     decimal: Literal[".", ","] | None = None
     """Decimal sign."""
@@ -107,7 +107,7 @@ class ToleranceSettings(Schema):
 
 
 class ReportSettings(Schema):
-    """What stands at the head of reports."""
+    """Head of reports."""
 
     laboratory: _Word | None = None
     """Name and address of the measuring laboratory."""
@@ -139,14 +139,14 @@ class SettingsFile(Schema):
     limits: LimitSettings = LimitSettings()
     """What is refused."""
     numbers: NumberSettings | None = None
-    """How numbers are written in tables from elsewhere."""
+    """Number format of tables from other programs."""
     simulators: tuple[Annotated[str, Field(pattern="^[0-9a-f]{64}$")], ...] | None = None
     """Simulators that `mismatch` may run, by the SHA-256 that it prints; ignored in a file beside sessions, which
     others may write."""
     tolerances: tuple[ToleranceSettings, ...] | None = None
     """Tolerances of circles."""
     report: ReportSettings = ReportSettings()
-    """What stands at the head of reports."""
+    """Head of reports."""
 
     @model_validator(mode="after")
     def _profile_of_something(self) -> "SettingsFile":

@@ -61,6 +61,13 @@ def test_pieces_keep_the_tolerance_and_are_nearly_as_few_as_any_cut_allows(seed)
     assert len(pieces) <= fewest + 1
 
 
+def test_straight_moves_of_a_machine_without_errors_are_written_as_they_are(linuxcnc, reference):
+    """Of one, two and three cells, and one that is too short to bend; the last turns back, so that it is no run with the others."""
+    path = linuxcnc.read("G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X80 F600\nX80.4\nX-39.6\nY20\nM2\n", "lines.ngc")
+    done = compensate_toolpath(path, MachineModel(reference), chord_mm=0.001)
+    np.testing.assert_allclose(done.toolpath.poses[done.toolpath.is_move], path.poses[path.is_move], atol=1e-6)
+
+
 @pytest.mark.parametrize("chord_um", [0.01, 0.1, 1.0, 10.0])
 def test_the_chord_error_is_that_of_arc_and_compensation_together(linuxcnc, reference, chord_um):
     """Without errors of the machine the chord of an arc remains: L = sqrt(8 r c), at most a sixth shorter."""

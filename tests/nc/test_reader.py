@@ -42,6 +42,38 @@ def test_a_turn_without_a_way_takes_its_feed_in_degrees():
     np.testing.assert_allclose(path.duration_s[1:], [5.0, 60.0])
 
 
+def test_polar_coordinates_in_inches():
+    turned, longer = ends("G20\nG1 @2 ^30 F10\n^120\nG91 @1\n")[-2:, :2] / 25.4
+    np.testing.assert_allclose(ends("G20\nG1 @2 ^30 F10")[-1, :2] / 25.4, [3.0**0.5, 1.0])
+    np.testing.assert_allclose([turned, longer / 1.5], [[-1.0, 3.0**0.5]] * 2)
+
+
+def test_line_numbers_have_eight_digits():
+    np.testing.assert_array_equal(ends("N99999999 G0 X1")[-1, 0], 1.0)
+
+
+@pytest.mark.parametrize("end", ["\r", "\r\n"])
+def test_lines_end_as_on_other_systems(end):
+    text = FIRST + "G1 X10 F600\nY5 ; up\nX0\nM2\n"
+    path = read_program(text.replace("\n", end), "part.ngc")
+    np.testing.assert_array_equal(path.poses, read_program(text, "part.ngc").poses)
+    np.testing.assert_array_equal(path.line[path.is_move], [2, 3, 4, 5])
+
+
+def test_a_message_shows_values_of_numbered_and_named_parameters():
+    path = read_program(f"{FIRST}#5=1.5\n#<depth>=-2\n(DEBUG, #5 to #<depth>, not #77)\nM2\n", "part.ngc")
+    assert path.text == {1: "DEBUG, 1.500000 to -2.000000, not #77"}
+
+
+def test_the_radius_of_a_tool_set_in_inches_is_kept_in_millimetres():
+    assert read_program(f"{FIRST}G20\nG10 L1 P1 R2\nG1 X1 F10\nM2\n", "part.ngc").text[1] == "G10 L1 P1 R50.8"
+
+
+def test_the_smallest_tilt_under_tool_centre_control_is_refused():
+    with pytest.raises(InputError, match=r"part\.ngc:5:4: A or B turns under G43\.4"):
+        read_program(f"{FIRST}G10 L1 P1 Z1\nG43.4 H1\nG1 A0.5 F100\nM2\n", "part.ngc")
+
+
 def test_comments_pauses_functions_and_the_end():
     path = read_program("%\n" + FIRST + "(one) ; two\nS1200 M3\n(MSG, look)\nM0\nM1\nM2\nrubbish\n%\n", "part.ngc")
     assert [path.text.get(row, "") for row in range(1, len(path))] == ["one", "two", "S1200 M3", "look", ""]
@@ -113,6 +145,7 @@ def test_a_helix_moves_the_other_axes_evenly():
         ("G53 G2 X5 R5 F100", 1, "G53 is allowed only with G0 or G1"),
         ("G20 F10 G1 X1", 5, "counts in the units before it on some controls"),
         ("G90.1 G2 X5 I2.5 F10", 10, "both I and J"),
+        ("N100000000 G0 X1", 1, "the number after N"),
     ],
 )
 def test_a_fault_names_line_and_column(line, column, says):

@@ -12,7 +12,8 @@ from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.sources.contract import Fitted, Setup
+from dbbstation.quality.knowledge import LOCAL_COEFFICIENTS
+from dbbstation.sources.contract import Effect, Fitted, LinearSource, Need, Owner, Parameter, Setup, Texts
 from dbbstation.sources.registry import known_sources
 from dbbstation.trace.circle import RawCircle
 
@@ -70,6 +71,30 @@ def test_a_shifted_machine_has_a_first_harmonic_counted_from_the_start(reference
     across = dy_um * np.cos(start) - dx_um * np.sin(start)
     expected = np.array([0.0, along, 0.0, 0.0, across, 0.0, 0.0]) / np.sqrt(2.0)
     assert expected_circle(observed(0.0, Direction.CCW), model, []).form_um == pytest.approx(expected, abs=0.05)
+
+
+class Lobed(LinearSource):
+    """A bar that reads a wave of five undulations too long, along a way only."""
+
+    name = "lobed"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.POSE, Need.PATH})
+    texts = Texts("", "", "", "", "", "")
+
+    def parameters(self, machine):  # noqa: ARG002
+        return (Parameter("size_mm", "mm", 0.004, ""),)
+
+    def derivative(self, motion, machine, values):  # noqa: ARG002
+        x, y = (motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]).T
+        return Effect(reading_mm=np.cos(5.0 * np.arctan2(y, x))[:, None])
+
+
+def test_a_cause_along_the_way_has_its_undulations_in_micrometres(reference) -> None:
+    """4 µm times cos(5 theta), over sqrt(2) cos(5 theta): the sixth of the coefficients, behind the mean."""
+    expected = expected_circle(observed(0.0, Direction.CCW), MachineModel(reference), [Lobed()])
+    wave = np.zeros((LOCAL_COEFFICIENTS, 1))
+    wave[5] = 4.0 / np.sqrt(2.0)
+    assert expected.local_um["lobed", ""] == pytest.approx(wave, abs=1e-6)
 
 
 @pytest.mark.parametrize("elevation_deg", [0.0, 50.0])

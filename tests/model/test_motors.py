@@ -13,7 +13,7 @@ from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.motors import motor_currents
 from dbbstation.model.uncertainty import position_uncertainty_mm
-from dbbstation.sources.contract import Fitted, Motion
+from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.columns import currents
 from tests.sources.runs import random_machine, random_run, run
@@ -63,6 +63,29 @@ def test_currents_answer_to_weights_and_drives(machine, rng, name, step):
         scale = np.abs(exact[:, :, k]).max()
         assert np.median(np.abs(numeric - exact[:, :, k])) < 2e-3 * scale
         assert np.quantile(np.abs(numeric - exact[:, :, k]), 0.95) < 1e-2 * scale
+
+
+class Offset(LinearSource):
+    """Amplifiers that read a current which is none."""
+
+    name = "offset"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.CURRENT})
+    texts = Texts("", "", "", "", "", "")
+
+    def parameters(self, machine):  # noqa: ARG002
+        return (Parameter("offset_a", "A", 0.1, ""),)
+
+    def derivative(self, motion, machine, values):  # noqa: ARG002
+        return Effect(current_a=np.ones((len(motion), 6, 1)))
+
+
+def test_currents_that_no_load_changes_answer_to_no_weight(machine, rng):
+    motion = random_run(rng, 80)
+    weight = Fitted(sources_named(["cog-shift"])[0], np.array([4.0, -7.0, 15.0]))
+    currents_of = motor_currents(MachineModel(machine, (weight, Fitted(Offset(), np.array([0.2])))), motion)
+    np.testing.assert_array_equal(np.unique(currents_of.current_a), [0.2])
+    np.testing.assert_array_equal(currents_of.by_parameters(weight), np.zeros((*currents_of.current_a.shape, 3)))
 
 
 @pytest.mark.parametrize(("name", "step"), [("gravity", 1e-3), ("cog-shift", 1e-2), ("strut-weight", 1e-2)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from dbbstation.quality.limits import (
     length_quantile,
     quantile,
     scale_of,
+    scaled_length_quantile,
 )
 from tests.cli.conftest import call
 from tests.quality.sessions import calibrated, finding_of, read, sound
@@ -132,6 +134,12 @@ def test_the_probability_is_shared_out():
     assert quantile(np.inf, 1e-4) == pytest.approx(3.8906, abs=1e-4)
     assert quantile(4, 0.05) == pytest.approx(2.776, abs=1e-3)
     assert length_quantile(2) == pytest.approx(np.sqrt(-2.0 * np.log(SHARE)))
+    # Of one freedom it is the normal distribution; less than one counts as one.
+    assert (
+        scaled_length_quantile(0.5)
+        == scaled_length_quantile(1.0)
+        == pytest.approx(NormalDist().inv_cdf(1.0 - 0.5 * SHARE))
+    )
 
 
 def test_scatter_is_known_whatever_one_of_thirty_does():

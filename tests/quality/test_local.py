@@ -98,3 +98,15 @@ def test_a_drift_of_both_is_no_place():
     assert local_difference(there, Others(opposite=back)).verdict is FindingVerdict.GOOD  # type: ignore[arg-type]
     bumped = run(1.0, Direction.CCW, more_um=60.0)
     assert local_difference(bumped, Others(opposite=back)).verdict is FindingVerdict.WRONG  # type: ignore[arg-type]
+
+
+def test_shift_length_and_ovality_move_no_place():
+    """Of a bump of all undulations, those by 3 to 29 count: each adds twice its size at the top, where they agree."""
+    raw, top = np.radians(np.arange(0.0, 360.0, 0.5)), local_columns(np.radians([200.0]))[0]
+    analysis = SimpleNamespace(closure=None, noise=SimpleNamespace(known=True, sigma_um=1e-3), raw=raw)
+    label = SimpleNamespace(circle=SimpleNamespace(direction=Direction.CCW), label="x", expected=None)
+    one, other = (
+        SimpleNamespace(run=label, analysis=analysis, local_um=um, u_um=1e-3) for um in (0.1 * top, 0.0 * top + 1e-9)
+    )
+    found = local_difference(one, Others(opposite=other))  # type: ignore[arg-type]
+    assert found.short == f"the path is {0.1 * 2.0 * 27:+.1f} µm from run x at 200 degrees"

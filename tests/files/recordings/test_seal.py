@@ -146,10 +146,16 @@ def test_a_run_that_was_taken_out_is_told(folder, index):
     _, runs = run_lines(folder)
     with_runs(folder, runs[:index] + runs[index + 1 :])
     text = told(folder)
-    assert "the list of runs lacks 1 of 6 sealed runs" in text
+    assert "the list of runs lacks 1 of 6 sealed runs: it was taken out" in text
     if index < 5:
         following = read_label(runs[index + 1])
         assert f"run {following} was sealed after a run that is not in the list any more" in text
+
+
+def test_two_runs_that_were_taken_out_are_told(folder):
+    _, runs = run_lines(folder)
+    with_runs(folder, runs[2:])
+    assert "the list of runs lacks 2 of 6 sealed runs: they were taken out" in told(folder)
 
 
 def read_label(line: str) -> str:

@@ -50,6 +50,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, str]:
         (b"format: dbb-plan/1\npath:\n\tradius_mm: 150\n", ":3:1: a tab is used for indentation"),
         (b"format: dbb-plan/1\nname: [1, 2\n", ":3:1: not YAML"),
         (b"format: dbb-plan/1\nname: 'x\n", ":3:1: not YAML"),
+        (b"%YAML 1." + 5000 * b"1" + b"\n---\nformat: dbb-plan/1\n", ":1:1: not YAML"),
         (b"format: dbb-plan/1\n---\nname: x\n", ":2:1: a second document starts here"),
         (b"format: dbb-plan/1\nname: x\nname: y\n", ":3:1: the key `name` stands here a second time, first in line 2"),
         (b"format: dbb-plan/1\nname: \x01\n", ":2:7: character 0x01 is not allowed"),

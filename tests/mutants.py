@@ -271,7 +271,7 @@ def put_calls(mutants: list[Mutant], workplace: Path) -> set[int]:
 def read_notes(path: Path) -> Notes:
     """Tests that passed, each with its places; what ran while a fixture is made counts for all tests of the file."""
     notes, ran, failed = Notes(), [], set()
-    for kind, *cells in (line.split("\t") for line in path.read_text().splitlines()):
+    for kind, *cells in (line.split("\t") for line in path.read_text(encoding="utf-8").splitlines()):
         if kind == "ran":
             ran.append(cells)
         elif kind == "killed":
@@ -420,7 +420,7 @@ def show(mutants: list[Mutant], out: Path, with_calls: Path, workplace: Path) ->
     if not path.exists():
         _run_tests([*every, "-n", "2", "--max-worker-restart=0"], with_calls, 36000, {NOTES: str(path.resolve())})
     if not out.exists():
-        out.write_text(",".join(FIELDS) + "\n")
+        out.write_text(",".join(FIELDS) + "\n", encoding="utf-8")
     notes = read_notes(path)
     write(mutants, notes, out)
     known = {_key(row) for row in _rows(out)}
@@ -440,7 +440,7 @@ def show(mutants: list[Mutant], out: Path, with_calls: Path, workplace: Path) ->
 def write(mutants: list[Mutant], notes: Notes, out: Path) -> None:
     """Put rows of mutants that were shown into the table."""
     known = {_key(row) for row in _rows(out)}
-    with out.open("a", newline="") as file:
+    with out.open("a", encoding="utf-8", newline="") as file:
         for number, (tests, took_s) in sorted(notes.shown.items()):
             one = mutants[number]
             if one.key not in known:
@@ -449,7 +449,7 @@ def write(mutants: list[Mutant], notes: Notes, out: Path) -> None:
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
+    with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 

@@ -46,7 +46,7 @@ def pytest_runtestloop(session) -> bool | None:
     if PLAN not in os.environ:
         return None
     of_id = {item.nodeid: item for item in session.items}
-    for number, tests in json.loads(Path(os.environ[PLAN]).read_text()):
+    for number, tests in json.loads(Path(os.environ[PLAN]).read_text(encoding="utf-8")):
         began = time.monotonic()
         child = os.fork()
         if child == 0:

@@ -177,7 +177,7 @@ def _known(parameters: Sequence[SimulatorParameter], count: int) -> tuple[Floats
     known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
     rows = np.zeros((len(known), max(count, len(parameters))))
     for row, (k, p) in enumerate(known):
-        rows[row, k] = 1.0 / p.uncertainty  # type: ignore[operator] # without bounds: omitted
+        rows[row, k] = 1.0 / p.uncertainty  # type: ignore[operator]  # those without are omitted
     return rows, np.array([p.value / p.uncertainty for _, p in known])  # type: ignore[operator]  # the same
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,9 +24,11 @@ from dbbstation.nc.splitting import (
     runs_of,
     split,
 )
-from dbbstation.nc.toolpath import RowKind, rounded
+from dbbstation.nc.toolpath import RowKind, joined, rounded
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
@@ -75,9 +77,31 @@ class Compensation:
     slowest_mm_min: float
     slowest_line: int
 
+    @classmethod
+    def together(cls, parts: Sequence[Compensation], toolpath: Toolpath) -> Compensation:
+        """Return the figures of successive parts as the figures of one toolpath."""
+        farthest, slowest = max(parts, key=lambda part: part.chord_um), min(parts, key=lambda part: part.slowest_mm_min)
+        return cls(
+            toolpath,
+            max(part.greatest_um for part in parts),
+            farthest.chord_um,
+            farthest.chord_line,
+            max(part.tilt_um for part in parts),
+            sum(part.seconds for part in parts),
+            sum(part.nominal_seconds for part in parts),
+            slowest.slowest_mm_min,
+            slowest.slowest_line,
+        )
+
 
 @with_one_thread
-def compensate_toolpath(
+def compensate_toolpath(toolpath: Toolpath, model: MachineModel, **how: Any) -> Compensation:  # noqa: ANN401 - as below
+    """Return `compensated_parts` as one toolpath."""
+    parts = list(compensated_parts(toolpath, model, **how))
+    return Compensation.together(parts, joined([part.toolpath for part in parts]))
+
+
+def compensated_parts(
     toolpath: Toolpath,
     model: MachineModel,
     *,
@@ -87,8 +111,8 @@ def compensate_toolpath(
     largest_mm: float = LARGEST_CORRECTION_MM,
     planner: Planner = LOOKS_AHEAD,
     prefer: Prefer = Prefer.ACCURACY,
-) -> Compensation:
-    """Return the toolpath that moves the actual machine along the given one.
+) -> Iterator[Compensation]:
+    """Yield, part by part, the toolpath that moves the actual machine along the given one.
 
     Args:
         model: calibrated; only sources of the machine are inverted.
@@ -102,47 +126,38 @@ def compensate_toolpath(
         StationError: a correction is larger than that, or the path has too many pieces.
         ModelError: a source needs what a program does not give, such as temperatures, or the time where it is None.
     """
-    needed_mm = _needed_mm(toolpath, planner)
-    runs = moves_of(toolpath) if chord_mm is None else runs_of(toolpath, needed_mm)
-    whole = np.zeros(len(toolpath), dtype=np.bool_)
-    if keep_arcs and toolpath.arc is not None:
-        whole = toolpath.arc[:, 2] != 0.0
     before: SpanBehind | None = None
-    tilt_left_mm = 0.0
-    parts = []
-    for rows in parts_of(toolpath, runs):
-        path = toolpath.part(rows)
-        begins_s = (
-            None if started_s is None else started_s + float(toolpath.end_s[rows.start - 1] if rows.start else 0.0)
-        )
-        curve = CommandCurve(path, model, begins_s, hold_tilt=prefer is Prefer.POSITION_ONLY, before=before)
-        pieces, commanded, off_mm = _commanded(curve, model, chord_mm, runs[rows], whole[rows])
+    commanded_before = toolpath.start
+
+    def runs_in(part: Toolpath) -> Integers:
+        return moves_of(part) if chord_mm is None else runs_of(part, _needed_mm(part, planner))
+
+    for path, runs in parts_of(toolpath, runs_in):
+        whole = keep_arcs & (path.rows["arc_number"] != 0)
+        curve = CommandCurve(path, model, started_s, hold_tilt=prefer is Prefer.POSITION_ONLY, before=before)
+        pieces, commanded, off_mm = _commanded(curve, model, chord_mm, runs, whole)
         shift_mm = felt_mm(commanded - path.between(*row_and_share(pieces.end)))
         _check_corrections(path, pieces, shift_mm, largest_mm)
         off_mm = np.where(path.kind[pieces.row] == RowKind.FEED, off_mm, 0.0)
-        parts.append(_Part(pieces.begin + rows.start, pieces.end + rows.start, commanded, shift_mm, off_mm))
-        before, tilt_left_mm = curve.behind, max(tilt_left_mm, curve.tilt_left_mm)
-    begin, end, commanded, shift_mm, off_mm = (np.concatenate(each) for each in zip(*parts, strict=True))
-    pieces = Pieces(begin, end)
-    corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
-    written = _written(toolpath, pieces)
-    done = _assembled(toolpath, pieces, written, commanded, runs, model.machine, corner_mm)
-    worst = int(np.argmax(off_mm)) if len(off_mm) else 0
-    too_short = planner.row_mm_s(done) * 60.0
-    too_short = np.where(too_short < (1.0 - FEED_KEPT) * done.feed, too_short, np.inf)
-    at_slowest = int(np.argmin(too_short)) if len(done) else 0
-    slowest = float(too_short.min(initial=np.inf))
-    return Compensation(
-        toolpath=done,
-        greatest_um=1e3 * float(shift_mm.max(initial=0.0)),
-        chord_um=1e3 * float(off_mm.max(initial=0.0)),
-        chord_line=int(toolpath.line[pieces.row[worst]]) if len(off_mm) else 0,
-        tilt_um=1e3 * tilt_left_mm,
-        seconds=planner.seconds(done),
-        nominal_seconds=planner.seconds(toolpath),
-        slowest_mm_min=slowest,
-        slowest_line=int(done.line[at_slowest]) if np.isfinite(slowest) else 0,
-    )
+        corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
+        done = _assembled(path, pieces, commanded, runs, model.machine, corner_mm, commanded_before)
+        worst = int(np.argmax(off_mm)) if len(off_mm) else 0
+        too_short = planner.row_mm_s(done) * 60.0
+        too_short = np.where(too_short < (1.0 - FEED_KEPT) * done.feed, too_short, np.inf)
+        slowest = float(too_short.min(initial=np.inf))
+        yield Compensation(
+            toolpath=done,
+            greatest_um=1e3 * float(shift_mm.max(initial=0.0)),
+            chord_um=1e3 * float(off_mm.max(initial=0.0)),
+            chord_line=int(path.line[pieces.row[worst]]) if len(off_mm) else 0,
+            tilt_um=1e3 * curve.tilt_left_mm,
+            seconds=planner.seconds(done),
+            nominal_seconds=planner.seconds(path),
+            slowest_mm_min=slowest,
+            slowest_line=int(done.line[int(np.argmin(too_short))]) if np.isfinite(slowest) else 0,
+        )
+        before, commanded_before = curve.behind, done.poses[-1] if len(done) else commanded_before
+        started_s = None if started_s is None else started_s + float(path.duration_s.sum())
 
 
 def _commanded(
@@ -170,23 +185,6 @@ def _commanded(
     return pieces, ends[:, 1], off_mm
 
 
-class _Part(NamedTuple):
-    """Commands along some rows of a toolpath.
-
-    Attributes:
-        begin: of each piece, as `Pieces`.
-        commanded: pose at the end of each, shape (k, 6) [mm, deg].
-        shift_mm: correction there, shape (k,) [mm].
-        off_mm: distance of the curve from pieces at feed, at `DENSELY` places, shape (k,).
-    """
-
-    begin: Floats
-    end: Floats
-    commanded: Floats
-    shift_mm: Floats
-    off_mm: Floats
-
-
 def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: Floats, largest_mm: float) -> None:
     if shift_mm.max(initial=0.0) <= largest_mm:
         return
@@ -206,33 +204,28 @@ def _needed_mm(toolpath: Toolpath, planner: Planner) -> Floats:
 def _assembled(
     toolpath: Toolpath,
     pieces: Pieces,
-    written: Flags,
     commanded: Floats,
     runs: Integers,
     machine: Machine,
     corner_mm: float,
+    start: Floats | None,
 ) -> Toolpath:
     row = pieces.row
     of = runs[row]
     begin_mm, begin_s = _until(toolpath, pieces.begin)
     end_mm, end_s = _until(toolpath, pieces.end)
-    bare = toolpath.divided(row[written], rounded(commanded[written]))
+    # Rapids stay one move.
+    written = np.append(row[1:] != row[:-1], True)[: len(row)] | (toolpath.kind[row] == RowKind.FEED)
+    bare = replace(toolpath.divided(row[written], rounded(commanded[written])), start=start)
     inner = np.append(of[1:] == of[:-1], False)[: len(row)][written]
-    bare = replace(bare, corners_mm=np.where(inner, np.fmax(bare.corners_mm, corner_mm), bare.corners_mm))
     feed = _feeds(bare, toolpath.feed[row[written]], (end_mm - begin_mm)[written], (end_s - begin_s)[written])
     # A wanted move that takes no time at all, as a turn with a few nanometres of way, has no such feed: the machine's own
     # limits are what slows it down, whatever F says.
-    return replace(
-        bare,
+    return bare.changed(
+        corners_mm=np.where(inner, np.fmax(bare.corners_mm, corner_mm), bare.corners_mm),
         feed_mm_min=np.where(bare.only_turns, bare.feed_mm_min, np.minimum(feed, machine.feed_limit_mm_min)),
         feed_deg_min=np.where(bare.only_turns, np.minimum(feed, machine.turn_limit_deg_min), bare.feed_deg_min),
     )
-
-
-def _written(toolpath: Toolpath, pieces: Pieces) -> Flags:
-    row = pieces.row
-    last = np.append(row[1:] != row[:-1], True)[: len(row)]
-    return np.asarray(last | (toolpath.kind[row] == RowKind.FEED))
 
 
 def _until(toolpath: Toolpath, places: Floats) -> tuple[Floats, Floats]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 from unicodedata import normalize
 
 from dbbstation.errors import InputError, StationError
-from dbbstation.nc.toolpath import DECIMALS
+from dbbstation.nc.toolpath import DECIMALS, joined
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.planner import LookAhead
@@ -61,6 +62,12 @@ class Dialect(ABC):
         The same toolpath and header give the same text. The first line without comment contains `numbers`.
         `toolpath.name` and `toolpath.run` identify the program, if a control needs a name or number.
         """
+
+    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
+        """Return the program of a toolpath in parts; `head` returns header and `numbers` once all parts are made."""
+        toolpath = joined(list(parts))
+        header, numbers = head()
+        return self.write(replace(toolpath, numbers=numbers), header)
 
     def file_name(self, stem: str, run: int) -> str:  # noqa: ARG002
         """Return the name of a program's file; `run` is its number among the programs that are written together, from 1."""

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
-from dbbstation.nc.compensate import Prefer, compensate_toolpath
+from dbbstation.nc.compensate import Compensation, Prefer, compensated_parts
 from dbbstation.nc.curve import felt_mm, rounding_mm
 from dbbstation.nc.dialect import COMPENSATED
 from dbbstation.nc.limits import CHORD_MM, CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
-from dbbstation.nc.mark import is_marked, marked
-from dbbstation.nc.nominal import check_machine, check_nominal, checksum
+from dbbstation.nc.mark import has_marks, marked, sums_of
+from dbbstation.nc.nominal import Checksum, check_machine, check_nominal
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
@@ -27,7 +29,9 @@ from dbbstation.nc.setup import offset_text
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -191,6 +195,7 @@ def compensated_program(
     return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
 
 
+@with_one_thread
 def _program(
     path: Toolpath,
     machine: Machine,
@@ -209,7 +214,7 @@ def _program(
         return Program(name, dialect.write(path, header), _points(path))
     check_joints(inverse.model.machine)
     asked_um, prefer = 1e3 * chord_mm, inverse.prefer
-    done = compensate_toolpath(
+    parts = compensated_parts(
         path,
         inverse.model,
         chord_mm=chord_mm,
@@ -219,47 +224,80 @@ def _program(
         planner=planner_of(machine, dialect),
         prefer=prefer,
     )
-    exact = done.toolpath
-    finished = marked(exact, dialect.decimals)
-    # What rounding and mark move a pose by is part of how far the tool leaves the path.
-    coarse_mm = felt_mm(finished.poses - exact.poses).max(initial=0.0)
-    done = replace(done, toolpath=finished, chord_um=done.chord_um + 1e3 * float(coarse_mm))
-    check_reach(machine, done.toolpath)
-    remarks = remarks_on(done, asked_um, machine, dialect, prefer)
+    done = _Finished(machine, dialect)
+    uncertainty = _uncertainty_um(path, inverse)
+
+    def head() -> tuple[list[str], tuple[int, ...]]:
+        total = done.total
+        said = [*header, *_said(inverse.origin), f"{COMPENSATED} {total.greatest_um:.3f} um"]
+        said.append(f"chord error asked for {asked_um:g} um, reached {total.chord_um:.3f} um")
+        said += remarks_on(total, asked_um, machine, dialect, prefer)
+        said += [] if done.is_marked else ["its poses are too few to carry a mark: keep this header"]
+        return [*said, *_said_of_uncertainty(*uncertainty)], (done.checksum.number,) * 2
+
+    text = dialect.write_parts(done.finished(parts), head)
+    total = done.total
     if inverse.strict:
-        check_kept(done, asked_um, machine)
-    header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
-    header.append(f"chord error asked for {asked_um:g} um, reached {done.chord_um:.3f} um")
-    header += remarks
-    header += [] if is_marked(finished) else ["its poses are too few to carry a mark: keep this header"]
-    together_um, by_axis_um, why = _uncertainty_um(path, inverse)
-    if together_um is not None:
-        header.append(f"standard uncertainty of the model along the path {together_um:.3f} um at most")
-    elif by_axis_um:
-        each = (
-            f"{axis} {'not known' if um is None else f'{um:.3f} um'}"
-            for axis, um in zip("XYZ", by_axis_um, strict=True)
-        )
-        header += [
-            f"standard uncertainty of the model along the path at most: {', '.join(each)}",
-            f"not known because {why}",
-        ]
-    number = checksum(finished, dialect.decimals)
+        check_kept(total, asked_um, machine)
+    together_um, by_axis_um, why = uncertainty
     return Program(
         name,
-        dialect.write(replace(finished, numbers=(number, number)), header),
-        _points(finished),
-        done.greatest_um,
-        done.chord_um,
+        text,
+        done.points,
+        total.greatest_um,
+        total.chord_um,
         asked_um,
         together_um,
         by_axis_um,
         why,
-        done.tilt_um,
-        None if dialect.look_ahead is None else done.seconds,
-        None if dialect.look_ahead is None else done.nominal_seconds,
-        remarks,
+        total.tilt_um,
+        None if dialect.look_ahead is None else total.seconds,
+        None if dialect.look_ahead is None else total.nominal_seconds,
+        remarks_on(total, asked_um, machine, dialect, prefer),
     )
+
+
+class _Finished:
+    """Marks and checks the parts of a compensated program, and keeps what its header states.
+
+    Attributes:
+        points: moves so far.
+    """
+
+    def __init__(self, machine: Machine, dialect: Dialect) -> None:
+        self._machine, self._decimals = machine, dialect.decimals
+        self.checksum, self.points = Checksum(dialect.decimals), 0
+        self._so_far: Compensation | None = None
+        self._coarse_mm = 0.0
+        self._sums: list[NDArray[np.uint64]] = []
+
+    def finished(self, parts: Iterable[Compensation]) -> Iterator[Toolpath]:
+        """Yield the parts as they are written."""
+        for part, after in pairwise(chain(parts, [None])):
+            if part is None:
+                continue
+            part_so_far = part if self._so_far is None else Compensation.together([self._so_far, part], part.toolpath)
+            finished = marked(part.toolpath, self._decimals, follows=self.points > 0, goes_on=after is not None)
+            # What rounding and mark move a pose by is part of how far the tool leaves the path.
+            off_mm = felt_mm(finished.poses - part.toolpath.poses)
+            self._so_far, self._coarse_mm = part_so_far, max(self._coarse_mm, float(off_mm.max(initial=0.0)))
+            check_reach(self._machine, finished)
+            self.checksum.add(finished)
+            self._sums.append(sums_of(finished, self._decimals))
+            self.points += _points(finished)
+            yield finished
+
+    @property
+    def total(self) -> Compensation:
+        """Return the figures of all parts, with the last part's toolpath."""
+        if self._so_far is None:
+            raise ValueError("no part is finished")
+        return replace(self._so_far, chord_um=self._so_far.chord_um + 1e3 * self._coarse_mm)
+
+    @property
+    def is_marked(self) -> bool:
+        """Return whether the mark is found again."""
+        return has_marks(np.concatenate(self._sums))
 
 
 def planner_of(machine: Machine, dialect: Dialect) -> Planner:
@@ -297,6 +335,17 @@ def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tup
     if None in by_axis_um:
         return None, by_axis_um, inverse.identified.why_unknown
     return together_um, by_axis_um, ""
+
+
+def _said_of_uncertainty(together_um: float | None, by_axis_um: tuple[float | None, ...], why: str) -> list[str]:
+    if together_um is not None:
+        return [f"standard uncertainty of the model along the path {together_um:.3f} um at most"]
+    if not by_axis_um:
+        return []
+    each = (
+        f"{axis} {'not known' if um is None else f'{um:.3f} um'}" for axis, um in zip("XYZ", by_axis_um, strict=True)
+    )
+    return [f"standard uncertainty of the model along the path at most: {', '.join(each)}", f"not known because {why}"]
 
 
 def _circle_header(

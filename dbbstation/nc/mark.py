@@ -7,7 +7,6 @@ deleted lines. Fewer decimals or shifted poses destroy it.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -69,15 +68,19 @@ _SHIFTS, _MIXING = np.array([30, 27, 31], np.uint64), np.array([0xBF58476D1CE4E5
 """Constants of the finaliser of SplitMix64 [Steele et al. 2014]."""
 
 
-def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
-    """Return a compensated toolpath with marked poses, rounded as in the written program."""
+def marked(
+    toolpath: Toolpath, decimals: Sequence[int] = DECIMALS, *, follows: bool = False, goes_on: bool = False
+) -> Toolpath:
+    """Return a compensated toolpath, or one of its parts, with marked poses, rounded as in the written program."""
     moves = np.flatnonzero(toolpath.is_move & (toolpath.unknown == 0))
     if not len(moves):
         return toolpath
     numbers = _numbers(toolpath.numbers_written[moves], decimals)
     free = _free(toolpath, moves, decimals)
+    free[-1] &= not goes_on
     can = np.flatnonzero(free.any(axis=1))
-    bits = BITS[min(max(_distinct(_sums(numbers[can])), 2), 4)]  # a pose that comes again counts once
+    # A pose that comes again counts once.
+    bits = BITS[4 if follows or goes_on else min(max(_distinct(_sums(numbers[can])), 2), 4)]
     steps = _steps(FARTHEST_ANGLE, 1) if bits == BITS[4] else _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
     shifts = np.append(_SHIFTS, np.uint64(64 - bits))
     fixed, moved = _as_bits(~free[can]), _as_bits(steps != 0)
@@ -85,31 +88,44 @@ def marked(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> Toolpath:
     numbers[can] += np.where(chosen[:, None] < 0, 0, steps[chosen])
     written = toolpath.numbers_written
     written[moves] = numbers / 10.0 ** np.array(decimals)
-    poses = toolpath.with_numbers(written).poses
+    done = toolpath.with_numbers(written)
+    poses = done.poses
     # Rows between moves stand where the move before them ended.
     before = np.searchsorted(moves, np.arange(len(poses)), side="right") - 1
     stands = ~toolpath.is_move & (before >= 0)
     poses[stands] = poses[moves[before[stands]]]
-    return replace(toolpath, poses=poses)
+    return done
 
 
 def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance explains."""
-    poses = toolpath.numbers_written[toolpath.is_move & (toolpath.unknown == 0)]
-    count = _distinct(_sums(_numbers(poses, DECIMALS)))
+    tried = list(decimals_of(toolpath))
+    parts = {(first, decimals[first]): [np.zeros(0, np.uint64)] for decimals in tried for first in (0, 3)}
+    for numbers in _known(toolpath):
+        for (first, decimals), sums in parts.items():
+            axes = slice(first, first + 3)
+            sums.append(_sums(_numbers(numbers[:, axes], (decimals,) * 3), axes))
+    whole = {which: np.concatenate(sums) for which, sums in parts.items()}
+    each = [whole[0, decimals[0]] + whole[3, decimals[3]] for decimals in tried]
+    count = _distinct(each[0])
+    return any(has_marks(sums, count) for sums in each)
 
-    @cache
-    def part(first: int, decimals: int) -> NDArray[np.uint64]:
-        axes = slice(first, first + 3)
-        return _sums(_numbers(poses[:, axes], (decimals,) * 3), axes)
 
-    for decimals in decimals_of(poses):
-        sums = part(0, decimals[0]) + part(3, decimals[5])
-        for bits in BITS.values():
-            hits = _distinct(sums[_has_mark(sums, bits)])
-            if hits > 0 and float(bdtrc(hits - 1, count, 0.5**bits)) < BY_CHANCE:
-                return True
-    return False
+def has_marks(sums: NDArray[np.uint64], count: int | None = None) -> bool:
+    """Return whether more of the poses with these `sums_of` are marked than chance explains; `count` of them differ."""
+    count = _distinct(sums) if count is None else count
+    hits = {bits: _distinct(sums[_has_mark(sums, bits)]) for bits in BITS.values()}
+    return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in hits.items())
+
+
+def sums_of(toolpath: Toolpath, decimals: Sequence[int]) -> NDArray[np.uint64]:
+    """Return a sum of each pose's numbers, by which it is known, shape (k,)."""
+    return np.concatenate([_sums(_numbers(each, decimals)) for each in _known(toolpath)])
+
+
+def _known(toolpath: Toolpath) -> Iterator[Floats]:
+    for part in toolpath.parts():
+        yield part.numbers_written[part.is_move & (part.unknown == 0)]
 
 
 def _distinct(sums: NDArray[np.uint64]) -> int:
@@ -117,10 +133,13 @@ def _distinct(sums: NDArray[np.uint64]) -> int:
     return int(np.count_nonzero(np.diff(np.sort(sums)))) + bool(len(sums))
 
 
-def decimals_of(poses: Floats) -> Iterator[tuple[int, ...]]:
-    """Yield the decimals in which a dialect may have written poses, shape (n, 6), this program's first."""
+def decimals_of(toolpath: Toolpath) -> Iterator[tuple[int, ...]]:
+    """Yield the decimals in which a dialect may have written the poses, this program's first."""
     yield DECIMALS
-    enough = [[n for n in COARSER if n <= most and _off(poses[:, axes], n) < _SAME] for axes, most in _GROUPS]
+    enough = [
+        [n for n in COARSER if n <= most and all(_off(each[:, axes], n) < _SAME for each in _known(toolpath))]
+        for axes, most in _GROUPS
+    ]
     yield from (found for mm in enough[0] for deg in enough[1] if (found := (mm,) * 3 + (deg,) * 3) != DECIMALS)
 
 

@@ -25,20 +25,38 @@ CHECKSUMS = 99_999_999
 _MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
 
 
-def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
-    """Return a checksum of moves, dwells and stops in order, with written decimals.
+class Checksum:
+    """A checksum of moves, dwells and stops in order, with written decimals, over successive parts of a toolpath.
 
     Comments, feeds, line numbers and units do not count.
     """
-    told = np.isin(toolpath.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
-    counts = toolpath.is_move & (toolpath.unknown == 0)
-    poses = np.where(counts[:, None], np.rint(toolpath.numbers_written * 10.0 ** np.array(decimals)), 0.0)
-    digest = hashlib.sha256()
-    digest.update(toolpath.kind[told].astype("<i1").tobytes())
-    digest.update(poses[told].astype("<i8").tobytes())
-    written = {seconds: f"{seconds:.6e}" for seconds in np.unique(toolpath.dwell_s[told]).tolist()}
-    digest.update(" ".join(map(written.__getitem__, toolpath.dwell_s[told].tolist())).encode())
-    return 1 + int.from_bytes(digest.digest()[:8]) % CHECKSUMS
+
+    def __init__(self, decimals: Sequence[int] = DECIMALS) -> None:
+        self._scale = 10.0 ** np.array(decimals)
+        self._kinds, self._poses, self._dwells = hashlib.sha256(), hashlib.sha256(), hashlib.sha256()
+
+    def add(self, part: Toolpath) -> None:
+        """Count the next rows."""
+        told = np.isin(part.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
+        counts = part.is_move & (part.unknown == 0)
+        poses = np.where(counts[:, None], np.rint(part.numbers_written * self._scale), 0.0)
+        self._kinds.update(part.kind[told].astype("<i1").tobytes())
+        self._poses.update(poses[told].astype("<i8").tobytes())
+        self._dwells.update("".join(f"{seconds:.6e} " for seconds in part.dwell_s[part.dwell_s != 0.0]).encode())
+
+    @property
+    def number(self) -> int:
+        """Return the checksum of all rows so far."""
+        digests = (each.digest() for each in (self._kinds, self._poses, self._dwells))
+        return 1 + int.from_bytes(hashlib.sha256(b"".join(digests)).digest()[:8]) % CHECKSUMS
+
+
+def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
+    """Return the checksum of a toolpath."""
+    total = Checksum(decimals)
+    for part in toolpath.parts():
+        total.add(part)
+    return total.number
 
 
 def check_nominal(toolpath: Toolpath) -> None:
@@ -51,11 +69,10 @@ def check_nominal(toolpath: Toolpath) -> None:
     """
     said = any(text.startswith(COMPENSATED) for text in toolpath.text.values())
     how = "says its header" if said else ""
-    moved = toolpath.numbers_written[toolpath.is_move]
     if (
         not how
         and toolpath.numbers
-        and any(checksum(toolpath, each) in toolpath.numbers for each in decimals_of(moved))
+        and any(checksum(toolpath, each) in toolpath.numbers for each in decimals_of(toolpath))
     ):
         how = "says the checksum in its line numbers"
     if not how and is_marked(toolpath):

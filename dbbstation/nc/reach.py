@@ -31,18 +31,12 @@ def check_reach(machine: Machine, toolpath: Toolpath) -> None:
     Raises:
         TravelError: names program, line, pose and limit.
     """
-    points = _Poses(toolpath, np.arange(len(toolpath)), np.ones(len(toolpath)))
-    outside = points.first_outside(machine)
-    upto = len(toolpath) if outside is None else int(points.row[outside]) + 1
-    pieces = toolpath.pieces(STEP_MM, STEP_DEG)[:upto]
-    # A move of one piece has no pose beside its end, which is a programmed point.
-    divided = np.flatnonzero(pieces > 1)
-    block = np.cumsum(pieces[divided]) // AT_ONCE
-    for rows in np.split(divided, np.flatnonzero(np.diff(block)) + 1):
-        row, share = in_pieces(pieces[rows])
-        poses = _Poses(toolpath, rows[row], share)
-        poses.refuse(machine, toolpath, poses.first_outside(machine))
-    points.refuse(machine, toolpath, outside)
+    for part in toolpath.parts():
+        pieces = part.pieces(STEP_MM, STEP_DEG)
+        block = np.cumsum(pieces) // AT_ONCE
+        for rows in np.split(np.arange(len(part)), np.flatnonzero(np.diff(block)) + 1):
+            row, share = in_pieces(pieces[rows])
+            _Poses(part, rows[row], share).check(machine, part)
 
 
 def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
@@ -69,7 +63,7 @@ class _Poses:
     """Known poses within rows of a toolpath, its start first."""
 
     def __init__(self, toolpath: Toolpath, row: Integers, share: Floats) -> None:
-        poses = toolpath.between(row, share)
+        poses = toolpath.poses[row] if (share == 1.0).all() else toolpath.between(row, share)
         known = toolpath.is_move[row]
         self.row, self.poses = row[known], poses[known]
         if len(row) and row[0] == 0:
@@ -77,30 +71,23 @@ class _Poses:
             begins = int(np.argmax(toolpath.is_move))
             self.row, self.poses = np.concatenate([[begins], self.row]), np.vstack([toolpath.before[:1], self.poses])
 
-    def first_outside(self, machine: Machine) -> int | None:
-        """Return the first pose outside the travel, or None."""
+    def check(self, machine: Machine, toolpath: Toolpath) -> None:
+        """Refuse the first pose outside the travel, naming its line."""
         if _is_inside(machine, self.poses):
-            return None
-        inside, outside = 0, len(self.poses)
-        while outside - inside > 1:
+            return
+        inside, outside = 0, len(self.poses) - 1
+        while outside - inside > 0:
             middle = (inside + outside) // 2
-            if _is_inside(machine, self.poses[:middle]):
-                inside = middle
-            else:
-                outside = middle
-        return inside
-
-    def refuse(self, machine: Machine, toolpath: Toolpath, outside: int | None) -> None:
-        """Refuse a pose and name its line."""
-        if outside is not None:
-            where = toolpath.where(int(self.row[outside]))
-            check_travel(machine, self.poses[outside : outside + 1], where=where, remedy=DECLARED)
+            inside, outside = (
+                (middle + 1, outside) if _is_inside(machine, self.poses[: middle + 1]) else (inside, middle)
+            )
+        where = toolpath.where(int(self.row[outside]))
+        check_travel(machine, self.poses[outside : outside + 1], where=where, remedy=DECLARED)
 
 
 def _is_inside(machine: Machine, poses: Floats) -> bool:
     try:
-        for begin in range(0, len(poses), AT_ONCE):
-            check_travel(machine, poses[begin : begin + AT_ONCE], where="")
+        check_travel(machine, poses, where="")
     except TravelError:
         return False
     return True

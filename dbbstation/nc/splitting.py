@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +11,10 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import felt_mm, in_mm, row_and_share
 from dbbstation.nc.pieces import longest
-from dbbstation.nc.toolpath import RowKind, in_pieces
+from dbbstation.nc.toolpath import ROWS_AT_ONCE, RowKind, in_pieces
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.machine.geometry import Machine
@@ -60,9 +59,6 @@ ALMOST = 0.999
 COSINE = 0.97
 """Cosine of the greatest angle between short lines of one curve, 14 degrees."""
 
-ROWS_AT_ONCE = 20_000
-"""Number of rows that are compensated together: thirty to a hundred megabytes, and enough for fast arrays."""
-
 MOST_CELLS = 1_000_000
 """Greatest number of cells, equal to `rs274.moves.MOST_ROWS`, because the path is held in memory."""
 
@@ -94,30 +90,37 @@ def rows_as_pieces(toolpath: Toolpath) -> Pieces:
 def moves_of(toolpath: Toolpath) -> Integers:
     """Return the written move of each row, shape (n,); an arc is one move."""
     goes_on = np.zeros(len(toolpath), dtype=np.bool_)
-    if toolpath.arc is not None and len(toolpath) > 1:
-        same = (toolpath.arc[1:] == toolpath.arc[:-1]).all(axis=1) & (toolpath.arc[1:, 2] != 0.0)
+    number = toolpath.rows["arc_number"]
+    if number.any():
+        same = (number[1:] == number[:-1]) & (number[1:] != 0)
         goes_on[1:] = same & (toolpath.line[1:] == toolpath.line[:-1]) & (toolpath.kind[1:] == toolpath.kind[:-1])
     moves: Integers = np.cumsum(~goes_on) - 1
     return moves
 
 
-def parts_of(toolpath: Toolpath, runs: Integers) -> list[slice]:
-    """Return the parts of a toolpath that are compensated one by one, so that long programs need little memory."""
-    leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
+def parts_of(toolpath: Toolpath, runs_in: Callable[[Toolpath], Integers]) -> Iterator[tuple[Toolpath, Integers]]:
+    """Yield successive parts and the run of each of their rows, so that long programs take little memory."""
+    begin = 0
+    while begin < len(toolpath) or begin == 0:
+        end, rows = 0, ROWS_AT_ONCE + 1
+        while not end:
+            part = toolpath.part(slice(begin, begin + rows))
+            runs = runs_in(part)
+            end = _end_of_part(part, runs) if begin + rows < len(toolpath) else len(part)
+            rows *= 2
+        yield part.part(slice(end)), runs[:end]
+        begin = max(begin + end, 1)
+
+
+def _end_of_part(part: Toolpath, runs: Integers) -> int:
+    """Return the last row with which another part may begin, a new run if there is one; 0 if there is none."""
+    leads_on = (part.tip_mm > 0.0) | (part.turn_deg > 0.0)
     # The first move shows where the machine comes from.
     may = np.flatnonzero(leads_on)[1:]
-    may = may[(toolpath.kind[may] == RowKind.FEED) & (toolpath.tip_mm[may] > 0.0)]
+    may = may[(part.kind[may] == RowKind.FEED) & (part.tip_mm[may] > 0.0)]
     new_run = may[runs[may] != runs[may - 1]]
-    cuts = [0]
-    while len(toolpath) - cuts[-1] > ROWS_AT_ONCE:
-        nearest = [at[(at > cuts[-1]) & (at <= cuts[-1] + ROWS_AT_ONCE)] for at in (new_run, may)]
-        found = next((int(at[-1]) for at in nearest if len(at)), None)
-        if found is None:
-            found = int(may[np.searchsorted(may, cuts[-1], side="right")]) if len(may) and may[-1] > cuts[-1] else None
-        if found is None:
-            break
-        cuts.append(found)
-    return [slice(begin, end) for begin, end in pairwise([*cuts, len(toolpath)])]
+    found = new_run if len(new_run) else may
+    return int(found[-1]) if len(found) else 0
 
 
 def runs_of(toolpath: Toolpath, needed_mm: Floats) -> Integers:

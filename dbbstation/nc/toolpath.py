@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -31,6 +31,10 @@ RAPID_MM_MIN = 5000.0
 
 RAPID_DEG_MIN = 2000.0
 """The same for rapids that tilt the platform."""
+
+
+ROWS_AT_ONCE = 20_000
+"""Rows that are handled together: some megabytes, and long enough for arrays to be quick."""
 
 
 class RowKind(IntEnum):
@@ -80,25 +84,56 @@ PIECE_CORNER_MM = 1e-4
 belongs to the end of the written move; the angles between its pieces need far less."""
 
 
+PLANES = np.array([[0, 1], [2, 0], [1, 2]])
+"""First and second axis of G17, G18 and G19: counter-clockwise leads from the first to the second."""
+
+ALL_AXES = 0b111111
+
+STRAIGHT = (0.0, 0.0, 0.0, 0.0)
+
+ROW = np.dtype(
+    [
+        ("poses", np.float64, 6),
+        ("feed_mm_min", np.float64),
+        ("feed_deg_min", np.float64),
+        ("dwell_s", np.float64),
+        ("corners_mm", np.float64),
+        ("line", np.int32),
+        ("offset", np.int32),
+        ("arc_number", np.int32),
+        ("kind", np.int8),
+        ("unknown", np.uint8),
+        ("in_machine", np.bool_),
+    ],
+    align=True,
+)
+"""A row of a toolpath: 96 bytes.
+
+`kind` is a `RowKind`. `poses` is [X, Y, Z, A, B, C] after the row in machine coordinates, without tool length [mm, deg].
+`feed_mm_min` is the speed of the tip in `FEED` rows, `feed_deg_min` the speed of `FEED` rows that only turn; both are NaN in
+other rows. `dwell_s` is zero except in `DWELL` rows. `line` is the program's line, from 1; 0 if there is none. `corners_mm` is
+the rounding allowed at the row's end: 0 exact, `EXACT_STOP_MM`, infinite unlimited, NaN not stated. `offset` is a row of
+`offsets`, by which the row's numbers are less than its pose; `arc_number` is a row of `arcs`. `unknown` has a bit for each axis
+whose position the program does not know: such a row must not name it. `in_machine` marks moves in machine coordinates (G53).
+"""
+
+
+def _column(name: str, kind: str) -> Any:  # noqa: ANN401 - a property of any array
+    return property(lambda self: self.rows[name], doc=f"Return `{name}` of each row, as in `ROW`{kind}.")
+
+
 @dataclass(frozen=True, eq=False)
 class Toolpath:
-    """Rows in order; every move is straight in all of X, Y, Z, A, B and C.
+    """Rows in order; every move is straight in X, Y, Z, A, B and C at once.
 
     Attributes:
         name: for messages; the file if read from one.
-        kind: `RowKind` of each row, shape (n,).
-        poses: [X, Y, Z, A, B, C] after each row in machine coordinates, without tool length, shape (n, 6) [mm, deg].
-        feed_mm_min: of `FEED` rows along the tip's path, shape (n,); NaN in other rows.
-        feed_deg_min: of `FEED` rows that only turn, shape (n,); NaN in other rows.
-        dwell_s: of `DWELL` rows, shape (n,); zero in other rows.
-        line: of the program, from 1, shape (n,); 0 if there is none.
+        rows: shape (n,), of the type `ROW`.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
         start: pose before the first row, shape (6,), NaN for unknown axes; None: all unknown.
-        corners_mm: rounding allowed at the end of each row, shape (n,): 0 exact, `EXACT_STOP_MM`, infinite unlimited, NaN not stated.
-        offset: row of `offsets` by which numbers of each row are less than its pose, shape (n,).
         offsets: work offset, G92 and tool length together, shape (k, 6) [mm, deg]; the first is zero.
-        unknown: axes whose position the program does not know, a bit each, shape (n,): such a row must not name them.
-        in_machine: moves in machine coordinates (G53), shape (n,).
+        arcs: centre [mm] in the first and second axis of its plane, spanned angle of a chord [rad], counter-clockwise positive, plane
+            as in `PLANES`, shape (k, 4); the first has angle 0 and belongs to straight rows.
         holds: offsets and tool lengths for which the poses are valid, by `IN_FORCE`, `G54`, `G92`, `H1`, each shape
             (6,), and diameters of tools by `D1`, shape (1,); a control may check them before it moves. None: not stated.
         units_said: whether the program states its unit of length.
@@ -106,22 +141,12 @@ class Toolpath:
         files: number of lines before each of its files, and the file's name; subprograms of other files follow the program.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those written together, from 1.
-        arc: centre [mm] in the first and second axis of its plane, spanned angle of a chord [rad], counter-clockwise positive, plane
-            as in `PLANES`, shape (n, 4); angle 0 in straight rows. None: no arcs.
     """
 
     name: str
-    kind: NDArray[np.int8]
-    poses: Floats
-    feed_mm_min: Floats
-    feed_deg_min: Floats
-    dwell_s: Floats
-    line: Integers
-    corners_mm: Floats
-    offset: NDArray[np.int32]
+    rows: NDArray[np.void]
     offsets: Floats
-    unknown: NDArray[np.uint8]
-    in_machine: Flags
+    arcs: Floats
     text: Mapping[int, str] = field(default_factory=dict)
     start: Floats | None = None
     holds: Mapping[str, tuple[float, ...]] | None = None
@@ -130,11 +155,21 @@ class Toolpath:
     notes: tuple[str, ...] = ()
     files: tuple[tuple[int, str], ...] = ()
     numbers: tuple[int, ...] = ()
-    arc: Floats | None = None
     run: int = 1
 
+    kind: ClassVar[NDArray[np.int8]] = _column("kind", "")
+    poses: ClassVar[Floats] = _column("poses", ", shape (n, 6)")
+    feed_mm_min: ClassVar[Floats] = _column("feed_mm_min", "")
+    feed_deg_min: ClassVar[Floats] = _column("feed_deg_min", "")
+    dwell_s: ClassVar[Floats] = _column("dwell_s", "")
+    line: ClassVar[Integers] = _column("line", "")
+    corners_mm: ClassVar[Floats] = _column("corners_mm", "")
+    offset: ClassVar[Integers] = _column("offset", "")
+    unknown: ClassVar[NDArray[np.uint8]] = _column("unknown", "")
+    in_machine: ClassVar[Flags] = _column("in_machine", "")
+
     def __len__(self) -> int:
-        return len(self.kind)
+        return len(self.rows)
 
     def where(self, row: int) -> str:
         """Return the line of a row as text for messages."""
@@ -151,29 +186,41 @@ class Toolpath:
         corners = self.corners_mm[self.is_move]
         return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
 
+    @property
+    def arc(self) -> Floats:
+        """Return each row's arc, shape (n, 4), as in `arcs`."""
+        return self.arcs[self.rows["arc_number"]]
+
+    def changed(self, **columns: Any) -> Toolpath:  # noqa: ANN401 - arrays of any type
+        """Return the toolpath with other columns of `ROW`."""
+        rows = self.rows.copy()
+        for name, values in columns.items():
+            rows[name] = values
+        return replace(self, rows=rows)
+
     def divided(self, row: Integers, poses: Floats) -> Toolpath:
-        """Return the toolpath with some rows divided into pieces."""
+        """Return the toolpath with some rows in several straight pieces."""
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
-        place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
         corners = self.corners_mm[row]
-        return replace(
-            self.only(row),
-            poses=poses,
-            corners_mm=np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners),
-            text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
-            arc=None,
-        )
+        corners[(corners <= 0.0) & ~last] = PIECE_CORNER_MM
+        divided = self.only(row).changed(poses=poses, corners_mm=corners, arc_number=0)
+        ends = np.searchsorted(row, list(self.text), side="right") - 1
+        return replace(divided, text=dict(zip(ends.tolist(), self.text.values(), strict=True)))
 
     def part(self, rows: slice) -> Toolpath:
-        """Return successive rows as a toolpath without texts."""
-        begins = rows.indices(len(self))[0]
-        return replace(self.only(rows), start=self.start if begins == 0 else self.before[begins])
+        """Return successive rows as a toolpath."""
+        begin, end, _ = rows.indices(len(self))
+        text = {row - begin: self.text[row] for row in range(begin, end) if row in self.text} if self.text else {}
+        return replace(self.only(rows), start=self.poses[begin - 1] if begin else self.start, text=text)
+
+    def parts(self) -> Iterator[Toolpath]:
+        """Yield successive rows as toolpaths, at least one: a long program is checked and written in little memory."""
+        for begin in range(0, max(len(self), 1), ROWS_AT_ONCE):
+            yield self.part(slice(begin, begin + ROWS_AT_ONCE))
 
     def only(self, rows: slice | Integers) -> Toolpath:
         """Return some rows as a toolpath without texts; each move begins at the end of the move before."""
-        of_rows = {name: getattr(self, name)[rows] for name in _OF_ROWS}
-        arc = None if self.arc is None else self.arc[rows]
-        return replace(self, **of_rows, text=MappingProxyType({}), arc=arc)
+        return replace(self, rows=self.rows[rows], text={})
 
     @property
     def is_move(self) -> Flags:
@@ -193,7 +240,7 @@ class Toolpath:
 
     def with_numbers(self, numbers: Floats) -> Toolpath:
         """Return the toolpath with other written numbers, shape (n, 6)."""
-        return replace(self, poses=numbers + self.offsets[self.offset])
+        return self.changed(poses=numbers + self.offsets[self.offset])
 
     @cached_property
     def tip_mm(self) -> Floats:
@@ -243,9 +290,10 @@ class Toolpath:
         """Return poses within rows, shape (k, 6); `share` 0 before the row, 1 after it, both of shape (k,)."""
         before, after = self.before[row], self.poses[row]
         inside = before + share[:, None] * (after - before)
-        if self.arc is not None:
-            chord = np.flatnonzero(self.arc[row, 2] != 0.0)
-            arc, plane = self.arc[row[chord]], PLANES[self.arc[row[chord], 3].astype(np.int64)]
+        chord = np.flatnonzero(self.rows["arc_number"][row])
+        if len(chord):
+            arc = self.arc[row[chord]]
+            plane = PLANES[arc[:, 3].astype(np.int64)]
             first, last = (np.take_along_axis(each[chord], plane, axis=1) for each in (before, after))
             inside[chord[:, None], plane] = _on_arc(first, last, arc, share[chord])
         # The end of a row is its programmed pose to the last bit.
@@ -261,38 +309,10 @@ class Toolpath:
         return np.maximum(pieces, 1.0).astype(np.int64)
 
 
-_ALIKE: dict[str, type] = {
-    "kind": np.int8,
-    "dwell_s": np.float64,
-    "offset": np.int32,
-    "unknown": np.uint8,
-    "in_machine": np.bool_,
-}
-_OF_ROWS = (*_ALIKE, "poses", "feed_mm_min", "feed_deg_min", "line", "corners_mm")
-"""Arrays of a toolpath with a value for each row. In the arrays of `_ALIKE`, rows that are added together share one
-value."""
-
 _NO_FEED = (np.nan, np.nan)
-_STRAIGHT = (0.0, 0.0, 0.0, 0.0)
 
-PLANES = np.array([[0, 1], [2, 0], [1, 2]])
-"""First and second axis of G17, G18 and G19: counter-clockwise turns the first towards the second."""
-
-ALL_AXES = 0b111111
-
-
-class _Rows(NamedTuple):
-    kind: RowKind
-    poses: Floats
-    feed: tuple[float, float]
-    dwell_s: float
-    line: int
-    corner_mm: float
-    offset: int
-    unknown: int
-    in_machine: bool
-    arc: tuple[float, float, float, float]
-    step: int
+GROWTH = 1.25
+"""Factor by which a builder makes room for more rows."""
 
 
 class ToolpathBuilder:
@@ -318,11 +338,11 @@ class ToolpathBuilder:
         self.files: tuple[tuple[int, str], ...] = ()
         self.numbers: tuple[int, ...] = ()
         self._start = start
-        self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
-        self.unknown = bits_of(np.isnan(self._pose))
+        self.unknown = ALL_AXES if start is None else bits_of(np.isnan(start))
         self._offsets: dict[tuple[float, ...], int] = {(0.0,) * 6: 0}
         self._offset = 0
-        self._rows: list[_Rows] = []
+        self._arcs: list[tuple[float, ...]] = [STRAIGHT]
+        self._rows = np.zeros(64, ROW)
         self._text: dict[int, str] = {}
         self._count = self.fed = self.left = 0
 
@@ -353,7 +373,7 @@ class ToolpathBuilder:
         *,
         line: int = 0,
         in_machine: bool = False,
-        arc: tuple[float, float, float, float] = _STRAIGHT,
+        arc: tuple[float, float, float, float] = STRAIGHT,
         unknown: int = 0,
     ) -> None:
         """Add moves at a feed.
@@ -369,46 +389,44 @@ class ToolpathBuilder:
     @property
     def pose(self) -> Floats:
         """Return the pose at the end of the last row, shape (6,) [mm, deg]."""
-        return self._pose.copy()
-
-    @property
-    def added(self) -> int:
-        """Return how many rows were added together last."""
-        return len(self._rows) - 1
+        if self._count == 0:
+            return np.full(6, np.nan) if self._start is None else np.array(self._start, dtype=np.float64)
+        return self._rows["poses"][self._count - 1].copy()
 
     def bend(
         self,
-        added: int,
+        first: int,
         poses: Floats,
         arc: tuple[float, float, float, float],
         plane: Integers,
     ) -> None:
-        """Replace the poses of rows that were added together. All later rows get their end position in the axes of a plane."""
-        self._rows[added].poses[:] = poses
-        self._rows[added] = self._rows[added]._replace(arc=arc)
-        for rows in self._rows[added + 1 :]:
-            rows.poses[:, plane] = poses[-1, plane]
+        """Replace the poses of rows that were added together; all behind stand at their end in the axes of a plane."""
+        behind = first + len(poses)
+        self._rows["poses"][first:behind] = poses
+        number = self._rows["arc_number"][first]
+        if number:
+            self._arcs[number] = arc
+        self._rows["poses"][behind : self._count, plane] = poses[-1, plane]
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
-        self._add(RowKind.DWELL, self._pose[None], dwell_s=seconds, line=line)
+        self._add(RowKind.DWELL, self.pose[None], dwell_s=seconds, line=line)
 
     def say(self, kind: RowKind, text: str, *, line: int = 0) -> None:
         """Add a row of words."""
         if text:
             self._text[self._count] = text
-        self._add(kind, self._pose[None], line=line)
+        self._add(kind, self.pose[None], line=line)
 
     def taken_back(self) -> str:
         """Remove the last row added by `say` and return its text."""
-        self._rows.pop()
         self._count -= 1
         return self._text.pop(self._count, "")
 
     @property
     def last_kind(self) -> RowKind | None:
         """Return the kind of the last row, or None."""
-        return self._rows[-1].kind if self._rows else None
+        return RowKind(self._rows["kind"][self._count - 1]) if self._count else None
 
     @property
     def last_text(self) -> str:
@@ -417,27 +435,17 @@ class ToolpathBuilder:
 
     def built(self) -> Toolpath:
         """Return the toolpath of all rows so far. An axis begins at its first named position; an unknown axis keeps its position."""
-        count = np.array([len(rows.poses) for rows in self._rows], dtype=np.int64)
-
-        def each(values: list[Any], kind: type) -> NDArray[Any]:
-            return np.repeat(np.array(values, dtype=kind), count, axis=0)
-
-        poses = np.vstack([np.empty((0, 6)), *(rows.poses for rows in self._rows)])
+        rows = self._rows[: self._count].copy()
+        poses = rows["poses"]
         for axis in np.flatnonzero(np.isnan(poses).any(axis=0)):
             known = np.flatnonzero(~np.isnan(poses[:, axis]))
             last = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
             poses[:, axis] = poses[known[np.maximum(last, 0)], axis] if len(known) else 0.0
-        alike: Any = {name: each([getattr(rows, name) for rows in self._rows], kind) for name, kind in _ALIKE.items()}
         return Toolpath(
             name=self.name,
-            **alike,
-            poses=poses,
-            feed_mm_min=each([rows.feed[0] for rows in self._rows], np.float64),
-            feed_deg_min=each([rows.feed[1] for rows in self._rows], np.float64),
-            line=each([rows.line for rows in self._rows], np.int64)
-            + each([rows.step for rows in self._rows], np.int64) * self._within(count),
-            corners_mm=self._corners_mm(count),
+            rows=rows,
             offsets=np.array(list(self._offsets)),
+            arcs=np.array(self._arcs),
             text=MappingProxyType(dict(self._text)),
             start=self._start,
             holds=self.holds,
@@ -446,26 +454,10 @@ class ToolpathBuilder:
             notes=self.notes,
             files=self.files,
             numbers=self.numbers,
-            arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 4),
         )
 
     def __len__(self) -> int:
         return self._count
-
-    @staticmethod
-    def _within(count: Integers) -> Integers:
-        """Return the index of each row among the rows that were added together, from 0, shape (n,)."""
-        behind = np.cumsum(count)
-        numbers: Integers = np.arange(behind[-1] if len(count) else 0) - np.repeat(behind - count, count)
-        return numbers
-
-    def _corners_mm(self, count: Integers) -> Floats:
-        """Return the rounding of each row; an arc in chords stops only at the arc's ends."""
-        corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
-        last = np.repeat(np.array([rows.step > 0 for rows in self._rows], dtype=np.bool_), count)
-        last[np.cumsum(count) - 1] = True
-        inner: Floats = np.where((corners <= 0.0) & ~last, PIECE_CORNER_MM, corners)
-        return inner
 
     def _add(
         self,
@@ -476,16 +468,31 @@ class ToolpathBuilder:
         dwell_s: float = 0.0,
         line: int,
         in_machine: bool = False,
-        arc: tuple[float, float, float, float] = _STRAIGHT,
+        arc: tuple[float, ...] = STRAIGHT,
         step: int = 0,
     ) -> None:
+        behind = self._count + len(poses)
+        if behind > len(self._rows):
+            self._rows.resize(int(GROWTH * behind), refcheck=False)
+        if arc[2] != 0.0:
+            self._arcs.append(arc)
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
-        poses = np.array(poses, dtype=np.float64)
-        offset = 0 if in_machine else self._offset
-        rows = _Rows(kind, poses, feed, dwell_s, line, corner_mm, offset, self.unknown, in_machine, arc, step)
-        self._rows.append(rows)
-        self._count += len(poses)
-        self._pose = poses[-1]
+        number, offset = len(self._arcs) - 1 if arc[2] != 0.0 else 0, 0 if in_machine else self._offset
+        rows = self._rows[self._count : behind]
+        rows[:] = (0.0, *feed, dwell_s, corner_mm, line, offset, number, kind, self.unknown, in_machine)
+        rows["poses"] = poses
+        if step:
+            rows["line"] += step * np.arange(len(rows), dtype=np.int32)
+        elif corner_mm <= 0.0:
+            rows["corners_mm"][:-1] = PIECE_CORNER_MM  # an arc as chords stops only at its own ends
+        self._count = behind
+
+
+def joined(parts: Sequence[Toolpath]) -> Toolpath:
+    """Return successive parts as one toolpath."""
+    begins = np.cumsum([0, *map(len, parts)]).tolist()
+    text = {begin + row: said for begin, part in zip(begins, parts, strict=False) for row, said in part.text.items()}
+    return replace(parts[0], rows=np.concatenate([part.rows for part in parts]), text=text)
 
 
 def bits_of(axes: Flags) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from io import StringIO
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
@@ -15,7 +16,7 @@ from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from dbbstation.computing.arrays import Flags
     from dbbstation.nc.toolpath import Toolpath
@@ -25,9 +26,6 @@ SIGNIFICANT_DIGITS = 7
 
 MOST_DECIMALS = 15
 """Greatest number of decimals of a feed or dwell: the length of a line is limited."""
-
-AT_ONCE = 20_000
-"""Number of rows whose words are made together, so that long programs need little memory."""
 
 
 def digits(value: float) -> str:
@@ -81,17 +79,32 @@ class WordDialect(Dialect):
         Raises:
             CannotSayError: the dialect has no words for something in it.
         """
-        text = StringIO()
-        for line in self.lines(toolpath, header):
+        return self._written(toolpath.parts(), lambda: (header, toolpath.numbers))
+
+    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
+        """Return the program of a toolpath in parts, each written as soon as it is made."""
+        return (self._written if type(self).write is WordDialect.write else super().write_parts)(parts, head)
+
+    def _written(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
+        text, first, state = StringIO(), None, _Modal()
+        for part in parts:
+            first = part if first is None else first
+            self._put(text, self._body(part, state))
+        if first is None:
+            raise ValueError("a program needs a part")
+        header, numbers = head()
+        self._put(text, self.end(first))
+        begin = StringIO()
+        self._put(begin, self._head(replace(first, numbers=numbers), header))
+        return begin.getvalue() + text.getvalue()
+
+    def _put(self, text: StringIO, lines: Iterable[str]) -> None:
+        for line in lines:
             if len(line) > self.longest_block and max(map(len, line.split("\n"))) > self.longest_block:
                 raise self.cannot_say(f"a line of more than {self.longest_block} characters")
             text.write(f"{line}\n")
-        return text.getvalue()
 
-    def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
-        """Yield lines of the program; some thousand are made at a time."""
-        # What does not move by the decimals that are written does not move.
-        toolpath = toolpath.with_numbers(rounded(toolpath.numbers_written, self.decimals))
+    def _head(self, toolpath: Toolpath, header: Sequence[str]) -> Iterator[str]:
         yield from self.before_header(toolpath)
         for text in header:
             yield self.comment(text)
@@ -102,8 +115,6 @@ class WordDialect(Dialect):
         if toolpath.numbers and around:
             around[0] = f"{self.line_number(toolpath.numbers[0])}{around[0]}"
         yield from around
-        yield from self._body(toolpath)
-        yield from self.end(toolpath)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
         """Return lines before the header's comments."""
@@ -196,42 +207,42 @@ class WordDialect(Dialect):
         """Return the error for a row without words in this dialect."""
         return CannotSayError(self.name, what)
 
-    def _body(self, toolpath: Toolpath) -> Iterator[str]:
-        changed = changed_axes(toolpath)
-        state = _Modal(math.nan, math.nan if toolpath.corner_mm is None else toolpath.corner_mm)
+    def _body(self, toolpath: Toolpath, state: _Modal) -> Iterator[str]:
+        # What does not move by the decimals that are written does not move.
+        toolpath = toolpath.with_numbers(rounded(toolpath.numbers_written, self.decimals))
+        if not state.rows:
+            state.corner_mm = math.nan if toolpath.corner_mm is None else toolpath.corner_mm
+            state.pose = np.full(6, np.nan) if toolpath.start is None else toolpath.start
+        words = self._words(toolpath, changed_axes(toolpath, state))
         # Most rows only have other axes than the row before: a table's words stand beside these.
         of_table = self.words.get("feed", "") if type(self).feed is WordDialect.feed else ""
         plain_feed = of_table.split("{words}") if of_table.count("{") == 1 else []
-        for begin in range(0, len(toolpath), AT_ONCE):
-            rows = slice(begin, min(begin + AT_ONCE, len(toolpath)))
-            words = self._words(toolpath, changed, rows)
-            kinds, feeds = toolpath.kind[rows].tolist(), toolpath.feed[rows].tolist()
-            corners, in_machine = toolpath.corners_mm[rows].tolist(), toolpath.in_machine[rows].tolist()
-            ends = _ends_of_plain(toolpath, rows) if plain_feed else []
-            done = 0
-            for place, kind in enumerate(kinds):
-                if place < done:
+        kinds, feeds = toolpath.kind.tolist(), toolpath.feed.tolist()
+        corners, in_machine = toolpath.corners_mm.tolist(), toolpath.in_machine.tolist()
+        ends = _ends_of_plain(toolpath) if plain_feed else []
+        done = 0
+        for row, kind in enumerate(kinds):
+            if row < done:
+                continue
+            if ends and ends[row] > row:
+                done = ends[row]
+                lines = f"{plain_feed[-1]}\n{plain_feed[0]}".join(words[row:done])
+                yield f"{plain_feed[0]}{lines}{plain_feed[-1]}"
+                continue
+            try:
+                if kind not in _MOVES:
+                    yield self._row(RowKind(kind), toolpath, row)
+                    if kind == RowKind.SYSTEM:
+                        yield from self.length_guard(toolpath.text[row], toolpath.holds or {}, state.rows + row)
                     continue
-                if ends and ends[place] > place:
-                    done = ends[place]
-                    lines = f"{plain_feed[-1]}\n{plain_feed[0]}".join(words[place:done])
-                    yield f"{plain_feed[0]}{lines}{plain_feed[-1]}"
-                    continue
-                try:
-                    if kind not in _MOVES:
-                        yield self._row(RowKind(kind), toolpath, begin + place)
-                        if kind == RowKind.SYSTEM:
-                            said = toolpath.text[begin + place]
-                            yield from self.length_guard(said, toolpath.holds or {}, begin + place)
-                        continue
-                    if corners[place] != state.corner_mm and not math.isnan(corners[place]):
-                        state.corner_mm = corners[place]
-                        yield self.corner(corners[place])
-                    line = self._move(kind, words[place], feeds[place], state)
-                    yield self.in_machine(line) if in_machine[place] else line
-                except CannotSayError as error:
-                    where = toolpath.where(begin + place)
-                    raise CannotSayError(error.dialect, error.asked, where=where) from None
+                if corners[row] != state.corner_mm and not math.isnan(corners[row]):
+                    state.corner_mm = corners[row]
+                    yield self.corner(corners[row])
+                line = self._move(kind, words[row], feeds[row], state)
+                yield self.in_machine(line) if in_machine[row] else line
+            except CannotSayError as error:
+                raise CannotSayError(error.dialect, error.asked, where=toolpath.where(row)) from None
+        state.rows += len(kinds)
 
     def _move(self, kind: int, words: str, feed: float, state: _Modal) -> str:
         if kind == RowKind.RAPID:
@@ -255,8 +266,8 @@ class WordDialect(Dialect):
         }
         return said[kind](text)
 
-    def _words(self, toolpath: Toolpath, changed: Flags, rows: slice) -> list[str]:
-        poses, changed = toolpath.numbers_written[rows], changed[rows]
+    def _words(self, toolpath: Toolpath, changed: Flags) -> list[str]:
+        poses = toolpath.numbers_written
         texts = [""] * len(poses)
         which = changed @ (1 << np.arange(6))
         for one in np.unique(which):
@@ -272,22 +283,24 @@ class WordDialect(Dialect):
         return texts
 
 
-def _ends_of_plain(toolpath: Toolpath, rows: slice) -> list[int]:
+def _ends_of_plain(toolpath: Toolpath) -> list[int]:
     """Return the end of the stretch of plain moves that each row begins, as an index among these rows; the row itself if it changes more than axes."""
-    kind, feed, corner = toolpath.kind[rows], toolpath.feed[rows], toolpath.corners_mm[rows]
+    kind, feed, corner = toolpath.kind, toolpath.feed, toolpath.corners_mm
     plain = np.zeros(len(kind) + 1, dtype=np.bool_)
     same = (kind[1:] == RowKind.FEED) & (kind[:-1] == RowKind.FEED) & (feed[1:] == feed[:-1])
-    plain[1:-1] = same & ((corner[1:] == corner[:-1]) | np.isnan(corner[1:])) & ~toolpath.in_machine[rows][1:]
+    plain[1:-1] = same & ((corner[1:] == corner[:-1]) | np.isnan(corner[1:])) & ~toolpath.in_machine[1:]
     stops = np.flatnonzero(~plain)
     ends: list[int] = stops[np.searchsorted(stops, np.arange(len(kind)))].tolist()
     return ends
 
 
 class _Modal:
-    """Modal values."""
+    """What successive parts of a program go on from: pose with NaN for unknown axes, shape (6,), and number of rows."""
 
-    def __init__(self, feed: float, corner_mm: float) -> None:
-        self.feed, self.corner_mm = feed, corner_mm
+    def __init__(self) -> None:
+        self.feed = self.corner_mm = math.nan
+        self.pose = np.full(6, np.nan)
+        self.rows = 0
 
 
 _MOVES = frozenset((int(RowKind.RAPID), int(RowKind.FEED)))
@@ -297,14 +310,15 @@ SAME = 1e-9
 """Positions that differ by less are equal: numbers and offsets have fifteen digits [mm, deg]."""
 
 
-def changed_axes(toolpath: Toolpath) -> Flags:
-    """Return the axes that each row must name, shape (n, 6); False in rows without a move."""
+def changed_axes(toolpath: Toolpath, state: _Modal) -> Flags:
+    """Return axes that each row must name, shape (n, 6); none in rows that are no moves."""
     moves = np.flatnonzero(toolpath.is_move)
     poses = toolpath.poses[moves]
     known = (toolpath.unknown[moves][:, None] >> np.arange(6)) & 1 == 0
-    start = np.full(6, np.nan) if toolpath.start is None else toolpath.start
-    before = np.vstack([start, poses])[: len(poses)]
-    was_known = np.vstack([~np.isnan(start), known])[: len(poses)]
+    before = np.vstack([state.pose, poses])
+    was_known = np.vstack([~np.isnan(state.pose), known])
+    state.pose = np.where(was_known[-1], before[-1], np.nan)
+    before, was_known = before[:-1], was_known[:-1]
     must = known & (~was_known | ~(np.abs(poses - before) <= SAME))
     # A move to where the machine stands already is a move: most controls want an axis in it.
     stays = ~must.any(axis=1)

@@ -56,7 +56,7 @@ def test_what_a_machine_remembers_goes_from_part_to_part(linuxcnc, reference, mo
     path = linuxcnc.read(LINES, "lines.ngc")
     whole = compensate_toolpath(path, model, started_s=10.0)
     monkeypatch.setattr(splitting, "ROWS_AT_ONCE", 3)
-    assert len(parts_of(path, runs_of(path, np.zeros(len(path))))) > 3
+    assert len(parts_in(path)) > 2
     parts = compensate_toolpath(path, model, started_s=10.0)
     np.testing.assert_array_equal(parts.toolpath.kind, whole.toolpath.kind)
     assert parts.toolpath.text == whole.toolpath.text
@@ -75,7 +75,7 @@ def test_an_arc_is_cut_within_its_chord_error(linuxcnc, crooked, monkeypatch):
     assert parts.chord_um <= 0.1
     np.testing.assert_allclose(parts.toolpath.poses[-1], whole.toolpath.poses[-1], rtol=0.0, atol=2e-6)
     # A part may take one piece more than its share of the whole, and none is much shorter.
-    assert 0 <= len(parts.toolpath) - len(whole.toolpath) <= len(parts_of(path, runs_of(path, np.zeros(len(path)))))
+    assert 0 <= len(parts.toolpath) - len(whole.toolpath) <= len(parts_in(path))
     shortest_mm = [each.toolpath.tip_mm[each.toolpath.kind == RowKind.FEED].min() for each in (parts, whole)]
     assert shortest_mm[0] > 0.9 * shortest_mm[1]
 
@@ -83,7 +83,11 @@ def test_an_arc_is_cut_within_its_chord_error(linuxcnc, crooked, monkeypatch):
 def test_parts_begin_with_moves_at_feed(linuxcnc, monkeypatch):
     monkeypatch.setattr(splitting, "ROWS_AT_ONCE", 2)
     path = linuxcnc.read(LINES, "lines.ngc")
-    parts = parts_of(path, runs_of(path, np.zeros(len(path))))
-    assert [part.start for part in parts] == [0, *(part.stop for part in parts[:-1])]
-    assert parts[-1].stop == len(path)
-    assert all(path.kind[part.start] == RowKind.FEED and path.tip_mm[part.start] > 0.0 for part in parts[1:])
+    parts = parts_in(path)
+    assert sum(map(len, parts)) == len(path)
+    np.testing.assert_array_equal(np.concatenate([part.line for part in parts]), path.line)
+    assert all(part.kind[0] == RowKind.FEED and part.tip_mm[0] > 0.0 for part in parts[1:])
+
+
+def parts_in(path):
+    return [part for part, _ in parts_of(path, lambda part: runs_of(part, np.zeros(len(part))))]

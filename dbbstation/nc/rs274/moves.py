@@ -131,7 +131,7 @@ class Moves(Modes):
         if arc is not None:
             cutter.reaches(element)
             arc = replace(arc, start=start, end=there, centre_mm=(element.centre.real, element.centre.imag))
-        self._beside = Beside(element, self.path.added + 1, start, there, plane, arc)
+        self._beside = Beside(element, len(self.path), start, there, plane, arc)
         if last is not None:
             self._beside.check(element.swept_rad)
         self._piece(block, there, arc)

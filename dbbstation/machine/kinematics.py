@@ -225,7 +225,11 @@ def _spans(hexapod: Hexapod, frames: Frames) -> tuple[Floats, Floats]:
     """Return T + R P - Q and R P, both (n, 6, 3) [mm]."""
     # NumPy is used because starting the compiler takes half a second.
     base, platform = _joints(hexapod, len(frames))
-    arm = platform @ np.swapaxes(frames.rotation, 1, 2)
+    if len(platform) == 1:  # one product of two large matrices instead of many small ones
+        products = frames.rotation.reshape(-1, 3) @ platform[0].T
+        arm = np.swapaxes(products.reshape(-1, 3, STRUTS), 1, 2)
+    else:
+        arm = platform @ np.swapaxes(frames.rotation, 1, 2)
     return frames.position_mm[:, np.newaxis, :] + arm - base, arm
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.model.compensation import begun, compensated_on
+from dbbstation.nc.toolpath import lengths
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -138,9 +140,7 @@ def row_and_share(places: Floats) -> tuple[Integers, Floats]:
 
 def felt_mm(off: Floats) -> Floats:
     """Return the motion that pose differences, shape (k, 6), cause at the tip or the lever, shape (k,) [mm]: the larger one."""
-    lengths = in_mm(off)
-    moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
-    felt: Floats = np.maximum(moved, tilted)
+    felt: Floats = np.maximum(lengths(off[:, :3]), math.radians(LEVER_MM) * lengths(off[:, 3:]))
     return felt
 
 

@@ -100,15 +100,17 @@ def marked(
 def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance explains."""
     tried = list(decimals_of(toolpath))
-    parts = {(first, decimals[first]): [np.zeros(0, np.uint64)] for decimals in tried for first in (0, 3)}
+    least = [min(decimals[first] for decimals in tried) for first in (0, 3)]
+    sums = [np.zeros((0, 2), np.uint64)]
     for numbers in _known(toolpath):
-        for (first, decimals), sums in parts.items():
-            axes = slice(first, first + 3)
-            sums.append(_sums(_numbers(numbers[:, axes], (decimals,) * 3), axes))
-    whole = {which: np.concatenate(sums) for which, sums in parts.items()}
-    each = [whole[0, decimals[0]] + whole[3, decimals[3]] for decimals in tried]
+        groups = zip(_GROUPS, least, strict=True)
+        sums.append(np.column_stack([_sums(_numbers(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups]))
+    # What has few decimals has zeros as the further ones.
+    place, angle = np.concatenate(sums).T
+    further = ((decimals[0] - least[0], decimals[3] - least[1]) for decimals in tried)
+    each = [place * np.uint64(10**more) + angle * np.uint64(10**turned) for more, turned in further]
     count = _distinct(each[0])
-    return any(has_marks(sums, count) for sums in each)
+    return any(has_marks(one, count) for one in each)
 
 
 def has_marks(sums: NDArray[np.uint64], count: int | None = None) -> bool:
@@ -136,10 +138,14 @@ def _distinct(sums: NDArray[np.uint64]) -> int:
 def decimals_of(toolpath: Toolpath) -> Iterator[tuple[int, ...]]:
     """Yield the decimals in which a dialect may have written the poses, this program's first."""
     yield DECIMALS
-    enough = [
-        [n for n in COARSER if n <= most and all(_off(each[:, axes], n) < _SAME for each in _known(toolpath))]
+    least = [
+        next(
+            (n for n in COARSER if n <= most and all(_off(each[:, axes], n) < _SAME for each in _known(toolpath))),
+            most + 1,
+        )
         for axes, most in _GROUPS
     ]
+    enough = [range(fewest, most + 1) for fewest, (_, most) in zip(least, _GROUPS, strict=True)]
     yield from (found for mm in enough[0] for deg in enough[1] if (found := (mm,) * 3 + (deg,) * 3) != DECIMALS)
 
 

@@ -13,7 +13,9 @@ from dbbstation.circles.strip import strip_widths
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.rs274.plain import letters_of, plain_lines
+from dbbstation.nc.dialects.linuxcnc import LinuxCNC
+from dbbstation.nc.export import Inverse, compensated_program
+from dbbstation.nc.rs274.reader import read_program
 from dbbstation.sources.contract import Fitted, Motion, Setup
 from dbbstation.sources.registry import known_sources
 from dbbstation.sources.trial import tried
@@ -36,7 +38,10 @@ def prepare() -> None:
     for one in (MachineModel(machine), model):
         one.actual(motion)
         one.bar(motion).by_source(joints.source, machine, joints.values)
-    plain_lines(letters_of("X1\n"), 0)
+    place = "X0 Y0 Z{:.3f} A0 B0 C0"
+    lines = ["G21 G90 G94 F600", f"G0 {place}", *(f"G1 X{x}" for x in range(8)), "M2"]
+    program = "\n".join(lines).format(middle[2])
+    compensated_program(read_program(program, "prepared.ngc"), LinuxCNC(), Inverse(model))
     noise = form_and_noise(np.random.default_rng(1).standard_normal(128))
     for path in drawn_paths(noise, np.arange(128.0) * (360.0 / 128.0), np.ones(65), 1, (2, 0)):
         strip_widths(path.highest_um, path.lowest_um, path.theta_deg)

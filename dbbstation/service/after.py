@@ -16,7 +16,7 @@ from dbbstation.files.keys import digests_of, files_of_session, key_of
 from dbbstation.files.places import real_path, unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.service.former_sessions import keep_models
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
@@ -118,6 +118,17 @@ def counted(session: Path) -> str:
 USUAL = (SessionTask.CALIBRATE, SessionTask.DIAGNOSE, SessionTask.PROGRAMS, SessionTask.REPORT)
 """Steps that need this session only; an acceptance also needs an earlier session."""
 
+_WRITTEN = {
+    SessionTask.CALIBRATE: "out",
+    SessionTask.DIAGNOSE: "out",
+    SessionTask.FIGURES: "figure",
+    SessionTask.HISTORY: "page",
+}
+"""Outputs that are no parameters of their tasks."""
+
+TOLERATED_FILTER = "30"
+"""Filter of the figures that tolerances are for."""
+
 _OF_OTHERS = {SessionTask.ACCEPTANCE, SessionTask.HISTORY}
 """Steps whose result depends on other sessions."""
 
@@ -160,7 +171,7 @@ class After:
         session: Path,
         model: Path | None = None,
         settings: Path | None = None,
-        start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
+        start: Callable[[Call, Path], BackgroundWork] = BackgroundWork,
         place: str = "",
         tolerances: Path | None = None,
     ) -> None:
@@ -278,30 +289,39 @@ class After:
         step = self._waiting.pop(0)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.results[step] = Result(WorkProgress.RUNNING)
-        self._running = step, self._start(self._job(step), self.folder)
+        self._running = step, self._start(self._call(step), self.folder)
 
-    def _job(self, step: SessionTask) -> SessionJob:
-        job = SessionJob(
-            task=step,
-            beside=self.session.parent,
-            out=self._out(step),
-            session=self.session,
-            settings=None if self._settings is None else self._settings.absolute(),
-        )
+    def _call(self, step: SessionTask) -> Call:
+        sessions = {"sessions": str(self.session)}
         match step:
+            case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
+                task, given = step.value, sessions
             case SessionTask.PROGRAMS:
                 plan, machine = self._files()
-                return job.model_copy(update={"plan": plan, "machine": machine, "model": self.model})
-            case SessionTask.REPORT:
-                return job.model_copy(
-                    update={"model": self.model, "place": self._place, "tolerances": self._tolerances}
-                )
-            case SessionTask.ACCEPTANCE:
-                if self.former is None:
-                    raise ValueError("no session was chosen for the comparison")
-                return job.model_copy(update={"before": self.former.folder})
-            case _:
-                return job
+                task, given = "program", {"plan": str(plan), "machine": str(machine), "out": PROGRAMS}
+            case SessionTask.REPORT | SessionTask.ACCEPTANCE:
+                task, given = "report", sessions | {"page": self._out(step)}
+            case SessionTask.FIGURES:
+                task, given = "circles", sessions | {"filter": TOLERATED_FILTER}
+            case SessionTask.HISTORY:
+                task, given = "history", {"folder": str(self.session.parent)}
+        if step is SessionTask.ACCEPTANCE:
+            if self.former is None:
+                raise ValueError("no session was chosen for the comparison")
+            given |= {"before": str(self.former.folder)}
+        if step in {SessionTask.PROGRAMS, SessionTask.REPORT} and self.model is not None:
+            given |= {"model": str(self.model)}
+        if step is SessionTask.REPORT and self._place:
+            given |= {"place": self._place}
+        output = _WRITTEN.get(step)
+        return Call(
+            task=task,
+            given=given,
+            outputs={} if output is None else {output: self._out(step)},
+            beside=self.session.parent,
+            settings=None if self._settings is None else self._settings.absolute(),
+            tolerances=self._tolerances if step is SessionTask.REPORT else None,
+        )
 
     def _files(self) -> tuple[Path, Path]:
         session = read_session(self.session)

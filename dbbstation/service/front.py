@@ -20,7 +20,7 @@ from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call
 from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import ProbeOutcome, ports, probe
@@ -191,17 +191,15 @@ class Front:
         if plan is None or machine is None or choice.folder is None:
             raise ValueError("plan, machine or folder is missing")
         folder = unused_path(choice.folder.parent, f"{choice.folder.name}-programs")
-        job = SessionJob(
-            task=SessionTask.PROGRAMS,
+        given = {"plan": str(plan.absolute()), "machine": str(machine.absolute()), "out": str(folder.absolute())}
+        call = Call(
+            task="program",
+            given=given if model is None else given | {"model": str(model.absolute())},
             beside=self.under.absolute(),
-            out=str(folder.absolute()),
-            model=None if model is None else model.absolute(),
-            plan=plan.absolute(),
-            machine=machine.absolute(),
             settings=None if self.settings is None else self.settings.absolute(),
             force=False,
         )
-        work = BackgroundWork(job, self.under)
+        work = BackgroundWork(call, self.under)
         try:
             if work.wait() is not WorkProgress.DONE:
                 raise StationError(work.failure())

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 
 class SessionTask(StrEnum):
-    """Tasks in their usual order."""
+    """Steps after a session in their usual order."""
 
     CALIBRATE = "calibrate"
     DIAGNOSE = "diagnose"
@@ -20,32 +20,22 @@ class SessionTask(StrEnum):
     HISTORY = "history"
 
 
-class SessionJob(BaseModel):
-    """One task on one session."""
+class Call(BaseModel):
+    """One task with its parameters and outputs, as the command of this name has them."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    task: SessionTask
-    """The task."""
+    task: str
+    """Name of the command."""
+    given: dict[str, str]
+    """Values by parameter; what is missing comes from the settings."""
+    outputs: dict[str, str] = {}
+    """Files to write, by the option that names them on the command line."""
     beside: Path
     """Folder that may contain the shop's settings."""
-    out: str
-    """Name of the output in the folder of results."""
-    session: Path | None = None
-    """Folder of the session; programs need none."""
-    before: Path | None = None
-    """Earlier session for the comparison of an acceptance."""
-    model: Path | None = None
-    """Model for compensation or comparison; None: nominal programs, or no model."""
-    plan: Path | None = None
-    """Plan of the programs."""
-    machine: Path | None = None
-    """Machine of the programs."""
     settings: Path | None = None
     """File of the shop's settings, if one was named."""
     tolerances: Path | None = None
     """Settings with the tolerances of an operator's job, which replace the shop's."""
-    place: str = ""
-    """Place of the measurement, for a certificate."""
     force: bool = True
     """Whether existing files are replaced: only the program writes into the folder of results."""

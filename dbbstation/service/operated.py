@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.facts.held import ComparedTolerance
-    from dbbstation.service.job import SessionJob
+    from dbbstation.service.job import Call
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class JobAnswer:
         operated: Operated,
         session: Path,
         missing: Sequence[str],
-        start: Callable[[SessionJob, Path], BackgroundWork] = BackgroundWork,
+        start: Callable[[Call, Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self._missing, job = tuple(missing), operated.job
         tolerances = operated.tolerances_file(session)

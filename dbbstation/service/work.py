@@ -18,7 +18,7 @@ from dbbstation.system.children import end_tree, python_module
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.service.job import SessionJob
+    from dbbstation.service.job import Call
 
 WORKER = "dbbstation.service.worker"
 """Module that the process runs. The station never imports it, since it imports all computations."""
@@ -51,8 +51,8 @@ class BackgroundWork:
         stage: by its own report; empty at first.
     """
 
-    def __init__(self, job: SessionJob, folder: Path) -> None:
-        self.job = job
+    def __init__(self, call: Call, folder: Path) -> None:
+        self.call = call
         self.stage = ""
         self._begun_s = time.monotonic()
         self._ended_s: float | None = None
@@ -131,7 +131,7 @@ class BackgroundWork:
         if self._process.stdin is None:
             return
         with suppress(OSError):
-            self._process.stdin.write(self.job.model_dump_json() + "\n")
+            self._process.stdin.write(self.call.model_dump_json() + "\n")
             self._process.stdin.flush()
 
     def _listen(self) -> None:

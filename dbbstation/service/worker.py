@@ -10,26 +10,19 @@ import _thread
 import json
 import logging
 import os
-import shlex
 import sys
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation import __version__
 from dbbstation.errors import StationError
 from dbbstation.files.formats.settings import read_settings, settings_files
-from dbbstation.files.inputs import input_book, inputs_so_far, virtual_so_far
-from dbbstation.files.places import name_of
-from dbbstation.files.provenance import Provenance
+from dbbstation.files.inputs import input_book
 from dbbstation.files.refused import in_a_sentence
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call
 from dbbstation.service.work import LOG_MARK, STAGE_MARK
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from dbbstation.files.formats.settings import Settings
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: the work failed, with the reason on standard error; the work was interrupted."""
@@ -51,9 +44,9 @@ def main() -> None:
     logging.captureWarnings(capture=True)
     try:
         with input_book():
-            job = SessionJob.model_validate_json(sys.stdin.readline())
+            call = Call.model_validate_json(sys.stdin.readline())
             threading.Thread(target=_interrupted_at_the_end, name="input", daemon=True).start()
-            answer = done(job)
+            answer = done(call)
         sys.stdout.write(json.dumps(answer, allow_nan=False))
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -76,116 +69,18 @@ def _interrupted_at_the_end() -> None:
     _thread.interrupt_main()
 
 
-def done(job: SessionJob) -> Mapping[str, object]:
-    """Do a job in the working folder; return its JSON result.
+def done(call: Call) -> Mapping[str, object]:
+    """Do a task in the working folder; return its JSON result.
 
     Raises:
         StationError: as of the task.
-        ValueError: the job lacks a file.
     """
-    from dbbstation.facts.serialise import plain  # noqa: PLC0415 - the job is read before half a second of imports
+    from dbbstation.facts.serialise import plain  # noqa: PLC0415 - the call is read before half a second of imports
+    from dbbstation.tasks.called import called  # noqa: PLC0415 - the same
 
-    shops = settings_files(job.beside) if job.settings is None else [job.settings]
-    settings = read_settings([*([] if job.tolerances is None else [job.tolerances]), *shops])
-    match job.task:
-        case SessionTask.CALIBRATE | SessionTask.DIAGNOSE:
-            return plain(_fitted(job))
-        case SessionTask.PROGRAMS:
-            return plain(_programs(job, settings))
-        case SessionTask.REPORT | SessionTask.ACCEPTANCE:
-            return plain(_reported(job, settings))
-        case SessionTask.FIGURES | SessionTask.HISTORY:
-            return plain(_drawn(job, settings))
-
-
-def _fitted(job: SessionJob) -> object:
-    from dbbstation.files.formats.model import write_model  # noqa: PLC0415 - the same
-    from dbbstation.tasks.calibrate import calibrate  # noqa: PLC0415 - the same
-    from dbbstation.tasks.diagnose import diagnose  # noqa: PLC0415 - the same
-
-    session = _needed(job.session, "session")
-    fit = calibrate if job.task is SessionTask.CALIBRATE else diagnose
-    result = fit(session, progress=_stage, say=_note)
-    write_model(Path(job.out), result.model, provenance=_provenance(job.task.value, session), force=job.force)
-    return result
-
-
-def _programs(job: SessionJob, settings: Settings) -> object:
-    from dbbstation.tasks.circle_programs import program  # noqa: PLC0415 - the same
-
-    plan, machine = _needed(job.plan, "plan"), _needed(job.machine, "machine")
-    chosen = {
-        option: settings.values[key].value
-        for option, key in (
-            ("dialect", "program.dialect"),
-            ("step_deg", "program.step_deg"),
-            ("clearance_mm", "program.clearance_mm"),
-            ("largest_correction_mm", "limits.largest_correction_mm"),
-        )
-        if key in settings.values
-    }
-    words: list[str] = [
-        word for option, value in chosen.items() for word in (f"--{option.replace('_', '-')}", str(value))
-    ]
-    of_model: list[str | Path] = [] if job.model is None else ["--model", job.model]
-    return program(
-        plan=plan,
-        machine=machine,
-        out=job.out,
-        model=job.model,
-        **chosen,
-        force=job.force,
-        provenance=lambda: _provenance("program", "--plan", plan, "--machine", machine, *of_model, *words),
-        progress=_stage,
-        say=_note,
-    )
-
-
-def _reported(job: SessionJob, settings: Settings) -> object:
-    from dbbstation.tasks.report import report  # noqa: PLC0415 - the same
-
-    session = _needed(job.session, "session")
-    given = [word for name in ("model", "before") if (path := getattr(job, name)) for word in (f"--{name}", path)]
-    given += ["--place", job.place] if job.place else []
-    return report(
-        session,
-        job.out,
-        settings=settings,
-        before=job.before,
-        model=job.model,
-        place=job.place,
-        force=job.force,
-        provenance=lambda: _provenance("report", session, *given),
-        progress=_stage,
-    )
-
-
-def _drawn(job: SessionJob, settings: Settings) -> object:
-    from dbbstation.tasks.pages import draw_circles, draw_history  # noqa: PLC0415 - the same
-    from dbbstation.tasks.telling import Telling  # noqa: PLC0415 - the same
-
-    session, out, telling = _needed(job.session, "session"), Path(job.out), Telling(_stage, say=_note)
-    if job.task is SessionTask.FIGURES:
-        return draw_circles(
-            session,
-            out,
-            lambda: _provenance("circles", session, "--filter", "30", "--figure", out),
-            telling,
-            force=job.force,
-        )
-    words = ("history", job.beside, "--page", out)
-    return draw_history(job.beside, out, settings, lambda: _provenance(*words), telling, force=job.force)
-
-
-def _needed(path: Path | None, what: str) -> Path:
-    if path is None:
-        raise ValueError(f"the job has no {what}")
-    return path
-
-
-def _provenance(*words: str | Path) -> Provenance:
-    command = shlex.join(["dbbstation", *(name_of(word) if isinstance(word, Path) else word for word in words)])
-    return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
+    shops = settings_files(call.beside) if call.settings is None else [call.settings]
+    settings = read_settings([*([] if call.tolerances is None else [call.tolerances]), *shops])
+    return plain(called(call.task, call.given, call.outputs, settings, force=call.force, progress=_stage, say=_note))
 
 
 def _stage(text: str, done: int = 0, of: int = 0) -> None:  # noqa: ARG001 - as `Progress` has it; the station shows no counts

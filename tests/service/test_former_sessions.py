@@ -16,7 +16,7 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import USUAL, After
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, keep_models
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.last_session import last_traces
 from dbbstation.service.work import WorkProgress
 from tests.plant.mechanisms.balls import CmmScatter
@@ -106,8 +106,8 @@ def test_the_model_in_force_before_is_copied_once_and_never_overwritten(shop: Pa
 def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
     begun: list[Scripted] = []
 
-    def start(job: SessionJob, folder: Path) -> Scripted:
-        begun.append(Scripted(job, folder))
+    def start(call: Call, folder: Path) -> Scripted:
+        begun.append(Scripted(call, folder))
         return begun[-1]
 
     after = After(shop / "now", start=start)  # type: ignore[arg-type]
@@ -115,7 +115,11 @@ def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
     assert SessionTask.ACCEPTANCE not in USUAL
     after.accept(before_and_now(shop / "now").formers[1])
     (work,) = begun
-    assert (work.job.task, work.job.session, work.job.before) == ("acceptance", shop / "now", shop / "there")
+    assert (work.call.task, work.call.given["sessions"], work.call.given["before"]) == (
+        "report",
+        str(shop / "now"),
+        str(shop / "there"),
+    )
     work.progress = WorkProgress.DONE
     after.look()
     assert after.results[SessionTask.ACCEPTANCE].path == after.folder / "acceptance.html"

@@ -27,7 +27,7 @@ from dbbstation.service.after import After, Result
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, SetUpPart
 from dbbstation.service.front import Front
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
@@ -221,20 +221,21 @@ def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
 
 
 def test_work_answers_with_its_result(session: Path, tmp_path: Path) -> None:
-    work = BackgroundWork(SessionJob(task=SessionTask.CALIBRATE, beside=tmp_path, out="model.yaml"), tmp_path)
+    work = BackgroundWork(Call(task="calibrate", given={}, outputs={"out": "model.yaml"}, beside=tmp_path), tmp_path)
     assert ended(work) is WorkProgress.FAILED
     assert work.failure().splitlines() == [
-        "ValueError: the job has no session",
+        "TypeError: missing a required argument: 'sessions'",
         "this is a fault of dbbstation itself; the log shows what to report",
     ]
     work.close()
-    gone = SessionJob(task=SessionTask.REPORT, beside=tmp_path, out="report.html", session=tmp_path / "gone")
+    given = {"sessions": str(tmp_path / "gone"), "page": "report.html"}
+    gone = Call(task="report", given=given, beside=tmp_path)
     work = BackgroundWork(gone, tmp_path)
     assert ended(work) is WorkProgress.FAILED
     assert "gone" in work.failure()
     assert "fault of dbbstation" not in work.failure()
     work.close()
-    work = BackgroundWork(gone.model_copy(update={"session": session}), tmp_path)
+    work = BackgroundWork(gone.model_copy(update={"given": given | {"sessions": str(session)}}), tmp_path)
     assert ended(work) is WorkProgress.DONE
     assert work.answer()["report"] == "report.html"
     assert "dbbstation report monday" in (tmp_path / "report.html").read_text("utf-8")
@@ -244,7 +245,8 @@ def test_work_answers_with_its_result(session: Path, tmp_path: Path) -> None:
 
 def test_work_can_be_ended(session: Path, tmp_path: Path) -> None:
     work = BackgroundWork(
-        SessionJob(task=SessionTask.DIAGNOSE, beside=tmp_path, out="joint.yaml", session=session), tmp_path
+        Call(task="diagnose", given={"sessions": str(session)}, outputs={"out": "joint.yaml"}, beside=tmp_path),
+        tmp_path,
     )
     end_s = time.monotonic() + PATIENCE_S
     while not work.stage:
@@ -269,12 +271,12 @@ class Scripted:
     stage = "fit of 6 runs"
     passed_s = 1.0
 
-    def __init__(self, job: SessionJob, folder: Path) -> None:
-        self.job, self.folder = job, folder
+    def __init__(self, call: Call, folder: Path) -> None:
+        self.call, self.folder = call, folder
         self.progress = WorkProgress.RUNNING
 
     def answer(self) -> dict[str, str]:
-        return {"from": self.job.task}
+        return {"from": self.call.task}
 
     def failure(self) -> str:
         return "it failed"
@@ -289,8 +291,8 @@ class Scripted:
 def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session: Path) -> None:
     begun: list[Scripted] = []
 
-    def start(job: SessionJob, folder: Path) -> Scripted:
-        begun.append(Scripted(job, folder))
+    def start(call: Call, folder: Path) -> Scripted:
+        begun.append(Scripted(call, folder))
         return begun[-1]
 
     after = After(session, start=start)  # type: ignore[arg-type]
@@ -305,8 +307,8 @@ def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session:
     results = session.parent / "monday-results"
     assert after.busy is None
     assert after.folder == results
-    assert [one.job.task for one in begun] == ["calibrate", "programs", "report"]
-    assert [one.job.model for one in begun] == [None, results / "model.yaml", results / "model.yaml"]
+    assert [one.call.task for one in begun] == ["calibrate", "program", "report"]
+    assert [one.call.given.get("model") for one in begun] == [None, *2 * [str(results / "model.yaml")]]
     assert after.results[SessionTask.REPORT].path == results / "report.html"
     after.do(SessionTask.DIAGNOSE, SessionTask.REPORT)
     after.look()

@@ -14,7 +14,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import After
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.verdicts import give_verdict
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Judge
@@ -35,8 +35,8 @@ class Done:
 
     progress, stage, passed_s = WorkProgress.DONE, "", 2.5
 
-    def __init__(self, job: SessionJob, folder: Path) -> None:
-        (folder / job.out).write_text("written", encoding="utf-8")
+    def __init__(self, call: Call, folder: Path) -> None:
+        (folder / (call.outputs.get("out") or call.given["page"])).write_text("written", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:
         return {"parameters": 42}

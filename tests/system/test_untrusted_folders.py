@@ -12,7 +12,7 @@ import pytest
 
 from dbbstation.computing.processes import each
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.job import SessionJob, SessionTask
+from dbbstation.service.job import Call
 from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.system.children import python_module
 
@@ -62,7 +62,7 @@ def test_the_modules_would_be_executed(folder):
 
 
 def test_jobs_of_the_screen_load_none(folder):
-    job = SessionJob(task=SessionTask.REPORT, beside=folder, out="report.html", session=folder / "session")
+    job = Call(task="report", given={"sessions": str(folder / "session"), "page": "report.html"}, beside=folder)
     work = BackgroundWork(job, folder)
     assert work.wait() is WorkProgress.DONE, work.failure()
     work.close()

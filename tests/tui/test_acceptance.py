@@ -79,7 +79,7 @@ def test_the_session_before_is_chosen_and_the_verdict_shown(after: After) -> Non
         assert after.busy is SessionTask.ACCEPTANCE
         assert "Comparing: fit of 6 runs" in texts_of(app, "#row-now")
         _, work = after._running
-        assert work.job.before == Path("/shop/monday")
+        assert work.call.given["before"] == str(Path("/shop/monday"))
         await pilot.press("h")  # not while it is being compared
         assert isinstance(app.screen, AcceptanceScreen)
         work.progress = WorkProgress.DONE

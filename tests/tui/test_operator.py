@@ -30,7 +30,7 @@ from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
 from dbbstation.service.board import Board, RunDecision
 from dbbstation.service.front import Front
-from dbbstation.service.job import SessionJob
+from dbbstation.service.job import Call
 from dbbstation.service.memory import Memory
 from dbbstation.service.messages import Message, Weight, message_of
 from dbbstation.service.operated import SHIFT_S, Answered, JobAnswer, answer_of, read_operated
@@ -76,9 +76,9 @@ class Reported:
     progress, stage, passed_s = WorkProgress.DONE, "", 1.0
     kind = "within"
 
-    def __init__(self, job: SessionJob, folder: Path) -> None:
-        assert job.tolerances is not None
-        self.settings = read_settings([job.tolerances])
+    def __init__(self, call: Call, folder: Path) -> None:
+        assert call.tolerances is not None
+        self.settings = read_settings([call.tolerances])
         (folder / "report.html").write_text("a report", encoding="utf-8")
 
     def answer(self) -> dict[str, object]:

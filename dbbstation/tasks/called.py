@@ -1,0 +1,110 @@
+"""Do a task by its name, as another process asks for it."""
+
+from __future__ import annotations
+
+import shlex
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dbbstation import __version__
+from dbbstation.files.atomic import write_bytes
+from dbbstation.files.inputs import inputs_so_far, virtual_so_far
+from dbbstation.files.places import name_of
+from dbbstation.files.provenance import Provenance
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from dbbstation.files.formats.settings import Settings
+    from dbbstation.tasks.declare import Declared
+    from dbbstation.tasks.telling import Progress
+
+_MODULES = {
+    "calibrate": "calibrate",
+    "circles": "circles",
+    "diagnose": "diagnose",
+    "history": "history",
+    "program": "circle_programs",
+    "report": "report",
+}
+"""Module of each task that a station asks for."""
+
+_PATHS = (Path, tuple[Path, ...])
+
+
+def called(
+    name: str,
+    given: Mapping[str, str],
+    outputs: Mapping[str, str],
+    settings: Settings,
+    *,
+    force: bool,
+    progress: Progress,
+    say: Callable[[str], None],
+) -> Any:  # noqa: ANN401 - the result of any task
+    """Do a task, write its outputs and return its result.
+
+    Args:
+        given: by parameter; what is missing comes from the settings.
+        outputs: files by `out`, `figure` or `page`, beside those that are parameters of the task.
+
+    Raises:
+        StationError: as the task does, or a file exists without `force`.
+    """
+    function = getattr(import_module(f"dbbstation.tasks.{_MODULES[name]}"), name)
+    task: Declared = function.declared
+    of_shop = {
+        each.name: settings.values[each.option.setting].value
+        for each in task.parameters.values()
+        if each.option.setting in settings.values
+    }
+    values = of_shop | dict(given)
+
+    def provenance() -> Provenance:
+        command = shlex.join(["dbbstation", name, *_words(task, values)])
+        return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
+
+    more = {
+        "settings": settings,
+        "tolerances": settings.tolerances,
+        "force": force,
+        "provenance": provenance,
+        "progress": progress,
+        "say": say,
+    }
+    result = function(**values, **{n: value for n, value in more.items() if n in task.signature.parameters})
+    for output, file in outputs.items():
+        _write(output, result, Path(file), provenance, settings, force=force)
+    return result
+
+
+def _words(task: Declared, values: Mapping[str, Any]) -> Iterator[str]:
+    for name, value in values.items():
+        if name in {"out", "page"}:
+            continue
+        one = task.parameters[name]
+        if one.flag.startswith("--"):
+            yield one.flag
+        yield name_of(Path(value)) if one.option.kind == "file" or one.type in _PATHS else str(value)
+
+
+def _write(
+    output: str,
+    result: Any,  # noqa: ANN401 - of any task
+    file: Path,
+    provenance: Callable[[], Provenance],
+    settings: Settings,
+    *,
+    force: bool,
+) -> None:
+    if output == "out":
+        result.save(file, force=force, provenance=provenance)
+    elif output == "figure":
+        from dbbstation.report.figure_format import FigureFormat, Stamped
+
+        write_bytes(file, result.drawing(Stamped(FigureFormat(file.suffix), provenance())), force=force)
+    else:
+        from dbbstation.report.history_page import history_html
+
+        write_bytes(file, history_html(result, provenance(), settings.tolerances_from), force=force)

@@ -58,8 +58,8 @@ def fleet(
 ) -> None:
     r"""Run one task on every session of some folders, and show which machines differ from others of their kind.
 
-    The folder --out gets a table, TASK.csv, a page with a row for each machine, TASK.html, and each session's result:
-    its JSON, model or report. If a session fails, the command names it and continues; the exit code is then 1. Results
+    The folder --out gets a table (TASK.csv), a page with a row for each machine (TASK.html), and each session's result
+    (JSON, model or report). If a session fails, the command names it and continues; the exit code is then 1. Results
     with the same inputs, options and program are reused, so that interrupted work continues.
 
     \b

@@ -50,9 +50,9 @@ def settings(
     r"""Show the shop's settings: every key, its value, and the file and line that it comes from.
 
     Commands first read `dbbstation-settings.yaml` in the folder that contains SESSION, or in the working folder if they
-    use no session. Then they read `settings.yaml` in the user's configuration folder. The first file with a key
-    decides. `dbbstation --settings FILE` reads that file alone. Options on the command line override settings, and each
-    command reports the options that come from settings.
+    use no session. Then they read `settings.yaml` in the user's configuration folder. For each key, the first file that
+    has it applies. `dbbstation --settings FILE` reads that file alone. Options on the command line override settings,
+    and each command reports the options that come from settings.
 
     \b
     Examples:

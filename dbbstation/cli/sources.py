@@ -26,7 +26,8 @@ def sources(
     r"""List the known causes of error, or describe the cause NAME.
 
     Each has a description, its symptoms in recordings, a way to confirm and to cure it, its equation with source, its needs, and how exactly real machines follow its formula.
-    With --machine (a machine file or a session folder) its parameters on this machine follow, with their usual sizes.
+    With --machine (a machine file or a session folder) the cause's parameters on this machine follow, with their usual
+    sizes.
 
     \b
     Examples:

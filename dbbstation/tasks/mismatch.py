@@ -153,7 +153,7 @@ def mismatch(
 
     A row of the table has one measured value, the simulated one, and all that was known at that moment: joint angles,
     positions, loads, temperatures, the time. Units are at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in
-    --variables. Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
+    --variables. Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then refitted.
 
     With --simulator the recordings have inputs and measured outputs, and the command runs your simulator itself. The
     answer names each missing term and its port; --out writes the missing terms as Python code. The user's cache folder

@@ -26,8 +26,8 @@ def table_iii(*, machines: int, rigid: bool, seed: int, as_json: bool) -> None:
     r"""Calibrate random machines in the paper's three ways and verify them on the jig [CAL Table III, Fig 7].
 
     Conv-A puts balls under the spindle and removes the centres. Conv-B does the same with set-up errors measured to 1
-    µm. Proposed uses raw circles on the jig plate. Default is not calibrated. Each machine has random kinematic errors
-    of 0.1 mm. Without --rigid it also has the reference machine's gravity, which no method models.
+    µm. Proposed uses raw circles on the jig plate. Default leaves the machine uncalibrated. Each machine has random
+    kinematic errors of 0.1 mm. Without --rigid it also has the reference machine's gravity, which no method models.
 
     \b
     Examples:

@@ -77,7 +77,7 @@ def kinematics(
         StationError: a name that is not C.
     """
     if out.suffix != SUFFIX:
-        raise StationError(f"{out.name} is no name of a component file", remedy=f"end it with {SUFFIX}")
+        raise StationError(f"{out.name} cannot be the name of a component file", remedy=f"end it with {SUFFIX}")
     corrected = out.with_suffix(MACHINE_SUFFIX)
     refuse_outputs([out, corrected], force=force)
     identified, digest = _read(model, known, machine), sha256_of(model)

@@ -98,7 +98,7 @@ def _gathered(
             fault("unit", f"`{shortened(row_unit)}` is no unit of a length", f"use one of {', '.join(UNITS[LENGTH])}")
         elif not np.isfinite(value):
             what = f"{names['value']} of {of['ball']} {axis} is `{shortened(of['value'])}`, not a finite number"
-            fault("value", what, "correct the cell or take the row out")
+            fault("value", what, "correct the cell or remove the row")
         elif axis in found:
             fault("axis", f"{axis} of {of['ball']} is in the sheet a second time", "remove one of the rows")
         else:

@@ -333,7 +333,7 @@ class Reader:
                 repeat += 1
         if (name.test, direction, repeat) in self._taken:
             self._fault(
-                file, line, f"run {name.test}-{direction}-{repeat} comes a second time", "give it another repeat"
+                file, line, f"run {name.test}-{direction}-{repeat} appears a second time", "give it another repeat"
             )
         self._taken.add((name.test, direction, repeat))
         return repeat

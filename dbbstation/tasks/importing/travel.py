@@ -108,7 +108,7 @@ def check_span(theta_deg: Floats, stated_deg: float | None, circle: Circle) -> t
             f"the angles span {span:.0f} degrees, a turn of the plan has {FULL_TURN_DEG:g}{path}",
             f"if this span is right, give --angle-span-deg {span:.0f}; the import then uses one turn of it. Else check plan and file",
         )
-    return (f"its angles span {span:.0f} degrees, as was confirmed: one turn of them counts",)
+    return (f"its angles span {span:.0f} degrees, as was confirmed; one turn of them is used",)
 
 
 def travel(t_s: Floats | None, theta_deg: Floats | None, circle: Circle, trace: str | None) -> TravelledPath:

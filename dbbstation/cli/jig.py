@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.files.formats.jig import JigFile
-    from dbbstation.files.recordings.cmm_sheet import Measured
+    from dbbstation.files.recordings.dmis import Measured
     from dbbstation.plan.repeatability import HolderResult
 
 _Unit = Literal["mm", "µm", "um", "m", "inch", "mil", "µinch"]

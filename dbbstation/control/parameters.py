@@ -89,8 +89,9 @@ class Values:
 
 @dataclass(frozen=True)
 class LeftOfModel:
-    """Remaining errors of the tool over a volume: position [µm] and tilt [deg], rms and largest."""
+    """Remaining errors of the tool over a volume with one set-up of the control: position [µm] and tilt [deg], rms and largest."""
 
+    way: str
     rms_um: float
     largest_um: float
     tilt_rms_deg: float
@@ -99,12 +100,16 @@ class LeftOfModel:
 
 @dataclass(frozen=True)
 class SourceLeft:
-    """Tool errors by one source alone, before and after correction by parameters and tables [µm rms]."""
+    """Tool errors by one source alone, before and after correction by parameters and tables [µm rms].
+
+    Attributes:
+        held_by: `parameters`, `table` or `nothing`; errors are None if they were not fitted.
+    """
 
     name: str
-    rms_um: float
-    left_rms_um: float
-    in_table: bool
+    rms_um: float | None
+    left_rms_um: float | None
+    held_by: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +117,7 @@ class Refitted:
     """Fitted parameters, with the remaining errors."""
 
     values: Values
-    left: dict[str, LeftOfModel]
+    left: tuple[LeftOfModel, ...]
     sources: tuple[SourceLeft, ...]
 
 
@@ -146,10 +151,11 @@ def refitted(model: MachineModel, poses: Floats, others: Floats) -> Refitted:
     as_it_is = replace(typed, base_mm=nominal, platform_mm=nominal, longer_mm=machine.reference_length_error_mm)
     ways = {"as it is": as_it_is, "typed": typed, "24 refitted": few, "42 refitted": all_joints}
     at = Frames.from_poses(others, machine.hexapod.rotation)
-    left = {name: _left(tool_errors(own, way.joints(machine, at), at)) for name, way in ways.items()}
-    exact = _left(tool_errors(own, exact_joints(own, others), at))
+    joints = {name: way.joints(machine, at) for name, way in ways.items()}
+    joints["program or kinematics"] = exact_joints(own, others)
+    left = tuple(_left(name, tool_errors(own, one, at)) for name, one in joints.items())
     sources = _by_source(own, in_table, poses, driven, typed)
-    return Refitted(all_joints, {**left, "program or kinematics": exact}, sources)
+    return Refitted(all_joints, left, sources)
 
 
 def exact_joints(model: MachineModel, poses: Floats) -> Floats:
@@ -171,11 +177,11 @@ def tool_errors(model: MachineModel, joints: Floats, wanted: Frames) -> Floats:
     return np.hstack([actual.position_mm - wanted.position_mm, turn.T / 2.0])
 
 
-def _left(errors: Floats) -> LeftOfModel:
+def _left(way: str, errors: Floats) -> LeftOfModel:
     off_um = 1e3 * np.linalg.norm(errors[:, :3], axis=1)
     tilt = np.degrees(np.linalg.norm(errors[:, 3:], axis=1))
     rms = [float(np.sqrt(np.mean(np.square(each)))) for each in (off_um, tilt)]
-    return LeftOfModel(rms[0], float(off_um.max()), rms[1], float(tilt.max()))
+    return LeftOfModel(way, rms[0], float(off_um.max()), rms[1], float(tilt.max()))
 
 
 def _typed(own: MachineModel, points: Floats) -> Values:
@@ -277,7 +283,8 @@ def _by_source(
             left = np.einsum("nij,nj->ni", tool, off - (table.joints(machine, frames) - flat.joints(machine, frames)))
         else:
             left = errors - columns @ np.linalg.lstsq(columns, errors, rcond=LOST)[0]
-        found.append(SourceLeft(fitted.source.name, _rms_um(errors), _rms_um(left), fitted in in_table))
+        held = "table" if fitted in in_table else "parameters"
+        found.append(SourceLeft(fitted.source.name, _rms_um(errors), _rms_um(left), held))
     return tuple(found)
 
 

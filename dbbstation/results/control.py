@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dbbstation.control.parameters import LeftOfModel, SourceLeft
+
 
 @dataclass(frozen=True, kw_only=True)
 class KinematicsResult:
@@ -30,27 +32,6 @@ class KinematicsResult:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeftByWay:
-    """Errors of the tool over the volume with one set-up of the control: position and tilt, rms and largest."""
-
-    way: str
-    rms_um: float
-    largest_um: float
-    tilt_rms_deg: float
-    tilt_largest_deg: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class SourceLeftOver:
-    """Errors of the tool by one source alone, without and with parameters and tables."""
-
-    name: str
-    rms_um: float | None
-    left_rms_um: float | None
-    held_by: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class ParametersResult:
     """Output of `control parameters`.
 
@@ -64,8 +45,8 @@ class ParametersResult:
     model_sha256: str
     low: tuple[float, ...]
     high: tuple[float, ...]
-    left: tuple[LeftByWay, ...]
-    sources: tuple[SourceLeftOver, ...]
+    left: tuple[LeftOfModel, ...]
+    sources: tuple[SourceLeft, ...]
     home_mm: tuple[float, ...]
     ini: tuple[str, ...]
     way_back: tuple[str, ...]

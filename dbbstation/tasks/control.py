@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from dbbstation.control.commands import correction_of
 from dbbstation.control.kinematics import HELD_BY_BACKLASH, component, settings
-from dbbstation.control.parameters import FITTED, TRIED, drawn_poses, hal_lines, home_mm, refitted, tables
+from dbbstation.control.parameters import FITTED, TRIED, SourceLeft, drawn_poses, hal_lines, home_mm, refitted, tables
 from dbbstation.errors import ModelError, StationError
 from dbbstation.files.atomic import refuse_outputs, write_folder, write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
@@ -22,7 +22,7 @@ from dbbstation.machine.difference import differences, in_words
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.travel import check_travel
-from dbbstation.results.control import KinematicsResult, LeftByWay, ParametersResult, SourceLeftOver
+from dbbstation.results.control import KinematicsResult, ParametersResult
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.tasks.programs import program_text, sha256_of
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.control.parameters import SourceLeft
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.machine_model import MachineModel
@@ -160,7 +159,7 @@ def parameters(
     found = refitted(own, poses, others)
     play = next((f.values for f in own.sources if f.source.name == HELD_BY_BACKLASH and len(f.values) == STRUTS), None)
     lines = tables(found.values, np.zeros(STRUTS) if play is None else 1e-3 * play)
-    in_table = {one.name for one in found.sources if one.in_table}
+    in_table = {one.name for one in found.sources if one.held_by == "table"}
     taken_out = (*found.values.sources(), *(f for f in own.of_the_machine().sources if f.source.name in in_table))
     corrected = replace(nominal, control=correction_of("parameters", digest, date, taken_out, nominal))
     joints = hal_lines(found.values, nominal)
@@ -176,14 +175,13 @@ def parameters(
     for i in range(STRUTS):
         settings_of += [f"[JOINT_{i}]", f"HOME and HOME_OFFSET: add {home[i]:.6f}"]
         settings_of += [f"COMP_FILE = joint-{i}.comp", "COMP_FILE_TYPE = 1"] if lines else []
-    left = tuple(LeftByWay(way=way, **asdict(one)) for way, one in found.left.items())
     return ParametersResult(
         folder=str(out),
         files=tuple(files),
         model_sha256=digest,
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
-        left=left,
+        left=found.left,
         sources=_held(own, found.sources, with_play=play is not None),
         home_mm=tuple(home.tolist()),
         ini=tuple(settings_of),
@@ -214,18 +212,11 @@ def _table(joints: Sequence[str]) -> str:
     return "joint,value_mm\n" + "".join(f"{name},{value}\n" for name, value in rows)
 
 
-def _held(model: MachineModel, found: Sequence[SourceLeft], *, with_play: bool) -> tuple[SourceLeftOver, ...]:
+def _held(model: MachineModel, found: Sequence[SourceLeft], *, with_play: bool) -> tuple[SourceLeft, ...]:
     by_name = {one.name: one for one in found}
-    rows = []
-    for fitted in model.of_the_machine().sources:
-        one = by_name.get(fitted.source.name)
-        if one is None:
-            held = "table" if with_play and fitted.source.name == HELD_BY_BACKLASH else "nothing"
-            rows.append(SourceLeftOver(name=fitted.source.name, rms_um=None, left_rms_um=None, held_by=held))
-        else:
-            held = "table" if one.in_table else "parameters"
-            rows.append(SourceLeftOver(name=one.name, rms_um=one.rms_um, left_rms_um=one.left_rms_um, held_by=held))
-    return tuple(rows)
+    names = [fitted.source.name for fitted in model.of_the_machine().sources]
+    others = {name: "table" if with_play and name == HELD_BY_BACKLASH else "nothing" for name in names}
+    return tuple(by_name.get(name) or SourceLeft(name, None, None, others[name]) for name in names)
 
 
 def _rotation_note(machine: Machine) -> list[str]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.control.parameters import LeftOfModel, Refitted
     from dbbstation.machine.geometry import Machine
 
 LOW, HIGH = np.array([-100.0, -100.0, -1108.0, -15.0, -15.0, 0.0]), np.array([100.0, 100.0, -908.0, 15.0, 15.0, 0.0])
@@ -78,17 +79,25 @@ def test_refitting_finds_what_brute_force_finds(reference: Machine) -> None:
     there = Frames.from_poses(others, of.hexapod.rotation)
     errors = 1e3 * tool_errors(model, given(of, brute.x).joints(of, there), there)[:, :3]
     by_brute_um = np.sqrt(np.mean(np.sum(np.square(errors), axis=1)))
-    assert found.left["24 refitted"].rms_um == pytest.approx(by_brute_um, rel=0.01)
-    assert found.left["42 refitted"].rms_um < found.left["24 refitted"].rms_um
-    assert found.left["24 refitted"].rms_um < 0.3 * found.left["typed"].rms_um < 0.1 * found.left["as it is"].rms_um
-    assert found.left["program or kinematics"].largest_um < 1e-3
+    assert left_of(found)["24 refitted"].rms_um == pytest.approx(by_brute_um, rel=0.01)
+    assert left_of(found)["42 refitted"].rms_um < left_of(found)["24 refitted"].rms_um
+    assert (
+        left_of(found)["24 refitted"].rms_um
+        < 0.3 * left_of(found)["typed"].rms_um
+        < 0.1 * left_of(found)["as it is"].rms_um
+    )
+    assert left_of(found)["program or kinematics"].largest_um < 1e-3
+
+
+def left_of(found: Refitted) -> dict[str, LeftOfModel]:
+    return {one.way: one for one in found.left}
 
 
 def test_joints_and_lengths_alone_are_taken_out_wholly(reference: Machine) -> None:
     model = truth_of(machine(reference, 1))
     found = refitted(model, drawn_poses(LOW, HIGH, 60, 1), drawn_poses(LOW, HIGH, 60, 2))
     for way in ("typed", "24 refitted", "42 refitted"):
-        assert found.left[way].largest_um < 1e-4
+        assert left_of(found)[way].largest_um < 1e-4
     joints = model.sources[1].values.reshape(6, 3)
     assert np.abs(found.values.base_mm - joints).max() < 1e-5
 
@@ -97,14 +106,14 @@ def test_tables_hold_what_follows_strut_length(reference: Machine) -> None:
     model = truth_of(machine(reference, 1), "screw-lead", "screw-cyclic")
     found = refitted(model, drawn_poses(LOW, HIGH, 100, 1), drawn_poses(LOW, HIGH, 300, 2))
     by_name = {one.name: one for one in found.sources}
-    assert by_name["screw-lead"].in_table
+    assert by_name["screw-lead"].held_by == "table"
     assert by_name["screw-lead"].left_rms_um < 0.01 * by_name["screw-lead"].rms_um
     # A chord over h is off by y'' s (h - s) / 2: of a wave of length p in rms (2 pi h / p)² sqrt(1 / 120), to fourth order.
     h = float(np.diff(found.values.points_mm)[0])
     expected = (2.0 * np.pi * h / 10.0) ** 2 / np.sqrt(120.0)
-    assert by_name["screw-cyclic"].in_table
+    assert by_name["screw-cyclic"].held_by == "table"
     assert by_name["screw-cyclic"].left_rms_um / by_name["screw-cyclic"].rms_um == pytest.approx(expected, rel=0.25)
-    assert found.left["42 refitted"].rms_um < 1.5 * by_name["screw-cyclic"].left_rms_um
+    assert left_of(found)["42 refitted"].rms_um < 1.5 * by_name["screw-cyclic"].left_rms_um
 
 
 def test_a_table_has_play_on_both_sides(reference: Machine) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.jig import BallSchema, JigFile, checked_jig, jig_text
 from dbbstation.files.formats.mapping import LENGTH, UNITS
 from dbbstation.files.recordings.cmm_long import is_long, wide
-from dbbstation.files.recordings.dmis import read_dmis
+from dbbstation.files.recordings.dmis import Measured, read_dmis
 from dbbstation.files.recordings.foreign_csv import read_foreign
 from dbbstation.files.recordings.table_csv import missing_column
 
@@ -27,26 +26,6 @@ if TYPE_CHECKING:
 AXES = ("x", "y", "z")
 DMIS_ENDINGS = (".dmo", ".dmi", ".dmis", ".out")
 LENGTH_UNITS = tuple(UNITS[LENGTH])
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One ball of a sheet.
-
-    Attributes:
-        name: empty if the sheet gives only bore and holder.
-        bore: None if not stated.
-        holder: empty if not stated.
-        centre_mm: x, y, z; z is NaN if not stated.
-        uncertainty_um: standard uncertainty, rms over the axes; None if not stated.
-    """
-
-    name: str
-    bore: int | None
-    holder: str
-    centre_mm: tuple[float, float, float]
-    uncertainty_um: float | None
-    line: int
 
 
 def read_sheet(
@@ -74,7 +53,7 @@ def read_sheet(
         InputError: every fault of the file.
     """
     if path.suffix.lower() in DMIS_ENDINGS:
-        return [Measured(one.name, None, "", one.centre_mm, None, one.line) for one in read_dmis(path)]
+        return read_dmis(path)
     foreign = read_foreign(path, numbers, encoding)
     table = foreign.table
     given = columns.get("u") or columns.get("ux")

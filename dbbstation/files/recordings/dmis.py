@@ -24,15 +24,26 @@ _FRAME = re.compile(r"(D\(.*\)\s*=\s*)?(DATSET|TRANS|ROTATE|RECALL|LOCATE)\s*/",
 
 
 @dataclass(frozen=True)
-class DmisPoint:
-    """One actual feature."""
+class Measured:
+    """One ball of a sheet.
+
+    Attributes:
+        name: empty if the sheet gives only bore and holder.
+        bore: None if not stated.
+        holder: empty if not stated.
+        centre_mm: x, y, z; z is NaN if not stated.
+        uncertainty_um: standard uncertainty, rms over the axes; None if not stated.
+    """
 
     name: str
+    bore: int | None
+    holder: str
     centre_mm: tuple[float, float, float]
+    uncertainty_um: float | None
     line: int
 
 
-def read_dmis(path: Path) -> list[DmisPoint]:
+def read_dmis(path: Path) -> list[Measured]:
     """Read the actual spheres and points of a DMIS output.
 
     Raises:
@@ -40,7 +51,7 @@ def read_dmis(path: Path) -> list[DmisPoint]:
     """
     text = text_of(path, LARGEST_SHEET)
     faults: list[Problem] = []
-    found: list[DmisPoint] = []
+    found: list[Measured] = []
     factor, frame = 0.0, 0
     for line, statement in _statements(text):
         unit = re.match(r"UNITS\s*/\s*(\w+)", statement, re.IGNORECASE)
@@ -64,7 +75,7 @@ def read_dmis(path: Path) -> list[DmisPoint]:
     return found
 
 
-def _of_the_whole(found: list[DmisPoint], factor: float, file: str, faults: list[Problem]) -> Iterator[Problem]:
+def _of_the_whole(found: list[Measured], factor: float, file: str, faults: list[Problem]) -> Iterator[Problem]:
     if found and not factor:
         yield Problem(file, 0, 0, "no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
     if not found and not faults:
@@ -86,7 +97,7 @@ def _statements(text: str) -> Iterator[tuple[int, str]]:
                 yield first, whole
 
 
-def _point(name: str, said: str, factor: float, file: str, line: int, faults: list[Problem]) -> DmisPoint | None:
+def _point(name: str, said: str, factor: float, file: str, line: int, faults: list[Problem]) -> Measured | None:
     cells = [cell.strip() for cell in said.split(",")]
     words = [cell.upper() for cell in cells]
     if "CART" not in words:
@@ -100,4 +111,4 @@ def _point(name: str, said: str, factor: float, file: str, line: int, faults: li
             Problem(file, line, 0, f"{name}: `{shortened(', '.join(after))}` are not three numbers", "check the line")
         )
         return None
-    return DmisPoint(name, (x, y, z), line)
+    return Measured(name, None, "", (x, y, z), None, line)

@@ -387,7 +387,10 @@ class Bank:
             replace(variant, slack=own[width:], slack_sd=sd, slack_at=at, tangents=len(tangents))
             for variant in _forms(law, own[:width], plausible, nonlinear, weight)
         )
-        self._of_laws[name] = replace(self._of_laws[name], variants=variants)
+        # What was laid out beside some causes may be better elsewhere beside others.
+        before = self._of_laws[name]
+        away = (v for v in before.variants if np.any(np.abs(np.subtract(v.nonlinear, nonlinear)) > spacings))
+        self._of_laws[name] = replace(before, variants=(*variants, *away))
 
     def _discrepancy(self, law: Law, effect: Floats, nonlinear: tuple[float, ...], amplitudes: Floats) -> Floats:
         if law.form_uncertainty == 0.0:

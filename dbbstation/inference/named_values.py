@@ -11,6 +11,7 @@ from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
 from dbbstation.inference.model_comparison import amplitude_size
+from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def named_values(settled: Settled, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
     """Return amplitudes and nonlinear parameters; uncertainties include slack."""
-    law = settled.bank.laws.get(member.cause.name)
+    law, covariance = settled.bank.laws.get(member.cause.name), widening_of(settled.bank.tails) * covariance
     if law is not None:
         found = values_of_law(law, member, values, covariance, law.form_uncertainty)
         if any(

@@ -198,7 +198,9 @@ def _settled(
 
 
 def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
-    return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in laid_out]
+    on_grid = {m.cause.name for m in settled.best.members if m.variant.nonlinear and not m.variant.tangents}
+    known = set(laid_out) - on_grid
+    return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in known]
 
 
 def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
@@ -350,7 +352,7 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
         every[amplitudes_of(member.variant)] = values[:width]
         bank.refine(law.name, nonlinear, every)
         cause = next(cause for cause in bank.causes if cause.name == law.name)
-        same = next(variant for variant in cause.variants if variant.label == member.variant.label)
+        same = next(v for v in cause.variants if v.label == member.variant.label and v.nonlinear == nonlinear)
         member = replace(member, cause=cause, variant=same)
 
 

@@ -67,6 +67,11 @@ def student_likelihood(new: Floats, tails: float) -> float:
     return _likelihood(new, tails, _scale_of(np.square(new), tails))
 
 
+def widening_of(tails: float) -> float:
+    """Return the variance of an estimate over its value at fixed weights, (t + 3) / (t + 1) [Lange, Little and Taylor 1989, sec. 3]."""
+    return 1.0 + 2.0 / (tails + 1.0)
+
+
 def _likelihood(new: Floats, tails: float, scale: float) -> float:
     return float(np.sum(log_student(new / np.sqrt(scale), tails))) - 0.5 * len(new) * float(np.log(scale))
 

@@ -18,6 +18,7 @@ from dbbstation.inference.patterns import Family
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.variables import Kind, Variable
+from tests.diagnosis.table.domains import answer
 from tests.inference.tables import direction, table
 from tests.inference.test_channel import channel
 
@@ -156,3 +157,10 @@ def test_an_effect_many_times_the_difference_is_refused():
     assert not beyond_reach(law, 4.0 * law.reach)
     assert "14 times the difference" in beyond_reach(law, 14.0 * law.reach)
     assert not beyond_reach(replace(law, family=None), 14.0 * law.reach)
+
+
+def test_a_law_laid_out_in_one_place_may_be_taken_in_another():
+    """A magnet's saturation, whose straight line was named before, so that 18 % of the effect were left."""
+    found = answer("magnet", 101, "effect")
+    assert found["laws"] == ["saturation of coil_a"]
+    assert found["left"] < 0.1

@@ -16,7 +16,7 @@ from dbbstation.inference.coloured import (
     largest_decay,
     with_put_back,
 )
-from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
+from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance, widening_of
 
 RADIUS, TURN = 0.9, 2.0 * np.pi / 12.0
 RESONANT = np.array([1.0, -2.0 * RADIUS * np.cos(TURN), RADIUS**2])
@@ -180,3 +180,11 @@ def test_a_bounded_process_that_oscillates_is_found_with_its_phase(rng):
     assert found.log_power(frequency) == pytest.approx(np.log(power), abs=0.6)
     flat = first_order(bands, 0.95)
     assert np.abs(flat.log_power(frequency) - np.log(power)).max() > 1.0
+
+
+@pytest.mark.parametrize("degrees", [2.5, 4.0, 10.0])
+def test_estimates_in_long_tails_are_as_uncertain_as_fishers_information(degrees):
+    """By quadrature over Student's t; fixed weights have on average the information of one standard normal row."""
+    per_row = t(degrees).expect(lambda x: ((degrees + 1.0) * x / (degrees + x**2)) ** 2)
+    assert widening_of(degrees) == pytest.approx(1.0 / per_row, rel=1e-6)
+    assert widening_of(np.inf) == 1.0

@@ -18,6 +18,7 @@ from dbbstation.inference.levels import ONCE
 from dbbstation.inference.named_values import growth, moved
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.settle import static_patterns
+from dbbstation.inference.uneven import widening_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,12 +80,13 @@ def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) 
     every = np.hstack(columns)
     base = channel.base.samples @ fitted.x[: channel.base.samples.shape[1]]
     refits = refits_without(settled, [rows for _, rows in parts_of(settled.channel)])
-    variances = _variances(every, fitted.covariance)
+    wider = widening_of(bank.tails)
+    variances = wider * _variances(every, fitted.covariance)
     u = weighted_jackknife(
         np.zeros(len(other)),
         variances,
         np.array([every @ (one.x - fitted.x) for one in refits]),
-        np.array([_variances(every, one.covariance) for one in refits]),
+        wider * np.array([_variances(every, one.covariance) for one in refits]),
     )
     beyond = {
         v.name: int(np.sum((v.values < v.low) | (v.values > v.high))) for v in channel.variables if v.name in over

@@ -25,6 +25,7 @@ from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.triangle import rms
+from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
 if TYPE_CHECKING:
@@ -266,12 +267,13 @@ def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple
     channel, size = settled.channel, settled.channel.base.samples.shape[1]
     alone = channel.fitted(channel.target, _noise_alone(channel))
     beside = fitted_together(settled)
-    before, after = np.diag(alone.covariance), np.diag(beside.covariance)[:size]
+    wider = widening_of(settled.bank.tails)
+    before, after = np.diag(alone.covariance), wider * np.diag(beside.covariance)[:size]
     moved = weighted_jackknife(
         beside.x[:size],
         after,
         np.array([one.x[:size] for one in refits]),
-        np.array([np.diag(one.covariance)[:size] for one in refits]),
+        wider * np.array([np.diag(one.covariance)[:size] for one in refits]),
     )
     units = [channel.unit if name == OFFSET else "in its own unit" for name in channel.base.names]
     return tuple(

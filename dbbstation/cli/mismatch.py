@@ -129,9 +129,7 @@ def _print_whether(result: MismatchResult) -> None:
     else:
         said = f"No mismatch: what differs, {rms.before:.3g} {unit} rms, is noise."
     echo(said.replace("  ", " "))
-    fitted = (
-        "" if noise.measured_in_order else "; fitted jointly, since nothing says in which order the rows were measured"
-    )
+    fitted = "" if noise.measured_in_order else "; fitted jointly, since the order of the rows is unknown"
     alike = f", {noise.rows_as_one:.3g} rows count as one" if noise.rows_as_one > 1.0 else ""
     if noise.degrees_of_freedom:
         alike += f", long tails (Student's t, {noise.degrees_of_freedom:g} degrees of freedom)"

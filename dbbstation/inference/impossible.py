@@ -17,12 +17,12 @@ NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero at which a non-negative parameter is impossible: one in 700 by chance."""
 
 
-def impossible(law: Law, values: Floats, variances: Floats) -> str:
-    """Return why amplitudes are impossible, else an empty text."""
+def impossible(law: Law, values: Floats, variances: Floats, least: float = NEGATIVE_SIGMA) -> str:
+    """Return why amplitudes are impossible, else an empty text; arguments as of `impossibly_negative`."""
     for k, positive in enumerate(law.positive):
         value = float(values[k])
         sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
-        if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k])):
+        if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k], least)):
             return why
     return ""
 
@@ -47,9 +47,9 @@ def impossible_beside(law: Law, values: Mapping[str, Value], every: Mapping[str,
     return f"It would have to be {shown}, which it cannot be beside the rest: something else is at work."
 
 
-def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
-    """Return why a negative value is impossible, else an empty text."""
-    if value >= -NEGATIVE_SIGMA * sigma:
+def impossibly_negative(name: str, value: float, sigma: float, unit: str, least: float = NEGATIVE_SIGMA) -> str:
+    """Return why a value below zero by so many standard deviations is impossible, else an empty text."""
+    if value >= -least * sigma:
         return ""
     return (
         f"It would have to be negative, {name} {value:.3g} ± {sigma:.2g} {unit}, which it "

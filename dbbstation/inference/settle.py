@@ -11,7 +11,7 @@ from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
-from dbbstation.inference.impossible import beyond_reach, impossible, impossible_beside
+from dbbstation.inference.impossible import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
 from dbbstation.inference.named_values import moved, values_of_law
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
@@ -401,7 +401,9 @@ def _impossible(settled: Settled) -> dict[str, str]:
             estimates.covariance[part, part],
         )
         effect = settled.bank.samples(member.variant.columns) @ values[:width]
-        why = impossible(laws[name], values[:width], np.diag(covariance)[:width])
+        # What is there by one amplitude is not there by less than nothing: its shape would be moved until it is another law.
+        least = 0.0 if width == 1 else NEGATIVE_SIGMA
+        why = impossible(laws[name], values[:width], np.diag(covariance)[:width], least)
         if why := why or beyond_reach(laws[name], float(np.std(effect))):
             found[name] = why
         own[name] = values_of_law(laws[name], member, values, covariance, laws[name].form_uncertainty)

@@ -368,13 +368,17 @@ class _Reader:
         return False
 
     def _refuse_constant(self, measured: Floats, simulated: Floats) -> None:
-        """Refuse values that differ by a constant only: its rounding is no noise."""
-        apart = measured - simulated
-        rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
-        if float(np.ptp(apart)) > rounding:
-            return
+        """Refuse a measured constant, and values that differ by one number: what rounding adds to it is no noise."""
+        apart, what = measured - simulated, f"`{self._asked.measured}`"
+        if np.ptp(measured) > 0.0:
+            rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
+            if float(np.ptp(apart)) > rounding:
+                return
+            what += f" less `{self._asked.simulated}`"
+        else:
+            apart = measured
         file, size = self._files[0], f"{float(np.mean(apart)):.6g} {self._unit}".strip()
-        what = f"`{self._asked.measured}` less `{self._asked.simulated}` is {size} in every row: no difference is left to explain"
+        what += f" is {size} in every row: no difference is left to explain"
         raise InputError.of(file.file, what, "check that these are the columns that you mean", line=file.header)
 
     def _is_numeric(self, name: str, column: Floats) -> bool:

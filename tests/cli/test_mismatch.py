@@ -245,11 +245,18 @@ def test_bad_input_is_answered(run, tmp_path, arguments, said):
     assert said in outcome.err
 
 
-@pytest.mark.parametrize(("more", "told"), [(0.0, "is 0 mm in every row"), (0.25, "is 0.25 mm in every row")])
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (0.0, "is 0 mm in every row"),
+        (0.25, "less `simulated_mm` is 0.25 mm in every row"),
+        (None, "`measured_mm` is 3 mm in every row"),
+    ],
+)
 def test_columns_that_differ_by_one_number_are_refused(run, tmp_path, more, told):
-    """Rounding of a sum is no noise, and no effect."""
+    """Rounding of a sum is no noise, and no effect; a stuck sensor measures nothing."""
     path, place = tmp_path / "x.csv", np.random.default_rng(7).uniform(-9.0, 9.0, 60)
-    rows = "".join(f"{one + more!r},{one!r},{k}\n" for k, one in enumerate(place.tolist()))
+    rows = "".join(f"{3.0 if more is None else one + more!r},{one!r},{k}\n" for k, one in enumerate(place.tolist()))
     path.write_text(f"measured_mm,simulated_mm,load_n\n{rows}")
     outcome = run("mismatch", path, *COLUMNS)
     assert outcome.code == FAILED

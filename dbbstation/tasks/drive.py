@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.tasks import options as o
@@ -11,11 +12,16 @@ from dbbstation.tasks.declare import Files, Names, Option, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from dbbstation.diagnosis.drive.findings import DriveFindings
+    from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.drive import DriveResult
     from dbbstation.tasks.telling import Progress
+
+    Recordings = Files | Columns | Iterable[Columns]
+else:
+    Recordings = Files
 
 STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out part": 40, "held-back stretch": 98}
 """Stages of an identification, and the share of its time that has passed at each begin [%]."""
@@ -24,11 +30,12 @@ STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out
 @task("identify", label="identification", stages=STAGES)
 def identify(
     recordings: Annotated[
-        Files,
+        Recordings,
         Option(
-            "CSV files with `t_s`, `position_mm` and `force_n` or `motor_current_a`.",
+            "CSV files with `t_s`, `position_mm` and `force_n` or `motor_current_a`; scripts may give DataFrames or mappings of arrays.",
             kind="argument",
             metavar="RECORDING.csv...",
+            objects=True,
         ),
     ],
     *,
@@ -72,7 +79,7 @@ def identify(
     from dbbstation.diagnosis.drive.identify import identify as identified_drive
     from dbbstation.diagnosis.drive.own import own_force
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
-    from dbbstation.files.recordings.drive_csv import read_drive
+    from dbbstation.files.recordings.drive_csv import given_drive, read_drive
     from dbbstation.laws.contract import MOVING
     from dbbstation.results.drive import drive_result
     from dbbstation.tasks.load import paths_of
@@ -84,7 +91,11 @@ def identify(
     replaced = {source.name for source in own}
     named = (*(source for source in named if source.name not in replaced), *map(own_force, own))
     telling.note(*(f"{name} is not compared: {why}" for name, why in lacking.items()))
-    files = [read_drive(path) for path in paths_of(recordings)]
+    given = recordings if isinstance(recordings, tuple) else (recordings,)
+    files = [
+        read_drive(one) if isinstance(one, Path) else given_drive(one, f"recording {number}")
+        for number, one in enumerate(given, 1)
+    ]
     telling.note(*(str(warning) for file in files for warning in file.warnings))
     raw = [file.recording(force_per_ampere) for file in files]
     found = identified_drive(raw, named, cutoff_hz, telling.stage, hold_out=held_out)

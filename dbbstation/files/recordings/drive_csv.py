@@ -13,6 +13,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.number_language import is_number
+from dbbstation.files.recordings.table_csv import given_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
 from dbbstation.trace.drive_recording import DriveRecording
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.files.recordings.table_csv import Columns
 
 TIME, POSITION, FORCE, CURRENT = "t_s", "position_mm", "force_n", "motor_current_a"
 REQUIRED = (TIME, POSITION)
@@ -83,6 +85,28 @@ def read_drive(path: Path) -> DriveFile:
         InputError: every missing column and unusable line.
     """
     return parse_drive(text_of(path, LARGEST_TABLE), str(path))
+
+
+def given_drive(given: Columns, name: str) -> DriveFile:
+    """Return columns in memory as a recording of a drive.
+
+    Raises:
+        InputError: missing columns, columns of several lengths, or unusable values.
+    """
+    table = given_table(given, REQUIRED, name)
+    faults: list[Problem] = []
+    _check_names(list(table.names), name, 0, faults)
+    numbers = {one: table.values[one] for one in table.names if one in LARGEST}
+    faults += [
+        Problem(name, 0, 0, f"`{one}` has values that are not finite", "correct or remove the rows")
+        for one, values in numbers.items()
+        if not np.isfinite(values).all()
+    ]
+    if not faults:
+        _check_values(numbers, table.lines.tolist(), name, faults)
+    if faults:
+        raise InputError(faults[:MOST_FAULTS])
+    return DriveFile(name, 0, numbers, {}, ())
 
 
 def parse_drive(text: str, file: str) -> DriveFile:

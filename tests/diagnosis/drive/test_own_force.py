@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from dbbstation.errors import InputError
 from dbbstation.tasks.drive import identify
 from dbbstation.tasks.mismatch import mismatch
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
@@ -59,3 +61,19 @@ def test_physics_of_other_columns_is_not_compared(tmp_path):
         say=said.append,
     )
     assert "bellows is not compared: a recording of a drive has no column oil_degc" in said
+
+
+def test_a_recording_in_memory_is_that_of_its_file():
+    file = "fixtures/drives/strut.csv"
+    names = ("t_s", "position_mm", "force_n")
+    lines = [line for line in Path(file).read_text("utf-8").splitlines() if not line.startswith("#")]
+    table = np.genfromtxt(lines, delimiter=",", names=True)
+    given = {name: table[name] for name in names}
+    asked = {"sources": ["coulomb-friction"], "held_out": False}
+    read, memory = identify(file, **asked), identify(given, **asked)
+    assert memory.parameters == read.parameters
+    assert identify([given], **asked).parameters == read.parameters
+    with pytest.raises(InputError, match="there is no column `t_s`"):
+        identify({"position_mm": given["position_mm"], "force_n": given["force_n"]})
+    with pytest.raises(InputError, match=r"recording 1: `force_n` has values that are not finite"):
+        identify(given | {"force_n": np.full(len(table), np.nan)})

@@ -2,8 +2,8 @@
 
     python -m tests.diagnosis.table.domains --seeds 1,2 --out docs/validation/tables-domains.json [--what effect,twin]
 
-A tank, a gyro, a sensor, a valve, a stop, a magnet, a beam in a warm room, a joint, a screw, a spring, a barometer, a scale of a ball bar. Rows,
-sizes, noise and times are drawn; half of the ordered tables have irregular times. Constants have their true values, so that u is tested.
+A tank, a gyro, a sensor, a valve, a stop, a magnet, a beam in a warm room, a joint, a screw, a spring, a barometer, a scale of a ball bar, a worn
+pump, a pendulum in air, a cell under load. Rows, sizes, noise and times are drawn; half of the ordered tables have irregular times. Constants have their true values, so that u is tested.
 Results are kept in the file, and tables that are there are not run again.
 """
 
@@ -245,6 +245,52 @@ def ball_bar(rng: np.random.Generator, t: Values) -> Scene:
     return Scene(columns, 100.0 + 0.0 * angle, effect, frozenset({"angle_deg"}), ("once per turn of angle",))
 
 
+def pump(rng: np.random.Generator, t: Values) -> Scene:
+    """Head of a pump whose worn rings let water back: the wheel moves more than is delivered, so the head falls with the flow."""
+    flow, speed = 60.0 + 15.0 * smooth(rng, len(t), 10), 1450.0 + 60.0 * smooth(rng, len(t), 25)
+    fall, back = 0.004, float(rng.uniform(2.0, 6.0))
+    columns = {"flow_l_min": flow, "speed_rpm": speed, "water_c": 15.0 + smooth(rng, len(t), 40)}
+    simulated = 40.0 * (speed / 1450.0) ** 2 - fall * flow**2
+    return Scene(
+        columns,
+        simulated,
+        -2.0 * fall * back * flow,
+        frozenset({"flow_l_min"}),
+        ("linear in flow",),
+        {"slope": 2.0 * fall * back},
+    )
+
+
+def pendulum(rng: np.random.Generator, t: Values) -> Scene:
+    """Acceleration of a pendulum in air, simulated without drag, which grows with the square of the speed; by 50 steps of Euler and Cromer a row."""
+    drag, state, rows = float(rng.uniform(0.05, 0.2)), [float(rng.uniform(0.8, 1.4)), 0.0], []
+    for step in np.diff(t, prepend=t[0]).tolist():
+        for _ in range(50):
+            state[1] -= step / 50.0 * (1.3 * np.sin(state[0]) + drag * abs(state[1]) * state[1])
+            state[0] += step / 50.0 * state[1]
+        rows.append(tuple(state))
+    angle, rate = np.array(rows).T
+    columns = {"swing_rad": angle, "rate_rad_s": rate, "room_c": 20.0 + smooth(rng, len(t), 40)}
+    return Scene(
+        columns,
+        -1.3 * np.sin(angle),
+        -drag * np.abs(rate) * rate,
+        frozenset({"rate_rad_s", "swing_rad"}),
+        ("curve over rate",),
+    )
+
+
+def battery(rng: np.random.Generator, t: Values) -> Scene:
+    """Voltage of a cell under load, simulated with a resistance alone: charge that moves slowly makes it sag late."""
+    load = 5.0 * np.repeat(rng.uniform(0.0, 1.0, len(t) // 12 + 1), 12)[: len(t)]
+    charge, constant = 100.0 - 0.01 * gathered(load, t), float((t[-1] - t[0]) / rng.uniform(12.0, 30.0))
+    columns = {"load_a": load, "charge_pct": charge, "cell_c": 25.0 + smooth(rng, len(t), 40)}
+    effect = -0.03 * (late(load, t, constant) - load[0])
+    simulated = 3.2 + 0.009 * charge - 0.02 * load
+    true = {"time constant": constant, "gain": 0.03}
+    return Scene(columns, simulated, effect, frozenset({"load_a"}), ("memory of load",), true)
+
+
 SCENES: dict[str, tuple[str, Callable[[np.random.Generator, Values], Scene]]] = {
     "clip above": ("static", clip_above),
     "clip both": ("static", clip_both),
@@ -260,6 +306,9 @@ SCENES: dict[str, tuple[str, Callable[[np.random.Generator, Values], Scene]]] = 
     "gyro": ("memory", gyro),
     "warming": ("memory", warming),
     "spring": ("concealed", spring),
+    "pump": ("static", pump),
+    "pendulum": ("static", pendulum),
+    "battery": ("memory", battery),
 }
 UNORDERED = frozenset({"barometer"})
 NOISES = ("white", "slow", "long tails", "rounded", "grows")

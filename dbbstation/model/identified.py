@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.facts.value import finite
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -60,7 +62,7 @@ class IdentifiedModel:
         elif (unseen := self.unseen) is not None:
             along = np.sum(unseen**2, axis=0)
         u = known_u(variance, along)
-        return {row: _or_none(value) for row, value in zip(self.covariance_rows, u, strict=True)}
+        return {row: finite(value) for row, value in zip(self.covariance_rows, u.tolist(), strict=True)}
 
     @property
     def uncertainties_between_sessions(self) -> dict[Row, float]:
@@ -85,7 +87,3 @@ class IdentifiedModel:
 def known_u(variance: Floats, along: Floats) -> Floats:
     """Return standard uncertainties; NaN if the prior mostly determines them."""
     return np.sqrt(np.where(along > variance, np.nan, variance + along))
-
-
-def _or_none(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -8,6 +8,8 @@ from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dbbstation import __version__
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
@@ -118,17 +120,24 @@ def circles_figure(plotted: Plotted, wanted: Wanted = FigureFormat.SVG) -> Any: 
         # A name in letters that no font here has becomes boxes in PNG and PDF; in SVG the viewer's fonts have them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         if isinstance(wanted, OnePanel):
+            if plotted.kind not in {PlotKind.POLAR, PlotKind.DEVIATION}:
+                raise StationError(
+                    f"one panel has the deviation of one run, not a {plotted.kind}",
+                    remedy="draw the whole figure, without Axes",
+                )
             runs = {one.entry.label: one.analysis for one in plotted.found.circles if one.analysis is not None}
             return wanted.draw({name: partial(_trace, name=name, analysis=one) for name, one in runs.items()})
         return in_format(draw_circles(plotted), wanted)
 
 
 def _trace(axes: Axes, name: str, analysis: CircleAnalysis) -> None:
-    axes.plot(analysis.path.theta_deg, analysis.residual_um, ".", color=AFTER, markersize=1.5)
-    axes.set_xticks(QUARTERS)
+    polar = axes.name == "polar"
+    theta = np.radians(analysis.path.theta_deg) if polar else analysis.path.theta_deg
+    axes.plot(theta, analysis.residual_um, ".", color=AFTER, markersize=1.5)
+    axes.set_xticks(np.radians(QUARTERS[:-1]) if polar else QUARTERS)
     axes.set_xlabel("angle from +X towards +Y, degrees")
     axes.set_ylabel("deviation, µm")
-    axes.set_title(f"{name}: G {analysis.g_um:.2f} µm")
+    axes.set_title(f"{name}: G(LS) {analysis.g_um:.2f} µm")
 
 
 def draw_circles(plotted: Plotted) -> Figure:

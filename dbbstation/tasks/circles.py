@@ -80,6 +80,8 @@ def circles(
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)
+    if kind == "compare" and len(paths_of(sessions)) == 1:
+        raise ArgumentError("kind", "one session is nothing to compare: name two sessions or more")
     chosen = Filter.of_word(filter)
     found = load_circles(
         paths_of(sessions),
@@ -110,7 +112,7 @@ def circle(
     feed_mm_min: Annotated[float, Option("Feed along the circle [mm/min].", above=0.0)] = 1000.0,
     start_deg: Annotated[float, Option("Start of the full turn, from +X towards +Y [deg].")] = 0.0,
     overshoot_deg: Annotated[float, Option("Overshoot before and after the full turn [deg].", least=0.0)] = 0.0,
-    feed_in_mm: Annotated[float, Option("Begin outside the circle, along the bar [mm].", least=0.0)] = 0.0,
+    feed_in_mm: Annotated[float, Option("Begin outside the circle, along the bar [mm].", above=0.0)],
     direction: Annotated[Literal["ccw", "cw"], Option("Sense of travel seen from +Z.")] = "ccw",
     filter: o.Filter = "none",  # noqa: A002 - the standard's word
 ) -> CircleFiguresResult:

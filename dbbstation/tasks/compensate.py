@@ -167,9 +167,10 @@ def compensate(
         program_text,
         setup_of,
         sha256_of,
+        source_of,
     )
 
-    source = program if isinstance(program, ProgramText) else Path(program)
+    source = source_of(program)
     name = source.name if isinstance(source, ProgramText) else str(source)
     pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64).reshape(6)
     if angles_deg is not None:

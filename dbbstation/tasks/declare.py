@@ -248,6 +248,7 @@ def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Functi
             return function(*bound.args, **bound.kwargs)
 
         told = {n: f"{one.help} [default: {one.usual}]" if one.usual else one.help for n, one in options.items()}
+        told = {n: f"False: {text}" if parameters[n].default is True else text for n, text in told.items()}
         told |= {name: text for name, text in _OF_ALL.items() if f"    {name}: " not in rest}
         lines = "".join(f"    {name}: {text}\n" for name, text in told.items() if name in signature.parameters)
         written = f"{head.partition(EXAMPLES)[0].strip()}\n\nArgs:\n{lines}{rest}"

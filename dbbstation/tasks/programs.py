@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import ArgumentError, InputError, Problem
 from dbbstation.files.formats.linuxcnc_control import parameters_of, tools_of
 from dbbstation.files.source_text import read_bytes
 from dbbstation.nc.compensate import Prefer
@@ -99,6 +99,17 @@ def hashed(path: Path) -> str:
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file; raises InputError if unreadable."""
     return hashlib.sha256(_content(path)).hexdigest()
+
+
+def source_of(program: str | PathLike[str] | ProgramText) -> Path | ProgramText:
+    """Return the path of a program, or its text.
+
+    Raises:
+        ArgumentError: a text that is not wrapped as `Program(text)`.
+    """
+    if isinstance(program, str) and "\n" in program:
+        raise ArgumentError("program", "a text is given as `Program(text)`; a string is the name of a file")
+    return program if isinstance(program, ProgramText) else Path(program)
 
 
 def program_text(path: Path | ProgramText) -> str:

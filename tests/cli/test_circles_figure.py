@@ -90,7 +90,7 @@ def test_sessions_are_compared(small, tmp_path):
     said = words_of(out)
     assert {"small: test a", "other: test a"} <= set(said)
     alone = call("circles", SMALL, "--kind", "compare", "--figure", tmp_path / "one.svg")
-    assert alone.code == FAILED
+    assert alone.code == USAGE
     assert "name two sessions or more" in alone.err
 
 

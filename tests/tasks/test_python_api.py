@@ -91,9 +91,14 @@ def test_panels_are_drawn_into_given_axes(curve):
     assert dbb.mismatch(curve, "meas_um", "sim_um", held_out=False).plot(left, panel="rows") is left
     circles = dbb.circles(SMALL, tests="a")
     assert circles.plot(right, panel="a ccw") is right
-    assert right.get_title().startswith("a ccw 1: G ")
+    assert right.get_title().startswith("a ccw 1: G(LS) ")
     with pytest.raises(dbb.ArgumentError, match="'z' is not one of 'a ccw 1'"):
         circles.plot(right, panel="z")
+    round_axes = plt.figure().add_subplot(projection="polar")
+    circles.plot(round_axes)
+    assert np.abs(round_axes.lines[0].get_xdata()).max() <= 2.0 * np.pi + 1e-9
+    with pytest.raises(dbb.StationError, match="one panel has the deviation of one run, not a map"):
+        dbb.circles(SMALL, tests="a", kind="map").plot(right)
     assert len(circles.plot().axes) == len({run.test for run in circles.runs})
     plt.close("all")
 
@@ -104,6 +109,11 @@ def test_a_program_in_memory_is_compensated():
     assert done.greatest_correction_um == done.programs[0].greatest_correction_um > 0.0
     assert done.text.count("\n") >= text.count("\n")
     assert repr(dbb.Program(text)) == "<Program program.ngc: 4 lines>"
+
+
+def test_a_text_is_no_file_of_a_program():
+    with pytest.raises(dbb.ArgumentError, match=r"a text is given as `Program\(text\)`"):
+        dbb.compensate("G21 G90\nM2\n", MODEL)
 
 
 def test_two_sessions_are_compared(tmp_path):
@@ -149,7 +159,7 @@ def test_one_circle_from_arrays_has_the_figures_of_the_session():
     assert one.g_um == pytest.approx(of_session.g_um, abs=1e-9)
     assert repr(one) == f"<CircleFiguresResult: circle ccw 1, G {one.g_um:.2f} µm>"
     with pytest.raises(dbb.ArgumentError, match="one shape"):
-        dbb.circle([0.0, 1.0], [150.0], bar_mm=150.0)
+        dbb.circle([0.0, 1.0], [150.0], bar_mm=150.0, feed_in_mm=1.5)
 
 
 def test_a_simulation_stays_in_memory_until_it_is_saved(tmp_path):

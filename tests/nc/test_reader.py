@@ -143,7 +143,6 @@ def test_a_helix_moves_the_other_axes_evenly():
         ("G2 X5 I2.5 P1.5 F100", 12, "number of turns"),
         ("G0 X5 P7", 7, "nothing in this line uses P7"),
         ("G53 G2 X5 R5 F100", 1, "G53 is allowed only with G0 or G1"),
-        ("G20 F10 G1 X1", 5, "counts in the units before it on some controls"),
         ("G90.1 G2 X5 I2.5 F10", 10, "both I and J"),
         ("N100000000 G0 X1", 1, "the number after N"),
     ],
@@ -155,6 +154,17 @@ def test_a_fault_names_line_and_column(line, column, says):
     assert (problem.file, problem.line, problem.column) == ("part.ngc", 3, column)
     assert says in problem.what
     assert problem.remedy
+
+
+def test_f_in_the_line_of_g20_counts_in_millimetres_and_in_the_line_of_g21_is_refused():
+    """LinuxCNC runs F before G20 and G21 [G-code overview, order of execution]; a slower move is stated, a faster one refused."""
+    path = read_program(FIRST + "G20 F10 G1 X1\nF2\nX2\nM2\n", "part.ngc")
+    np.testing.assert_allclose(path.feed[path.kind == RowKind.FEED], [10.0, 50.8])
+    assert path.notes == (
+        "line 3: F10 in the line of G20 counts in millimetres, as in LinuxCNC; inches would be faster",
+    )
+    with pytest.raises(InputError, match=r"part\.ngc:4:5: F in the line of G21 counts in the units before it"):
+        read_program(FIRST + "G20\nG21 F10 G1 X1\nM2\n", "part.ngc")
 
 
 def test_unreadable_words_are_all_named_at_once():

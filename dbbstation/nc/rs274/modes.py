@@ -126,6 +126,7 @@ class Modes:
         self._left_contour = False
         self._unplaced: tuple[Place, BadLine] | None = None
         self._unsure_feed: BadLine | None = None
+        self._feed_unit_mm = 1.0
         self._system_said = False
         self.path.holds = {}
         self.path.count_from(self._state.offset)
@@ -158,15 +159,18 @@ class Modes:
         return _SHOWN.sub(value, message)
 
     def _units(self, block: ProgramBlock) -> None:
-        units = block.code(ModalGroup.UNITS)
+        units, self._feed_unit_mm = block.code(ModalGroup.UNITS), self._state.unit_mm
         if "F" in block.words:
             self._unsure_feed = None
         if units is None:
             return
         self.path.units_said = True
         unit_mm = MM_PER_INCH if units == 20.0 else 1.0  # noqa: PLR2004
-        if unit_mm != self._state.unit_mm and "F" in block.words:
-            # LinuxCNC sets the feed before it changes units, so F would still count in the old ones.
+        # LinuxCNC sets the feed before it changes units, so F still counts in the old ones.
+        if unit_mm > self._state.unit_mm and "F" in block.words:
+            said = f"F{block.words['F'].value:g} in the line of G20 counts in millimetres, as in LinuxCNC; inches would be faster"
+            self.path.notes += (f"{block.place}: {said}",)
+        elif unit_mm != self._state.unit_mm and "F" in block.words:
             column, code = block.words["F"].column, name("G", units)
             what = f"F in the line of {code} counts in the units before it on some controls and after it on others"
             self._unsure_feed = block.place.fault(column, what, f"write {code} in a line before, or F in the next cut")
@@ -184,7 +188,7 @@ class Modes:
             if word.value < 0.0:
                 raise block.place.fault(word.column, f"the feed is negative (F{word.value:g})", "give a positive feed")
             # Degrees are degrees in G20 as well: only the speed of the tool tip counts in inches.
-            self._speed = Feed(word.value * self._state.unit_mm, word.value)
+            self._speed = Feed(word.value * self._feed_unit_mm, word.value)
 
     def _functions(self, block: ProgramBlock) -> None:
         speed, tool = block.words.get("S"), block.words.get("T")

@@ -12,7 +12,7 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.toolpath import RAPID_MM_MIN, RowKind, ToolpathBuilder, rounded
+from dbbstation.nc.toolpath import RAPID_MM_MIN, RowKind, ToolpathBuilder, bits_of, rounded
 
 HOME = np.array([0.0, 0.0, -1000.0, 0.0, 0.0, 0.0])
 
@@ -104,3 +104,7 @@ def test_a_strut_that_is_too_short_in_the_middle_of_a_move_is_found(reference):
     limits = (float(shortest + at_ends) / 2.0, 1380.0)
     with pytest.raises(TravelError, match="strut"):
         check_reach(replace(reference, travel=replace(reference.travel, strut_mm=limits)), path)
+
+
+def test_axes_are_bits_from_x_as_the_lowest():
+    assert bits_of(np.array([True, False, True, False, False, True])) == 0b100101

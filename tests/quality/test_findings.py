@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
-from dbbstation.quality.knowledge import Run, seen
+from dbbstation.quality.knowledge import Others, Run, seen
 from dbbstation.quality.limits import (
     FALSE_ALARMS_PER_RUN,
     SHARE,
@@ -24,6 +25,7 @@ from dbbstation.quality.limits import (
     scale_of,
     scaled_length_quantile,
 )
+from dbbstation.quality.single import feed
 from tests.cli.conftest import call
 from tests.quality.sessions import calibrated, finding_of, read, sound
 from tests.quality.shares import spoil
@@ -140,6 +142,21 @@ def test_the_probability_is_shared_out():
         == scaled_length_quantile(1.0)
         == pytest.approx(NormalDist().inv_cdf(1.0 - 0.5 * SHARE))
     )
+
+
+def test_the_limit_of_the_feed_is_that_of_the_longest_turn_that_passes():
+    """Found by halving: the feed that is missing after the shortest time that is judged wrong."""
+    circle = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
+
+    def judged(longer_s):
+        return feed(SimpleNamespace(feed_mm_min=None, longer_s=longer_s, run=SimpleNamespace(circle=circle)), Others())
+
+    passes, wrong = 0.0, 1000.0
+    for _ in range(60):
+        middle = 0.5 * (passes + wrong)
+        passes, wrong = (passes, middle) if judged(middle).verdict is FindingVerdict.WRONG else (middle, wrong)
+    assert judged(wrong).value == pytest.approx(judged(wrong).limit)
+    assert judged(900.0).limit == judged(wrong).limit
 
 
 def test_scatter_is_known_whatever_one_of_thirty_does():

@@ -1,4 +1,4 @@
-"""Platform joints, concealed to 99 % by kinematics, from "cannot tell" to a name.
+"""Identify platform-joint errors of which kinematic parameters conceal 99 %.
 
 A machine is measured, diagnosed, and measured again with proposed tests.
 """

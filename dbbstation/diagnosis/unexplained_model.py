@@ -85,7 +85,7 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
         raise ModelError("the model has no unnamed effect that a curve describes")
     if curve.follows not in KEPT_AS:
         raise ModelError(
-            f"the residual follows {curve.variable}, which no program contains or no source of a model describes: it cannot be compensated"
+            f"the residual cannot be compensated: it follows {curve.variable}, and programs or error sources lack this variable"
         )
     (source,) = sources_named([KEPT_AS[curve.follows]])
     machine = after.layout.machine

@@ -66,5 +66,5 @@ def csv_rows(
         except csv.Error as error:
             line = first_line - 1 + reader.line_num
             what = f"a cell has more than {csv.field_size_limit():,} characters"
-            raise InputError.of(file, what, "check its quotation marks and which file it is", line=line) from error
+            raise InputError.of(file, what, "check its quotation marks, or name another file", line=line) from error
         yield first_line - 1 + reader.line_num, cells

@@ -123,7 +123,7 @@ class Bank:
 
     @property
     def count(self) -> int:
-        """Return the number of columns of all causes."""
+        """Return the total number of columns of all causes."""
         return self._columns.count
 
     @property

@@ -42,7 +42,7 @@ class VerdictsByLevel:
     def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
         """Return the verdict on a member, given its size in standard deviations.
 
-        A class may be certain although each of its members is uncertain. In this case held-out parts cannot refute a member.
+        A class may be certain although each of its members is uncertain. Held-out parts cannot refute a single member then.
         """
         classes = [one for one in self._levels.follows if name in one.members]
         answers = {one.answer for one in classes}

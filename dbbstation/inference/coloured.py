@@ -150,7 +150,7 @@ class Coloured:
         return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
 
     def independent_samples(self, stretches: Sequence[slice]) -> float:
-        """Return the effective number of independent squared rows in stretches."""
+        """Return how many independent samples have squares that average as precisely as these stretches."""
         # n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98
         # (1935) 536; Priestley 1981, sec. 5.3.2].
         power = np.exp(

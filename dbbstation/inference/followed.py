@@ -257,7 +257,7 @@ MOST_PARTS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class ChosenWithoutParts:
-    """Selections without each part of a table.
+    """Selections from a table, each with one part left out.
 
     Attributes:
         ignored: predictions omit effects that follow only these variables.

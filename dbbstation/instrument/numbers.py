@@ -117,7 +117,7 @@ class DecimalText(Number):
     @model_validator(mode="after")
     def _specials_fit(self) -> Self:
         if self.width and any(len(special.code) != self.width for special in self.specials):
-            raise ValueError("write a special with as many characters as its field has")
+            raise ValueError("write each special code with as many characters as its field has")
         return self
 
     @property
@@ -196,7 +196,7 @@ class Integer(Number):
         if self.signed and self.written == "bcd":
             raise ValueError("packed BCD has no sign of its own: use a sign part")
         if any(len(special.code) != self.width for special in self.specials):
-            raise ValueError("write a special with as many characters as its field has")
+            raise ValueError("write each special code with as many characters as its field has")
         return self
 
     @property

@@ -195,5 +195,5 @@ def _one(source: Path | ExchangedSimulator, model: Model, ask: SimulationRequest
         where = f"{place}:{line}" if line else place
         what = f"the simulation failed: {in_words(error)}"
         raise CalibrationError(
-            what, where=f"{where}, {told(model, ask)}", remedy="correct `simulate` for this input"
+            what, where=f"{where}, {told(model, ask)}", remedy="mend `simulate` for this input"
         ) from error

@@ -87,7 +87,7 @@ class Schedule:
         return sum(task != mine for task in self.open)
 
     def counts_beside(self, run: RunId) -> RunId | None:
-        """Return an accepted run of the same task that would count in addition to this one, or None."""
+        """Return another accepted run of the same task, which would count beside this one, or None."""
         if any((task.test, task.direction) == (run.test, run.direction) for task in self.open):
             return None
         mine = [

@@ -30,7 +30,7 @@ OUTPUTS = {
     "page": "Write the page here, as HTML.",
 }
 """Help texts of a command's outputs; the metavar names the kind of output."""
-MACHINE = Option("Nominal machine, as its controller believes it.", metavar="MACHINE.yaml")
+MACHINE = Option("Nominal machine: the geometry that its controller uses.", metavar="MACHINE.yaml")
 Machine = Annotated[File, replace(MACHINE, kind="file")]
 PLAN = Option("Test plan.", metavar="PLAN.yaml")
 Plan = Annotated[File, replace(PLAN, kind="file")]

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:
-    r"""Follow platform-joint errors of some µm, concealed to 99 %, from "cannot tell" to an identified cause.
+    r"""Identify platform-joint errors of some µm, of which kinematic parameters conceal 99 %.
 
     The machine is measured on the jig and diagnosed. The study then records the tests that the diagnosis proposes and
     diagnoses again, until platform joints are named.

@@ -204,7 +204,7 @@ def test_what_no_program_knows_is_not_kept(hollow):
     with pytest.raises(ModelError, match="has no unnamed effect"):
         keep_unexplained(None, diagnosis.after)
     late = replace(diagnosis.unexplained.curve, follows=Follows("time", "", READING))
-    with pytest.raises(ModelError, match="follows time of the reading, which no program contains"):
+    with pytest.raises(ModelError, match="follows time of the reading, and programs or error sources lack"):
         keep_unexplained(late, diagnosis.after)
 
 

@@ -55,7 +55,7 @@ def speed_noise_m_s(noise_m: float, rate_hz: float, half: int) -> float:
 
 
 def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -> int:
-    """Return the half-width of the shortest window with permitted slope noise, at most `most`."""
+    """Return the half-width of the shortest window whose slope noise is permitted; at most `most`."""
     fine = (half for half in range(1, most) if speed_noise_m_s(noise_m, rate_hz, half) <= allowed_m_s)
     return next(fine, most)
 

@@ -1,4 +1,4 @@
-"""`dbb-machine/1`: the nominal machine, as its controller believes it."""
+"""`dbb-machine/1`: the nominal machine: the geometry that its controller uses."""
 
 from dataclasses import fields
 from pathlib import Path

@@ -276,7 +276,7 @@ def _refused(log: EventLog, error: OSError) -> OutputError:
 
 
 def runs_told(event: LoggedEvent) -> str:
-    """Return the runs of an event in words, with reasons of verdicts."""
+    """Return text about an event's runs, with reasons of verdicts."""
     told = []
     for run in event.runs:
         name = f"{run['test']}-{run['direction']}-{run['repeat']}"

@@ -141,7 +141,7 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
         line,
         1,
         what,
-        f"state --decimal and --separator, or check which file it is; it was read as if {language.text}{stated}",
+        f"state --decimal and --separator, or check which file it is; the file was read with this assumption: {language.text}{stated}",
     )
 
 

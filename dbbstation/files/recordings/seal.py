@@ -121,9 +121,12 @@ def fits_name(name: str, digest: str) -> bool:
 def link(before: str, run: RunEntry) -> str:
     """Return the link of a sealed run in the chain.
 
-    It is the SHA-256 of these lines in UTF-8, each with a line end, empty if absent: link of the previous sealed run,
-    test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of run file, program and its model, and x, y and
-    z of the programmed centre [mm].
+    The link is the SHA-256 of twelve lines in UTF-8. Each line has a line end; a missing value is an empty line.
+
+    1. The previous sealed run's link.
+    2. Test, direction, repeat, mounting, and start in UTC (ISO 8601): five lines.
+    3. SHA-256 of the run file, of the program, and of the program's model: three lines.
+    4. x, y and z of the programmed centre [mm]: three lines.
     """
     program = ("", "") if run.program is None else (run.program.sha256, run.program.model_sha256)
     started = "" if run.started is None else run.started.astimezone(UTC).isoformat()

@@ -109,7 +109,7 @@ def _two_bodies(count: int) -> tuple[Floats, Floats]:
 
 
 def grown(motion: Motion, values: Floats) -> Floats:
-    """Return growth at every sample, shape (n,), in its parameters' unit."""
+    """Return the growth at every sample in the unit of the parameters, shape (n,)."""
     growth, constant_s, loss = values
     law: Floats = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
     return law

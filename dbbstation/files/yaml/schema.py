@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from inspect import get_annotations
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -47,7 +48,10 @@ class Partly:
     part: type[Schema]
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
-        kinds, fields = get_type_hints(self.part, include_extras=True), self.part.model_fields
+        bases = [one for one in reversed(self.part.__mro__) if issubclass(one, Schema)]
+        # Not `get_type_hints`, which needs the names of what pydantic declares for type checkers only.
+        kinds = {name: kind for one in bases for name, kind in get_annotations(one, eval_str=True).items()}
+        fields = self.part.model_fields
         keys: Any = {key: (kinds[key] | None, Field(None, description=one.description)) for key, one in fields.items()}
         said = f"Keys that replace those of: {self.part.__doc__}"
         made: Any = create_model(f"{self.part.__name__}Instead", __base__=Schema, __doc__=said, **keys)

@@ -26,11 +26,11 @@ class LinuxCNC(WordDialect):
     """An axis word is written when its value changes, the motion code in every line.
 
     - F under G94 is the speed along X, Y and Z alone, which is the feed of the tool tip. So F needs no correction for
-    tilting.
+      tilting.
     - `G64 P Q0`: P bounds the rounding of corners; exact path (G61) would stop at each of 3600 corners. Q0 keeps
-    LinuxCNC from merging short moves, which it does only while A, B and C are constant.
+      LinuxCNC from merging short moves, which it does only while A, B and C are constant.
     - G61 and G64 apply to the end of each following move and cause no stop. A G61 move in pieces has G64 before its
-    first piece and G61 before its last.
+      first piece and G61 before its last.
     - Dwells (G4) end blending, so the machine stops at the corner between feed-in and arc.
     """
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.analysis import analyse
-from dbbstation.circles.quick_look import quick_look
-from dbbstation.circles.signatures import Signature
+from dbbstation.circles.quick_look import _turn, quick_look
+from dbbstation.circles.signatures import ENDS, Signature, SignatureColumn, shapes_of
 from dbbstation.trace.circle import RawCircle
 from tests.circles.test_analysis import CCW, CW, PHI
 
@@ -206,3 +206,26 @@ def test_many_samples_are_averaged_and_few_refused():
     assert one.u < 0.005
     assert "12.0 mm" in one.text
     assert look(none, phi=np.arange(0.0, 360.0, 2.0)) is None
+
+
+def test_averages_of_samples_lie_at_their_angles_about_a_ball_beside_the_centre():
+    """Each average is of twenty samples, with the mean arctangent of their coordinates."""
+    phi = np.arange(57600) / 160.0
+    theta = np.radians(CCW.theta_deg(phi))
+    x, y = CCW.radius_mm * np.cos(theta) - 3.0, CCW.radius_mm * np.sin(theta) + 2.0
+    averages = _turn(analyse(RawCircle("a run", CCW, phi / CCW.turning_deg_s, phi, np.hypot(x, y))))
+    angle = np.degrees(np.unwrap(np.arctan2(y, x)).reshape(-1, 20).mean(axis=1))
+    far = np.abs(np.mod(averages.theta_deg[:, None] - angle + 180.0, 360.0) - 180.0).min(axis=1)
+    assert len(far) > 2800
+    assert far.max() < 1e-3
+
+
+@pytest.mark.parametrize("circle", [CCW, CW])
+@pytest.mark.parametrize("end", ENDS)
+def test_the_shape_of_a_spike_is_that_of_an_axis_that_sticks_behind_its_end(end, circle):
+    theta = np.radians(circle.theta_deg(PHI))
+    x, y, sign = np.cos(theta), np.sin(theta), circle.direction.sign
+    off_x, off_y = spiked({end: 1.0}, 6.0)(x, y, -sign * y, sign * x)
+    shape = shapes_of(np.degrees(theta), circle, 6.0)[SignatureColumn(Signature.SPIKE, end, "µm")]
+    # The axis is up to 6 degrees off its own direction there, whose cosine is 0.9945.
+    assert shape == pytest.approx(1e3 * (off_x * x + off_y * y), abs=0.006)

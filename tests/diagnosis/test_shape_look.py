@@ -10,7 +10,7 @@ import pytest
 from dbbstation.diagnosis.shape_look import Ranges, TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Samples
 from dbbstation.inference.blocks import Columns
-from dbbstation.inference.forms import Bump, Wave
+from dbbstation.inference.forms import Bump, Ringing, Wave
 from dbbstation.inference.sums import REACH, NearbyWaves
 
 NOISE_MM = 5e-4
@@ -30,6 +30,8 @@ def runs_of(rng, seconds):
             "time": seconds * (k + turn),
             "angle": np.degrees(theta),
             "angle since the start": (1 - 2 * k) * turn,
+            "strut-force": 1005.0 + 5.0 * np.cos(theta[:, None] + np.arange(6)),
+            "time since its reversal": np.mod(40.0 * turn[:, None] + np.arange(6), 10.0) * (1 - 2 * k),
             "position of the platform": 150 * np.column_stack([np.cos(theta), np.sin(theta)]),
         }
         gain = {
@@ -179,3 +181,33 @@ def test_a_dent_is_found_where_it_is():
     )
     assert bump.form.centre == pytest.approx(731.0, abs=3.0)
     assert bump.form.width in {5.0, 8.0}
+
+
+def test_a_step_over_a_force_is_found_where_it_is():
+    """Forces reach from 1000 to 1010 N, and places of steps are a fortieth of that apart."""
+    rng = np.random.default_rng(8)
+    runs, _, _, look = problem(
+        rng, lambda run: 1e-3 * run.gain[EVERY][:, 1] * np.sign(run.values["strut-force"][:, 1] - 1003.3)
+    )
+    shapes = looked_for(look, extent_of(runs))
+    step = next(s for s in shapes if (s.variable, s.kind, s.strut) == ("strut-force", "step", 2))
+    assert step.form.at == pytest.approx(1003.3, abs=0.25)
+
+
+def test_two_struts_that_ring_with_different_periods_are_both_told():
+    """Every strut is then tried with either period; grid periods are 7 % apart."""
+    rng = np.random.default_rng(9)
+    hidden = {1: Ringing(0.5, 1.6), 4: Ringing(1.5, 1.6)}
+
+    def ringing(run):
+        since = run.values["time since its reversal"]
+        return sum(
+            2e-3 * run.gain[EVERY][:, strut - 1] * form.columns(since[:, strut - 1])[:, 0]
+            for strut, form in hidden.items()
+        )
+
+    runs, _, _, look = problem(rng, ringing)
+    shapes = [s for s in looked_for(look, extent_of(runs)) if s.kind == "ringing"]
+    for form in hidden.values():
+        near = {s.strut for s in shapes if s.form.period == pytest.approx(form.period, rel=0.05)}
+        assert near == set(range(1, 7))

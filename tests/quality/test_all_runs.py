@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.quality.all_runs import BAR_UM, bar_of_all, programs_of_all
+from dbbstation.quality.all_runs import BAR_UM, WAYS, bar_of_all, programs_of_all
 from dbbstation.quality.answer import Advice, answer
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.forms import SIZES
@@ -59,6 +59,28 @@ def test_programs_that_all_ran_otherwise_are_told_and_how(
     assert one.verdict is FindingVerdict.WRONG, one
     assert ran in one.short
     assert answer(judged.findings).causes[0].startswith("all programs ran ")
+
+
+def test_ways_are_the_turns_and_mirror_images_of_a_square() -> None:
+    """A circle begins where the matrix of the way takes its start, and the sign of the determinant tells its sense."""
+    x, y = np.eye(2)
+    matrices = {
+        "mirrored in X": [-x, y],
+        "mirrored in Y": [x, -y],
+        "with X and Y exchanged": [y, x],
+        "with X and -Y exchanged": [-y, -x],
+        "in axes turned by 90 degrees": [-y, x],
+        "in axes turned by 180 degrees": [-x, -y],
+        "in axes turned by 270 degrees": [y, -x],
+    }
+    same_place, *ways = WAYS
+    assert same_place.reverses
+    assert [way.label for way in ways] == list(matrices)
+    for way, matrix in zip(ways, matrices.values(), strict=True):
+        start, begin = np.radians(20.0), np.radians(way.begin_deg(20.0))
+        there = np.array(matrix) @ [np.cos(start), np.sin(start)]
+        assert there == pytest.approx([np.cos(begin), np.sin(begin)])
+        assert way.reverses is bool(np.linalg.det(matrix) < 0.0)
 
 
 def test_sound_runs_are_likelier_as_planned_and_one_that_is_wrong_says_nothing_of_the_others(whole: Sound) -> None:

@@ -50,8 +50,8 @@ def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
     echo_line(f"machine {machine.machine}: {count}, {sessions[0].date} to {sessions[-1].date}")
     if machine.watched_quantities:
         echo(
-            f"{machine.watched_quantities} quantities are watched; all together they give {found.false_alarms_per_session:g} false alarms "
-            f"per session, {machine.false_alarms_expected:.2g} over this history"
+            f"{machine.watched_quantities} quantities are watched. Expect {found.false_alarms_per_session:g} false alarms per session, "
+            f"and {machine.false_alarms_expected:.2g} over this history."
         )
     echo(headline(machine))
     for line in changes_in_words(machine, found.coverage_factor):

@@ -79,7 +79,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
-    """Return changes by other constants, shape (n, q), scaled to the standard deviation of the others."""
+    """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula."""
     changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
     return np.vstack(changes) / source.form_uncertainty
 

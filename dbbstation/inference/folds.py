@@ -89,7 +89,7 @@ class HeldOutError:
         return self._all([fold.after for fold in self.folds])
 
     def corrected(self, after: Sequence[float]) -> HeldOutError:
-        """Return the result with other errors after correction."""
+        """Return a copy in which each part has this error after correction."""
         return replace(self, folds=tuple(replace(fold, after=one) for fold, one in zip(self.folds, after, strict=True)))
 
     @property

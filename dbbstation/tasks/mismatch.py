@@ -114,7 +114,7 @@ def mismatch(
     known: Annotated[
         Uncertainties | None,
         Option(
-            "Prior standard uncertainty of each parameter NAME with a column d_NAME [default: the change that moves the simulated value by twice the mismatch].",
+            "Prior standard uncertainty of the parameter whose derivative is in the column d_NAME. The default is the change that moves the simulated value by twice the mismatch.",
             metavar="NAME=U,...",
         ),
     ] = None,

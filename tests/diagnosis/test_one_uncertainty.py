@@ -31,12 +31,21 @@ NAME = "strut_compliance_um_kn"
 
 @pytest.fixture(scope="module")
 def diagnosed(reference):
-    """Gravity on fifteen level circles, the only cause that is looked for."""
+    """Gravity on fifteen level circles, the only cause that is looked for, beside seven lobes of 0.3 µm that no cause has."""
     (gravity,) = sources_named(["gravity"])
     truth = MachineModel(reference, (*random_kinematics(reference, 3), Fitted(gravity, np.array([COMPLIANCE_UM_KN]))))
     plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
     runs = draw_session(truth, plan, np.random.default_rng(3), 5e-4, 120)
+    lobes = [3e-4 * np.cos(7.0 * np.radians(run.raw.theta_deg)) for run in runs]
+    runs = [replace(r, raw=replace(r.raw, length_mm=r.raw.length_mm + own)) for r, own in zip(runs, lobes, strict=True)]
     return diagnose(reference, runs, [gravity])
+
+
+def test_a_value_is_the_true_one_beside_what_has_no_name(diagnosed):
+    (finding,) = diagnosed.sources
+    found = finding.parameters[NAME]
+    assert diagnosed.unexplained.variable == "angle wave"
+    assert abs(found.value - COMPLIANCE_UM_KN) < 3.0 * found.uncertainty
 
 
 def test_what_a_formula_may_be_off_by_is_in_every_uncertainty_of_a_value(diagnosed):

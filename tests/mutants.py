@@ -10,6 +10,9 @@ put there. Names of a module's constants are noted where functions of the module
 first, then the fastest. Where no call can stand (compiled kernels, defaults of arguments), and behind the tests that were
 seen, come the test files that name the module.
 
+Kernels have to be compiled (`python -m dbbstation.prepare`) and the machine idle: durations that compiling or other programs lengthen
+leave few tests. The one run of all default tests takes two processes.
+
 The table goes on where it was interrupted. Two columns are filled by hand: `equivalent`, why a
 survivor changes nothing that counts, and `since`, a later test that kills it, which `--since` tries. At the end all tests that
 killed run once more without a mutant, and have to pass.
@@ -313,7 +316,7 @@ def shown(mutant: Mutant, number: int, notes: Notes) -> list[str]:
     for test in sorted(notes.tests[number] | near, key=rank):
         path = test.partition("::")[0]
         takes_s = notes.seconds[test] + (0.0 if path in set_up else notes.set_up[path])
-        if len(chosen) < MOST_TESTS and takes_s <= left_s:
+        if len(chosen) < MOST_TESTS and (takes_s <= left_s or not chosen):
             chosen.append(test)
             set_up.add(path)
             left_s -= takes_s

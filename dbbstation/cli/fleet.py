@@ -41,7 +41,7 @@ def fleet(
     exclude: o.Exclude = (),
     false_alarms: Annotated[float, Option(o.FALSE_ALARMS, least=1e-6, most=0.5)] = 0.01,
     out: Annotated[Path, replace(o.OUT, kind="folder", metavar="FOLDER")] = Path("fleet"),
-    table: Annotated[Path | None, Option(o.OUTPUTS["table"], kind="file")] = None,
+    table: Annotated[Path | None, Option(o.TABLE, kind="file")] = None,
     jobs: Annotated[
         int | None, Option("Number of processes on this computer  [default: one for each core].", least=1)
     ] = None,

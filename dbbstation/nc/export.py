@@ -19,7 +19,7 @@ from dbbstation.nc.curve import felt_mm, rounding_mm
 from dbbstation.nc.dialect import COMPENSATED
 from dbbstation.nc.limits import CHORD_MM, CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import has_marks, marked, sums_of
-from dbbstation.nc.nominal import Checksum, check_machine, check_nominal
+from dbbstation.nc.nominal import ProgramChecksum, check_machine, check_nominal
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
@@ -266,7 +266,7 @@ class _Finished:
 
     def __init__(self, machine: Machine, dialect: Dialect) -> None:
         self._machine, self._decimals = machine, dialect.decimals
-        self.checksum, self.points = Checksum(dialect.decimals), 0
+        self.checksum, self.points = ProgramChecksum(dialect.decimals), 0
         self._so_far: Compensation | None = None
         self._coarse_mm = 0.0
         self._sums: list[NDArray[np.uint64]] = []

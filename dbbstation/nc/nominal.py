@@ -25,7 +25,7 @@ CHECKSUMS = 99_999_999
 _MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
 
 
-class Checksum:
+class ProgramChecksum:
     """A checksum of moves, dwells and stops in order, with written decimals, over successive parts of a toolpath.
 
     Comments, feeds, line numbers and units do not count.
@@ -53,7 +53,7 @@ class Checksum:
 
 def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
     """Return the checksum of a toolpath."""
-    total = Checksum(decimals)
+    total = ProgramChecksum(decimals)
     for part in toolpath.parts():
         total.add(part)
     return total.number

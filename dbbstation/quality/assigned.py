@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.quality.beside import Beside, Readings, mean_of
+from dbbstation.quality.beside import NearAssignments, Readings, mean_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
@@ -142,7 +142,9 @@ class Assigned:
 
     def _follow(self, base: _Changes, known: dict[_Changes, float]) -> None:
         """Add assignments near a given one, the most probable first, until the rest cannot affect a decision."""
-        beside = Beside(self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels))
+        beside = NearAssignments(
+            self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels)
+        )
         known.setdefault(base, beside.log - self._mistakes(base))
         least = known[()] + self._cost - 2.0 * LOG_ODDS_LIMIT
         asked = [_Asked(self, base, beside, *each, least) for each in self._changes]
@@ -207,7 +209,7 @@ class Assigned:
         return known if len(known) == len(labels) else []
 
     def fewest_mistakes(self, base: _Changes, runs: Integers, instead: Integers) -> Floats:
-        """Return lower bounds of the cost of mistakes near a given assignment; arguments as of `Beside.most`."""
+        """Return lower bounds of the cost of mistakes near a given assignment; arguments as of `NearAssignments.most`."""
         tests = {test: k for k, test in enumerate(dict.fromkeys(one.test for one in self.circles))}
         of_label = np.array([*(tests[one.test] for one in self.circles), *[len(tests)] * 3])
         of_run = np.array([tests[one.run.test] for one in self.runs])
@@ -278,7 +280,13 @@ class _Asked:
     """Assignments near a given one, with upper bounds of their log posterior densities."""
 
     def __init__(
-        self, sitting: Assigned, base: _Changes, beside: Beside, runs: Integers, instead: Integers, least: float
+        self,
+        sitting: Assigned,
+        base: _Changes,
+        beside: NearAssignments,
+        runs: Integers,
+        instead: Integers,
+        least: float,
     ) -> None:
         self._beside, self._base, self._planned = beside, dict(base), sitting.planned
         self._runs, self._instead = runs, instead

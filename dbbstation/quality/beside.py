@@ -59,7 +59,7 @@ class Readings:
         )
 
 
-class Beside:
+class NearAssignments:
     """Log densities near an assignment with given labels.
 
     Args:

@@ -23,9 +23,10 @@ FORCE, JSON = Option("Replace existing files."), Option("Print the result as JSO
 Force = Annotated[bool, FORCE]
 Json = Annotated[bool, replace(JSON, flag="--json")]
 FIGURE = "Write a figure here, as SVG, PNG or PDF by the ending of its name."
+TABLE = "Write the table here, as CSV."
 OUTPUTS = {
     "out": "Write the result here.",
-    "table": "Write the table here, as CSV.",
+    "table": TABLE,
     "figure": FIGURE,
     "page": "Write the page here, as HTML.",
 }

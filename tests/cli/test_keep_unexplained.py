@@ -44,7 +44,7 @@ def off_the_line_mm(truth, path):
 def test_the_curve_is_printed_with_its_uncertainty_and_that_its_cause_is_unknown(kept):
     outcome, *_ = kept
     assert "An unmodelled effect, organised by strut-length wave, strut 3." in outcome.out
-    assert "cause unknown:" in outcome.out
+    assert "an error of unknown cause moves the readings by" in outcome.out
     titles = (
         "cause",
         "verdict",

@@ -95,7 +95,7 @@ def test_a_column_of_numbers_that_no_quantity_has(tmp_path, column, power):
 
 @pytest.mark.parametrize(("column", "power"), [("simulated_mm", 3), ("simulated_mm", 12), ("measured_mm", -12)])
 def test_a_simulation_in_another_unit(tmp_path, column, power):
-    assert "in one unit" in told(*scaled(tmp_path, column, power))
+    assert "in the same unit" in told(*scaled(tmp_path, column, power))
 
 
 @pytest.mark.parametrize(("column", "power"), [("load_n", -30), ("load_n", 30), ("oil_temp_c", 9)])

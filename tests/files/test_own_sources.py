@@ -149,7 +149,9 @@ def test_a_module_that_it_cannot_import_is_named(tmp_path):
 
 
 def test_a_file_without_an_error_source(tmp_path):
-    assert "own.py: no class in it derives from ErrorSource; see " in told(own(tmp_path, "class Bow:\n    pass\n"))
+    assert "own.py: no class in it derives from ErrorSource or TableSource; see " in told(
+        own(tmp_path, "class Bow:\n    pass\n")
+    )
 
 
 def test_a_name_that_is_taken(tmp_path):

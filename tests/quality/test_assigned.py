@@ -18,7 +18,7 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, effects_of
-from dbbstation.quality.beside import SIZES, Beside, mean_of
+from dbbstation.quality.beside import SIZES, NearAssignments, mean_of
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
 from dbbstation.quality.plan_effects import BESIDE, ELSEWHERE, ELSEWHERE_UM, LARGER
@@ -213,7 +213,7 @@ def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) ->
     for given in ((), ((0, 2),)):
         assigned = shown(sitting, {}, 4)
         labels = assigned._labels(given)
-        beside = Beside(assigned.effects, assigned.readings, assigned.information(labels), np.array(labels))
+        beside = NearAssignments(assigned.effects, assigned.readings, assigned.information(labels), np.array(labels))
         assert beside.log == pytest.approx(log_density(assigned, labels), rel=1e-7, abs=1e-3)
         widths = set()
         for runs, instead in assigned._changes:

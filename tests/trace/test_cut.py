@@ -107,7 +107,7 @@ def test_more_than_a_turn_that_begins_elsewhere_gives_the_turn_in_its_middle():
 
 @pytest.mark.parametrize("feed", [800, 900, 970, 995, 1005, 1030, 1100, 1200])
 def test_another_feed_is_found_and_named(feed):
-    with pytest.raises(TraceError, match=r"a feed of .* plan says 1000") as refused:
+    with pytest.raises(TraceError, match=r"a feed of .* plan states 1000") as refused:
         cut(trace(feed=feed, noise_mm=0.0003), CIRCLE)
     shown = float(str(refused.value).split("a feed of ")[1].split()[0])
     assert shown == pytest.approx(feed, rel=0.003 if "overlap" in str(refused.value) else 0.03)

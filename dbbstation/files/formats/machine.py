@@ -87,7 +87,7 @@ def machine_text(machine: Machine) -> str:
 
 def machine_data(machine: Machine) -> dict[str, object]:
     """Return the keys of a machine in the format's order, without empty ones; the inverse of `MachineParts.to_domain`."""
-    own: dict[str, Any] = {name: getattr(machine, name) for name in _ALIKE}
+    own: Any = {name: getattr(machine, name) for name in _ALIKE}
     joints = vars(machine.hexapod) | {"rotation": machine.hexapod.rotation.value}
     return MachineParts.model_validate(joints | own).model_dump(exclude_none=True)
 

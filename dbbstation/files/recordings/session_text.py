@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.facts.serialise import adapter
 from dbbstation.files.formats.session import SessionDetails, SessionFile
@@ -26,7 +26,7 @@ def session_data(
     return in_order(data_of(file, folder))
 
 
-def data_of(record: object, folder: Path | None = None) -> dict[str, Any]:
+def data_of(record: object, folder: Path | None = None) -> dict[str, object]:
     """Return a part of a session file as plain data, without what is absent."""
     return adapter(type(record)).dump_python(record, mode="json", by_alias=True, exclude_none=True, context=folder)
 

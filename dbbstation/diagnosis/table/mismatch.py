@@ -185,7 +185,7 @@ def find_mismatch(
             return _found(table, sources, lacking or {}, progress, hold_out=hold_out, matters=matters)
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = "the difference is so much larger than its noise that rounding hides what it follows"
-        remedy = "check that measured and simulated values are of one quantity in one unit"
+        remedy = "check that measured and simulated values are of one quantity in the same unit"
         raise CalibrationError(
             what, where=f"{table.simulated_name} beside the measured values", remedy=remedy
         ) from error

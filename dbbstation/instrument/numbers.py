@@ -33,7 +33,7 @@ class Number(Schema):
     @model_validator(mode="after")
     def _modulus_with_counter(self) -> Self:
         if (self.of == "counter") != (self.modulus is not None):
-            raise ValueError("give a modulus with counters only")
+            raise ValueError("a modulus is for counters only")
         return self
 
     def pattern(self) -> bytes:

@@ -121,8 +121,8 @@ def compensate(
     the angles too. The result is right for these values only. Its first lines stop LinuxCNC if other values are active.
 
     The program must be complete (with M2, M30 or percent signs), uncompensated, and made for the model's machine.
-    Travel, feeds and the size of corrections are checked before anything is written. With --machine, a machine whose
-    control already corrects is refused.
+    Travel, feeds and the size of corrections are checked before anything is written. With --machine, the command
+    refuses a machine that its control already corrects.
 
     \b
     Examples:

@@ -23,7 +23,7 @@ import click
 def history(*, tables: int, quantities: int, length: int, changes: int, seed: int, as_json: bool) -> None:
     r"""Simulate histories: how many raise a false alarm, and how soon steps and drifts are found.
 
-    The stated share of false alarms comes from the Markov chain, for the whole table and the same number of sessions.
+    The stated share of false alarms comes from the Markov chain. It holds for the whole table and for this number of sessions.
     Delays are given for one quantity of such a table, also with other settings than the program's.
 
     \b

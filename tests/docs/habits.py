@@ -85,7 +85,8 @@ def in_help(group: click.Group = cli) -> Iterator[str]:
         command = group.get_command(context, name)
         if command is None:
             continue
-        yield from sentences_of(re.sub(r"\n\s*\n", ". ", command.help or ""))
+        head = (command.help or "").partition("\b\nExamples")[0]
+        yield from sentences_of(re.sub(r"[.]?\s*\n\s*\n", ". ", head))
         for option in command.params:
             yield from sentences_of(getattr(option, "help", None) or "")
         if isinstance(command, click.Group):

@@ -1,6 +1,6 @@
 """Write files completely or not at all: a temporary file beside the target is synced and renamed.
 
-After a power cut there is the old file or the new one, and perhaps a temporary file with `.new` in its name.
+After a power cut the old or the new file exists, and perhaps a temporary file with `.new` in its name.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def _refuse_overwriting(path: Path, *, force: bool) -> None:
 
 
 def is_leftover(path: PurePath) -> bool:
-    """Return whether a path is in or is a temporary file or folder of an interrupted write."""
+    """Return whether a path is, or is inside, a temporary file or folder of an interrupted write."""
     return any(part.startswith(".") and part.endswith(_MARK) for part in path.parts)
 
 

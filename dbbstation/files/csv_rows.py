@@ -18,8 +18,7 @@ _BEGINS_FORMULA = frozenset("=+-@\t\n＝＋－＠")
 """Characters that begin a formula in a spreadsheet, or that it ignores before one [OWASP, CSV Injection]."""
 
 DIGITS = 12
-"""Digits of a written number: sums of binary fractions err in the sixteenth digit, and a micrometre of a kilometre is
-the ninth."""
+"""Digits of a written number. Rounding errors of sums begin at the sixteenth digit; a micrometre in a kilometre is the ninth."""
 
 _NONE = "-"
 """Cells that mean a missing value."""
@@ -55,7 +54,7 @@ def csv_rows(
     """Yield the line number and the cells of each row.
 
     Raises:
-        InputError: a cell is too long, as behind an unclosed quotation mark.
+        InputError: a cell is too long, for example after an unclosed quotation mark.
     """
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=skip_spaces)
     while True:

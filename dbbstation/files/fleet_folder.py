@@ -32,7 +32,7 @@ class FleetFolder:
     """Results of one task in a folder; a context manager.
 
     Raises:
-        OutputError: something else lies in the folder, or it cannot be written.
+        OutputError: the folder contains other files, or cannot be written.
     """
 
     def __init__(self, folder: Path, task: str) -> None:

@@ -24,7 +24,7 @@ LARGEST_BYTES = 2_000_000_000
 """Largest file that is read [bytes], about an hour at a hundred thousand readings a second."""
 
 BLOCK_BYTES = 1 << 20
-"""Bytes that are read at once: a thousandth of the largest file, which is little for the program."""
+"""Bytes that are read at once: a thousandth of the largest file, which needs little memory."""
 
 
 class NotRegularError(OSError):
@@ -77,7 +77,7 @@ def opened(path: Path, largest: int = LARGEST_BYTES) -> Iterator[Source]:
 
     Raises:
         NotRegularError: it is a pipe, a socket or a device.
-        TooLargeError: it has more bytes.
+        TooLargeError: it exceeds the size limit.
         OSError: it is missing, a folder, or refused by the system.
     """
     _check(path, _stat(path), largest)  # some devices do something when they are opened

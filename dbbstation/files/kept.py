@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 
 _PATIENCE_S = 5.0
-"""Longest wait for another process that writes [s]; after it the result is not stored."""
+"""Longest wait for another writing process [s]; after this time the result is not stored."""
 
 SHARES = frozenset(
     {"9p", "afs", "ceph", "cifs", "davfs", "fuse.davfs2", "fuse.glusterfs", "fuse.rclone", "fuse.s3fs", "fuse.sshfs"}

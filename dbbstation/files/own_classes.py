@@ -31,7 +31,7 @@ def classes_in_files(
     """Return classes that derive from `base`, each with its place.
 
     Args:
-        base: one or several; abstract bases of others and names with an underscore do not count.
+        base: one class or several; abstract base classes and names with a leading underscore do not count.
         faults: grows by files that are missing, not Python, or lack such a class.
     """
     found = []

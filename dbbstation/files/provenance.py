@@ -32,7 +32,7 @@ _COMMENT = 170
 
 @dataclass(frozen=True)
 class Provenance(Record):
-    """Origin of an output. It has no date, so the same inputs and command give the same file."""
+    """Origin of an output."""
 
     program: str
     """Name and version of the program that wrote it."""

@@ -22,7 +22,7 @@ def read_bytes(
     """Return a file's bytes, or None with the reason added to `faults`.
 
     Args:
-        is_input: outputs name it, unless another input holds its hash.
+        is_input: outputs name the file, unless another input contains its hash.
     """
     try:
         data = content_of(path, largest)

@@ -64,7 +64,7 @@ class BarFile(Schema):
     calibrated: Moment
     """Time of the reading on the calibrator."""
     temp_c: TemperatureDegc
-    """Temperature of the bar then [degC]."""
+    """Temperature of the bar at this time [degC]."""
     temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)]
     """Standard uncertainty of a temperature of the bar, on the calibrator and during measurements [K]."""
     expansion_um_m_k: ExpansionUmMK

@@ -188,7 +188,7 @@ def checked_jig(text: str, file: str) -> JigFile:
     """Return the checked jig of a text.
 
     Raises:
-        InputError: whatever a jig file must not hold.
+        InputError: the text is no valid jig file.
     """
     faults: list[Problem] = []
     document = parse_yaml(text, file, faults)

@@ -14,7 +14,7 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
     """Return the numbered parameters of a LinuxCNC parameter file.
 
     Raises:
-        InputError: a line that is none, or none at all.
+        InputError: a line is no valid entry, or the file has no entries.
     """
     found: dict[int, float] = {}
     for number, line in enumerate(text.splitlines(), 1):
@@ -35,10 +35,10 @@ def parameters_of(text: str, file: str) -> dict[int, float]:
 
 
 def tools_of(text: str, file: str) -> dict[int, dict[str, float]]:
-    """Return the words of tools by number of a LinuxCNC tool table.
+    """Return each tool's words in a LinuxCNC tool table, by tool number.
 
     Raises:
-        InputError: a line that is none, or none at all.
+        InputError: a line is no valid entry, or the file has no entries.
     """
     found: dict[int, dict[str, float]] = {}
     for number, line in enumerate(text.splitlines(), 1):

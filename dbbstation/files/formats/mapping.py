@@ -40,7 +40,7 @@ RUN = "run"
 IGNORED = "ignored"
 
 OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED, RUN)
-"""Meanings of columns that identify the run of a row, the same in all rows of a run."""
+"""Meanings of columns that identify a row's run; their cells are equal in all rows of the run."""
 
 _OF_KIND = {ColumnKind.TEMPERATURE: _TEMPERATURES, ColumnKind.CURRENT: _CURRENTS}
 

@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Parameter
 
 _ROUNDING = 1e-9
-"""Largest asymmetry of a covariance by rounding, as a correlation."""
+"""Largest asymmetry that rounding causes in a covariance, as a correlation."""
 
 _NEGATIVE = 1e-6
-"""Most negative eigenvalue of the correlations that rounding explains."""
+"""Most negative eigenvalue that rounding causes in a correlation matrix."""
 
 
 def read_model(
@@ -47,8 +47,8 @@ def read_model(
     """Read a model.
 
     Args:
-        sources: None: those of package and installed ones. A sequence: these beside them, replacing equal names. A mapping: these
-            alone.
+        sources: None: sources of package and installed ones. A sequence: in addition to these, replacing equal names. A
+            mapping: only its sources.
 
     Raises:
         InputError: every fault with its place; an installed source that cannot be used.
@@ -237,7 +237,7 @@ def write_model(
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
-        ValueError: its covariance is none, or does not fit its rows.
+        ValueError: its covariance is invalid, or does not fit its rows.
     """
     refuse_existing(path, force=force)
     write_text(path, model_text(model, provenance), force=force)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import Seal
 
 SHORTEST = 16
-"""Least number of hex digits of an anchor: nobody can make another log with the same sixteen."""
+"""Least number of hex digits of an anchor: nobody can make another log with the same sixteen digits."""
 
 
 def anchor_of(seal: Seal | None) -> str:
@@ -29,7 +29,7 @@ def links_of(folder: Path) -> tuple[str, ...]:
 
 
 def sealed_at(folder: Path) -> dict[tuple[str, str, int], datetime]:
-    """Return when each run was sealed, by test, direction and repeat, if the event log has the date."""
+    """Return each run's time of sealing, by test, direction and repeat, if the event log contains it."""
     log, found = read_event_log(folder, []), dict[tuple[str, str, int], datetime]()
     for event in () if log is None else log.events:
         for run in (*event.runs, *(event.all_runs or ())):

@@ -42,7 +42,7 @@ def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[Table
         unit: of values without a column of units.
 
     Raises:
-        InputError: a coordinate is missing, double, no number, or in no known unit.
+        InputError: a coordinate is missing, given twice, not a number, or in an unknown unit.
     """
     axis_name, value_name = _axis_column(table, columns), _named(table, columns, "value", _VALUE)
     ball_name, unit_name = _named(table, columns, "ball", _BALL, but=axis_name), _named(table, columns, "unit", _UNIT)

@@ -46,7 +46,7 @@ def read_sheet(
             `axis`, `value`, `unit`.
         unit: of coordinates; None: as the sheet states, else mm.
         of_one_holder: a bore alone identifies a ball.
-        u_unit: of uncertainties; None: as the sheet states, else that of coordinates.
+        u_unit: of uncertainties; None: as the sheet states, else the coordinates' unit.
         numbers, encoding: of a table; None: as fits best.
 
     Raises:
@@ -115,7 +115,7 @@ def jig_of_sheet(
         cmm_temp_c: of the plate; None if not known.
 
     Raises:
-        InputError: an unknown or double ball, no uncertainty, or whatever a jig file must not hold.
+        InputError: a ball is unknown, given twice or without uncertainty, or the jig is invalid.
     """
     faults: list[Problem] = []
     balls: dict[str, BallSchema] = {}
@@ -177,8 +177,7 @@ _NOT_MEASURED = {
     "tol",
     "tolerance",
 }
-"""Words beside an axis in names of other columns. Programs use `U` and `u` differently, so these columns must be named
-by the user."""
+"""Words that, beside an axis, mark a column as no measured coordinate. Programs use `U` and `u` differently, so the user must name uncertainty columns."""
 
 
 def _usual(key: str, table: TableFile) -> str | None:
@@ -224,7 +223,7 @@ def _unlike_a_cmm(one: Measured, file: str, unit: str) -> Problem:
 
 
 def _said_unit(name: str, units: Mapping[str, str]) -> str:
-    """Return a column's unit from below its name, from brackets, or from the name's end; else empty."""
+    """Return a column's unit, written below its name, in brackets or at the name's end; else empty."""
     for text in (units.get(name, ""), *re.findall(r"[\[(]\s*([^\])]*?)\s*[\])]", name), name.rpartition("_")[2]):
         plain = text.strip(" []()").lower().replace("μ", "µ")
         known = {"um": "µm", "in": "inch", "uinch": "µinch", "uin": "µinch"}.get(plain, plain)

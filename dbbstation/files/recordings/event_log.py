@@ -40,10 +40,10 @@ class LoggedEvent:
     """One line of the log.
 
     Attributes:
-        what: in a word or two, such as `rejected`.
+        what: the event in one or two words, such as `rejected`.
         at: None for a computed session, such as a simulated one.
         set_to: new values of session keys; None for removed ones.
-        runs: entries that replace those of the same test, direction and repeat, or follow all others.
+        runs: entries; each replaces the entry of equal test, direction and repeat, or is appended.
         all_runs: the whole list if it was rearranged, else None.
     """
 
@@ -93,7 +93,7 @@ def run_key(run: Mapping[str, Any]) -> tuple[str, str, int]:
 
 
 def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, object]:
-    """Return the members of an event that changes one state to another; empty if they are equal."""
+    """Return the JSON members of an event that changes one state to another; empty for equal states."""
     keys = [key for key in (*after, *(key for key in before if key not in after)) if key != "runs"]
     set_to = {key: after.get(key) for key in keys if before.get(key) != after.get(key)}
     old = {run_key(run): run for run in before.get("runs", ())}
@@ -158,8 +158,8 @@ def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, A
 
     Args:
         before: link of the previous line; empty for the first.
-        what: in a word or two.
-        at: None if that means nothing.
+        what: the event in one or two words.
+        at: its time; None in computed sessions.
     """
     moment = {} if at is None else {"at": at.astimezone(UTC).isoformat().replace("+00:00", "Z")}
     text = json.dumps({**moment, "what": what, **members}, ensure_ascii=False, allow_nan=False).encode()
@@ -263,7 +263,7 @@ def _refuse_another(log: EventLog, handle: int) -> None:
 
 
 _LONGEST_LAST = 1_000_000
-"""Greatest number of bytes that are read of the last line; an event with a list of a thousand runs has half of them."""
+"""Greatest number of bytes that are read of the last line; an event with a thousand runs has half as many."""
 
 
 def _ends_with(line: bytes, last: str) -> bool:
@@ -287,7 +287,7 @@ def runs_told(event: LoggedEvent) -> str:
 
 
 def keys_told(event: LoggedEvent) -> Sequence[str]:
-    """Return the keys of an event other than runs, without those that change with every run."""
+    """Return an event's keys, except runs and keys that change with every run."""
     return [key for key in event.set_to if key != "seal" or event.what not in _OF_RUNS]
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session import SessionFolder
 
 DEPTH = 2
-"""Depth of folders below the searched one: sessions of a machine, of a month."""
+"""Searched levels of subfolders, such as one per machine, then one per month."""
 
 MOST = 30
 """Greatest number of sessions that are read, the newest first; each needs some hundredths of a second."""
@@ -27,7 +27,7 @@ MOST = 30
 def former_sessions(
     now: SessionFolder, under: Path, tests: set[str] | None = None
 ) -> list[tuple[datetime, SessionFolder]]:
-    """Return earlier sessions of the same machine, plan and jig, the last first; only real ones for a real session, only virtual ones for a virtual one."""
+    """Return earlier sessions of the same machine, plan and jig, the latest first. A real session gets only real ones, a virtual session only virtual ones."""
     accepted = now.in_state(RunState.ACCEPTED)
     began = min((run.started for run in accepted if run.started is not None), default=None)
     tests = tests or {run.test for run in accepted} or set(now.plan.tests)

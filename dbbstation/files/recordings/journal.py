@@ -34,8 +34,7 @@ _LOG = logging.getLogger(__name__)
 _MANY = 1000
 
 SYNC_INTERVAL_S = 0.5
-"""Time between two syncs [s], so short that each sample is on the disk within a second, in spite of the sync's own time
-and of batches."""
+"""Time between two syncs [s], so short that each sample is on the disk within a second, despite batches and the sync's own time."""
 
 
 def run_name(test: str, direction: Direction, repeat: int) -> str:
@@ -153,7 +152,7 @@ class RunWriter:
         self.sync_if_due()
 
     def sync_if_due(self) -> None:
-        """Sync if the last sync is old; call it also without samples."""
+        """Sync if the last sync is old. Call this also while no samples arrive."""
         if self._clock() - self._synced_at >= SYNC_INTERVAL_S:
             self.sync()
 

@@ -84,7 +84,7 @@ def run_of(
 
 
 def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
-    """Return all circles of a plan by a model; empty without a model, since all are then alike."""
+    """Return a plan's circles as expected by a model; empty without a model, since they are then all alike."""
     return () if model is None else circles_of_plan(session, model)
 
 

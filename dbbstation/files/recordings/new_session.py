@@ -40,7 +40,7 @@ class FinishedRun:
     Attributes:
         columns: by name, each of shape (n,), in the columns' units.
         mounting: number of the ball's set-up; None: one per test.
-        started: first sample; None for a computed run.
+        started: time of the first sample; None for a computed run.
         program: name and bytes of the NC program; None for the plan's circle.
         reason: of a rejection; else empty.
         texts: text columns such as `status`, n each.
@@ -117,7 +117,7 @@ def make_session_folder(
         at: for the log; None for a computed session, which then always has the same bytes.
 
     Raises:
-        InputError: what no session may note.
+        InputError: a value that a session must not contain.
         OutputError: the folder exists, lies in another session, or cannot be written.
     """
     refuse_recorded(folder)

@@ -1,7 +1,7 @@
 """Read run files `runs/*.csv`: one circle in one direction, raw.
 
 Blocks become lines (`run_lines`), then checked numbers (`run_numbers`), then a recording. An interrupted file
-(`.csv.part`) gives its good lines; the others are named.
+(`.csv.part`) gives its good lines; warnings name the bad ones.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class RunFile:
     Attributes:
         header: `# key: value` lines, by key.
         unknown_columns: texts by name, one per sample.
-        status: the instrument's per sample; empty if not noted.
+        status: of the instrument at each sample; empty if not recorded.
         warnings: findings that do not invalidate the run.
     """
 

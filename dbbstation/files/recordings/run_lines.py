@@ -31,7 +31,7 @@ _NUMBER = re.compile(NUMBER.encode())
 
 
 _MOST_KNOWN = 10_000
-"""Greatest number of distinct texts of a column that are stored once; with more, nearly all texts differ."""
+"""Up to this number of distinct texts in a column, equal texts are stored once; with more, nearly all differ."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ _LONGEST_FOOT = 1000
 
 
 def _lines(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[tuple[list[bytes], bool]]:
-    """Yield the lines of each block, and True; the last line may lack its end and has False."""
+    """Yield the lines of each block and whether they end with a line end; only the file's last line may lack it."""
     left = b""
     number = 1
     for block in blocks:

@@ -42,7 +42,7 @@ class Counted:
 
 
 _MOST_COUNTED = 10_000
-"""Greatest number of counted faults; ten thousand tell no more than the first hundred."""
+"""Greatest number of counted faults; more add no information."""
 
 
 class Numbers:

@@ -136,7 +136,7 @@ def link(before: str, run: RunEntry) -> str:
 
 
 def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
-    """Return runs with links for newly sealed runs, which continue the chain."""
+    """Return the runs; newly sealed ones get links that continue the chain."""
     done = [run for run in runs if run.chain_sha256]
     behind = runs.index(done[-1]) if done else -1
     kept = [run for run in runs if not (run.sha256 and not run.chain_sha256 and runs.index(run) < behind)]

@@ -56,7 +56,7 @@ _UNLIKE_RADIUS = 0.2
 """Largest relative difference of readings from the bar's length; no ball bar has such a travel."""
 
 _SLOWEST, _FASTEST = 50.0, 0.05
-"""Range of plausible durations of a recording, over the circle's nominal duration."""
+"""Plausible durations of a recording, relative to the circle's nominal duration."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -192,7 +192,7 @@ class SessionFolder(SessionDetails):
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
 
     def unusable(self, run: RunEntry) -> str:
-        """Return why no figures follow from a run's file; empty if they do."""
+        """Return why a run's file gives no figures; empty if it gives figures."""
         try:
             recording = self.load(run).recording
             if lost := self.loss(run, recording):

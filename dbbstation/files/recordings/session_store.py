@@ -95,7 +95,7 @@ def log_faults(file: Path, data: Mapping[str, Any], log: EventLog | None, *, but
     """Return differences of a session file and its event log.
 
     Args:
-        but_runs: skip the list of runs, whose chain is checked already.
+        but_runs: as for `standing`.
     """
     stands = standing(data, log, but_runs=but_runs)
     remedy = AMEND.format(folder=file.parent)

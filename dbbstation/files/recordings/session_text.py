@@ -27,12 +27,12 @@ def session_data(
 
 
 def data_of(record: object, folder: Path | None = None) -> dict[str, object]:
-    """Return a part of a session file as plain data, without what is absent."""
+    """Return a part of a session file as plain data, without absent values."""
     return adapter(type(record)).dump_python(record, mode="json", by_alias=True, exclude_none=True, context=folder)
 
 
 def in_order(data: Mapping[str, object]) -> dict[str, object]:
-    """Return the keys of a session file but its format in their usual order."""
+    """Return the keys of a session file, except its format, in their usual order."""
     keys = ("machine", "plan", *(each.name for each in fields(SessionDetails)), "runs")
     return {key: data[key] for key in keys if key in data}
 

@@ -72,7 +72,7 @@ class SessionWriter:
         """Make a session folder with machine and plan and no runs.
 
         Raises:
-            InputError: what no session may note.
+            InputError: a value that a session must not contain.
             OutputError: the folder exists, lies in another session, or cannot be written.
         """
         make_session_folder(folder, machine, plan, details or SessionDetails(), (), {}, clock())

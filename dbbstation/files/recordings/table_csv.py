@@ -47,7 +47,7 @@ class TableFile:
         lines: number of each row's line, shape (n,).
         cells: texts by column, n each, with a decimal point.
         values: numbers by column, shape (n,); NaN for empty cells and texts.
-        instants: columns of dates and times, of which the numbers are seconds after the first.
+        instants: columns of dates and times; their numbers are seconds after the first.
     """
 
     file: str

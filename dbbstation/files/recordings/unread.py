@@ -55,7 +55,7 @@ def _is_utf_16(start: bytes) -> bool:
 
 
 def with_tabs(lines: list[str]) -> list[str] | None:
-    """Return lines with tabs for the spaces between columns; None if no such table begins.
+    """Return lines with tabs for the spaces between columns; None if the lines are no such table.
 
     Names may hold single spaces if two or more separate them.
     """

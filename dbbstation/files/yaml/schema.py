@@ -43,7 +43,7 @@ class Schema(BaseModel):
 
 @dataclass(frozen=True)
 class Partly:
-    """Marks keys of another part of a format, all of which may be absent; what goes together is checked elsewhere."""
+    """Marks keys of another part of a format, all of which may be absent; required combinations are checked elsewhere."""
 
     part: type[Schema]
 
@@ -74,10 +74,10 @@ def read_document(path: Path, schema: type[Schema | Record], faults: list[Proble
 
 
 def validate(document: YamlDocument, schema: type[S], faults: list[Problem], folder: Path | None = None) -> S | None:
-    """Return a document by its schema; None with faults added to `faults`.
+    """Return a document validated by its schema; None with faults added to `faults`.
 
     Args:
-        folder: that paths in it are relative to.
+        folder: to which the document's paths are relative.
     """
     try:
         return adapter(schema).validate_python(document.data, context=folder)

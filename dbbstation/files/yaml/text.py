@@ -84,7 +84,7 @@ DEEPEST = 50
 """Greatest depth of nested lists and mappings; the formats have eight."""
 
 SHORT = 10_000
-"""Greatest number of characters of a parsed text that stays in memory, with 63 others: usually 5 MB, at most 60 MB."""
+"""Greatest number of characters of a parsed text that stays in memory, with 63 other texts: usually 5 MB, at most 60 MB."""
 
 LONGEST_TAG = 1000
 """Greatest number of characters of a tag. Tags are refused, but each is first read to its end."""

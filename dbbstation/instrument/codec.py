@@ -28,7 +28,7 @@ class Garbage:
 
     Attributes:
         why: fault, or empty if they do not fit the grammar.
-        joining: rest of a frame from before listening, which is no fault.
+        joining: end of a frame that began before listening, which is no fault.
     """
 
     raw: bytes
@@ -44,12 +44,12 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
     """Return the bytes of one sample.
 
     Args:
-        length_mm: None: none, reported as `fault` unless `status` says otherwise.
+        length_mm: None: no length, reported as `fault` unless `status` is given.
         counter: taken modulo the wire's modulus.
         status: a length that does not fit becomes `overrange`, or `fault` if the device has no such status.
 
     Raises:
-        InstrumentError: the wire cannot say it.
+        InstrumentError: the protocol cannot express it.
     """
     if length_mm is None and status == "ok":
         status = "fault"

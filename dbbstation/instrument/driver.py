@@ -51,7 +51,7 @@ class Arrivals:
             self._chunks.popleft()
 
     def at_latest_s(self, behind: int) -> float:
-        """Return the latest possible arrival of a byte [s], by the number of bytes behind it."""
+        """Return the latest possible arrival time of a byte [s], from the number of bytes after it."""
         place = self._count - behind
         end, seen_s = next(one for one in self._chunks if one[0] >= place)
         return seen_s - (end - place) * self._character_s

@@ -83,7 +83,7 @@ class Content:
     Attributes:
         value: signed, in device units.
         voice: code or bit of a status.
-        features: switched on, for optional parts.
+        features: names of switched-on features, for optional parts.
     """
 
     value: float

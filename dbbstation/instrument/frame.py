@@ -95,7 +95,7 @@ class Frame(Schema):
 
     Attributes:
         bare: no prefix, no end, no line end, as for single control characters.
-        means: meaning, with its text or code.
+        means: meaning of the message, to which its text or code is added.
     """
 
     name: str = "reading"
@@ -142,7 +142,7 @@ class Frame(Schema):
 
     @property
     def terminator(self) -> bytes:
-        """Return the fixed bytes at its end, or empty."""
+        """Return the fixed bytes at the frame's end; may be empty."""
         last = self.parts[-1]
         return last.value if isinstance(last, Literally) else b""
 

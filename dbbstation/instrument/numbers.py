@@ -22,7 +22,7 @@ class Number(Schema):
 
     Attributes:
         modulus: of a counter.
-        scale: of one on the wire, in the length's unit; 0.0001 for four implicit decimals.
+        scale: length of the number 1 on the wire, in the length's unit; 0.0001 for four implicit decimals.
     """
 
     of: Literal["length", "counter"] = "length"
@@ -53,7 +53,7 @@ class Number(Schema):
             found.counter = int(value)
 
     def write(self, content: Content) -> bytes:
-        """Return the bytes of the number, or of the special that stands for the status.
+        """Return the bytes of the number, or of the special code for the status.
 
         Raises:
             NotRepresentable: it does not fit.
@@ -95,7 +95,7 @@ class DecimalText(Number):
 
     Attributes:
         width: with sign and point; None: free, at most `max_width`.
-        decimals: written; others are understood only with `decimals_vary`.
+        decimals: number written; other numbers are read only with `decimals_vary`.
         pad: filling on the left.
         signed: the field has a sign, `plus` for positive numbers. A non-blank sign is required; a blank may be filling.
         min_width: of a free width, filled with blanks or zeros; narrower is invalid.
@@ -255,7 +255,7 @@ class Integer(Number):
 
 
 class Ieee(Number):
-    """An IEEE 754 number of 4 or 8 bytes. Not-a-number is rejected unless it is a special."""
+    """An IEEE 754 number of 4 or 8 bytes. Not-a-number is rejected unless it is a special code."""
 
     kind: Literal["float"]
     size: Literal[4, 8] = 4

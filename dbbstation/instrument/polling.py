@@ -64,8 +64,8 @@ EXCHANGES = 20
 """Number of last requests over which disturbed replies are counted."""
 
 MOST_NOISY = 7
-"""If so many of these have bytes of no reply, the cause is not noise but another instrument, whose replies are cut at
-the wrong places. If one exchange in twenty is disturbed, so many occur once in 30 000 times (binomial)."""
+"""If so many of these requests get bytes outside a reply, the cause is not noise but another instrument, whose replies
+are cut at the wrong places. If one exchange in twenty is disturbed, so many occur once in 30 000 times (binomial)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,7 +70,7 @@ class FollowUp(Schema):
     """A request that is sent once after a fault, to read the device's message.
 
     Attributes:
-        frames: the first is the answer while there is a fault, others that there is nothing to tell. All are messages.
+        frames: the first is the answer while there is a fault, others are answers without a fault. All are messages.
     """
 
     request: Bytes = Field(min_length=1)

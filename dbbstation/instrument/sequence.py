@@ -28,7 +28,7 @@ class Placed(Generic[Held]):
     """A sample with its position in the sequence.
 
     Attributes:
-        lost: missing before it; None: it is rejected.
+        lost: number missing before it; None: the sample is rejected.
     """
 
     sample: Held

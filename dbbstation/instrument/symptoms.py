@@ -45,8 +45,8 @@ def _understood(protocol: Protocol, raw: bytes) -> float:
 _TELLING_BYTES = 12
 
 _MOSTLY = 0.25
-"""Share of characters with wrong parity above which noise is excluded. If the device has the other parity all
-characters are wrong, without parity half of them."""
+"""Share of characters with wrong parity above which noise is excluded. If the device uses the other parity, all
+characters are wrong; without parity, half of them."""
 
 _OTHERS = 3
 """Greatest number of likely instruments in a message."""

@@ -22,10 +22,10 @@ OUTER_DWELL_S = 1.0
 """Stop outside the circle: the recording must hold some samples before the feed-in."""
 
 CORNER_DWELL_S = 0.3
-"""Stop between feed-in and arc: what the path does not round, the machine's own swinging does not blur."""
+"""Stop between feed-in and arc: the machine's vibration then does not blur the path's sharp corner."""
 
 LEAST_CORNER_MM = 1e-4
-"""The control may round the corners of the polygon by this much; 0.1 µm is below what a bar can see."""
+"""The control may round the corners of the polygon by this much; 0.1 µm is below a bar's resolution."""
 
 EVEN_RAD = 1e-9
 """Steps that differ by less are the same."""

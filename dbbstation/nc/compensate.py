@@ -123,8 +123,8 @@ def compensated_parts(
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
-        StationError: a correction is larger than that, or the path has too many pieces.
-        ModelError: a source needs what a program does not give, such as temperatures, or the time where it is None.
+        StationError: a correction exceeds `largest_mm`, or the path has too many pieces.
+        ModelError: a source needs data that a program lacks, such as temperatures, or the time if `started_s` is None.
     """
     before: SpanBehind | None = None
     commanded_before = toolpath.start

@@ -73,14 +73,14 @@ class CommandCurve:
         """Largest omitted correction of the tilt so far, as motion at `LEVER_MM` [mm]."""
         self._before = before
         self.behind = before
-        """State behind the last place that was computed."""
+        """State after the last computed place."""
 
     def at(self, places: Floats) -> Floats:
         """Return poses to command at places in program order, shape (k, 6) [mm, deg].
 
         Raises:
             KinematicsError: a pose that the machine cannot take.
-            ModelError: a source needs what a program does not give.
+            ModelError: a source needs data that a program lacks.
         """
         path = self.toolpath
         row, share = row_and_share(places)

@@ -96,7 +96,8 @@ class Dialect(ABC):
 
         Raises:
             InputError: as `read`, or nothing moves.
-            StationError: a setup for a dialect that takes none, or a compensated program that its own check of offsets ends.
+            StationError: a setup for a dialect that takes none, or a compensated program whose own check of offsets
+                ends it.
         """
         declared = {} if setup is None else {"setup": setup}
         if declared and not self.takes_setup:

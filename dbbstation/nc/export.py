@@ -116,7 +116,7 @@ def circle_programs(
 
     Raises:
         TravelError: a program leaves the travel; none is returned then.
-        ModelError: the model is of another nominal machine, or has a source that needs what a program lacks.
+        ModelError: the model is of another nominal machine, or has a source that needs data that a program lacks.
         StationError: a test that the plan does not have, or a circle that `strict` refuses.
     """
     if inverse is not None:
@@ -182,7 +182,7 @@ def compensated_program(
     Raises:
         TravelError: the compensated path leaves the travel.
         KinematicsError: a pose that the machine cannot take.
-        ModelError: the model has a source that needs what a program lacks.
+        ModelError: the model has a source that needs data that a program lacks.
         MachineError: a feed that the machine does not reach.
         StationError: the program is compensated already or for another machine, its corrections are too large, or `strict`
             refuses it.
@@ -296,7 +296,7 @@ class _Finished:
 
     @property
     def is_marked(self) -> bool:
-        """Return whether the mark is found again."""
+        """Return whether the written poses contain the mark."""
         return has_marks(np.concatenate(self._sums))
 
 

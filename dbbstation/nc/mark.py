@@ -45,8 +45,9 @@ _SAME = 1e-9
 _GROUPS = ((slice(0, 3), DECIMALS[0]), (slice(3, 6), DECIMALS[5]))
 
 FARTHEST_PLACE, FARTHEST_ANGLE, FARTHEST_ANGLE_OF_FEW = 1, 3, 9
-"""Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre; half a nanometre, or three, at a point 100 mm from the
-tip. If A, B and C are constant, one pose in five has the mark; thirty poses are then enough."""
+"""Greatest steps of last decimals: each of X, Y, Z by a nanometre, each of A, B, C by half a nanometre at a point 100
+mm from the tip, or 1.5 if few poses are free. If A, B and C are constant, one pose in five has the mark; thirty poses
+are then enough."""
 
 _FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
 """Motion by one last decimal, for an angle at a point 100 mm from the tip [nm]."""
@@ -62,7 +63,7 @@ _ODD = np.array(
     ],
     dtype=np.uint64,
 )
-"""Odd numbers of 64 bits with about as many ones as zeros, one for each axis. Compensated programs are recognised by them: never change them."""
+"""Odd numbers of 64 bits with about as many ones as zeros, one for each axis. They identify compensated programs: never change them."""
 
 _SHIFTS, _MIXING = np.array([30, 27, 31], np.uint64), np.array([0xBF58476D1CE4E5B9, 0x94D049BB133111EB], np.uint64)
 """Constants of the finaliser of SplitMix64 [Steele et al. 2014]."""
@@ -114,14 +115,14 @@ def is_marked(toolpath: Toolpath) -> bool:
 
 
 def has_marks(sums: NDArray[np.uint64], count: int | None = None) -> bool:
-    """Return whether more of the poses with these `sums_of` are marked than chance explains; `count` of them differ."""
+    """Return whether more poses are marked than chance explains, from their `sums_of`; `count` is the number of different poses."""
     count = _distinct(sums) if count is None else count
     hits = {bits: _distinct(sums[_has_mark(sums, bits)]) for bits in BITS.values()}
     return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in hits.items())
 
 
 def sums_of(toolpath: Toolpath, decimals: Sequence[int]) -> NDArray[np.uint64]:
-    """Return a sum of each pose's numbers, by which it is known, shape (k,)."""
+    """Return a sum of each pose's numbers that identifies the pose, shape (k,)."""
     return np.concatenate([_sums(_numbers(each, decimals)) for each in _known(toolpath)])
 
 

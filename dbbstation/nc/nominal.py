@@ -62,7 +62,7 @@ def checksum(toolpath: Toolpath, decimals: Sequence[int] = DECIMALS) -> int:
 def check_nominal(toolpath: Toolpath) -> None:
     """Refuse a compensated program.
 
-    Three signs identify a compensated program: a comment, the mark in its poses, and the checksum as line number.
+    Three signs identify it: a comment, the mark in its poses, and the checksum as line number.
 
     Raises:
         StationError: it is compensated already.

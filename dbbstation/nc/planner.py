@@ -66,7 +66,7 @@ class Planner:
         return reached
 
     def row_mm_s(self, toolpath: Toolpath) -> Floats:
-        """Return the speed of each row at feed that moves the tip, F or less, shape (n,) [mm/s]; infinite in others."""
+        """Return the speed of each row at feed that moves the tip, F or less, shape (n,) [mm/s]; infinite in other rows."""
         turning = cuts(toolpath) & (toolpath.turn_deg > 0.0)
         reached = np.where(turning, self.reached_mm_s(move_mm(toolpath)), np.inf)
         return np.where(cuts(toolpath), np.minimum(toolpath.feed / 60.0, reached), np.inf)

@@ -49,7 +49,7 @@ def dialect_named(name: str) -> Dialect:
 
 
 def dialect_of_file(file: str, text: str) -> Dialect:
-    """Return a program's dialect by its extension, or by its text if several share that.
+    """Return a program's dialect by its extension, or by its text if several dialects share the extension.
 
     Raises:
         StationError: no dialect has that extension, or several have it and the program does not tell them apart.

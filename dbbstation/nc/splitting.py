@@ -99,7 +99,7 @@ def moves_of(toolpath: Toolpath) -> Integers:
 
 
 def parts_of(toolpath: Toolpath, runs_in: Callable[[Toolpath], Integers]) -> Iterator[tuple[Toolpath, Integers]]:
-    """Yield successive parts and the run of each of their rows, so that long programs take little memory."""
+    """Yield successive parts with each row's run, so that long programs take little memory."""
     begin = 0
     while begin < len(toolpath) or begin == 0:
         end, rows = 0, ROWS_AT_ONCE + 1
@@ -113,7 +113,7 @@ def parts_of(toolpath: Toolpath, runs_in: Callable[[Toolpath], Integers]) -> Ite
 
 
 def _end_of_part(part: Toolpath, runs: Integers) -> int:
-    """Return the last row with which another part may begin, a new run if there is one; 0 if there is none."""
+    """Return the last row with which another part may begin, preferably the first row of a run; 0 without such a row."""
     leads_on = (part.tip_mm > 0.0) | (part.turn_deg > 0.0)
     # The first move shows where the machine comes from.
     may = np.flatnonzero(leads_on)[1:]

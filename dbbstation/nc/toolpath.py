@@ -400,7 +400,7 @@ class ToolpathBuilder:
         arc: tuple[float, float, float, float],
         plane: Integers,
     ) -> None:
-        """Replace the poses of rows that were added together; all behind stand at their end in the axes of a plane."""
+        """Replace the poses of rows that were added together. All later rows get the last pose's coordinates in a plane."""
         behind = first + len(poses)
         self._rows["poses"][first:behind] = poses
         number = self._rows["arc_number"][first]

@@ -200,7 +200,7 @@ def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
 
 
 def _with_messages(path: Toolpath) -> dict[int, str | None]:
-    """Return texts by row; None: no row. A message before a stop counts as the stop's text, because dialects write both in one row or two."""
+    """Return texts by row; None: ignore this row. A message before a stop counts as the stop's text, because dialects write both in one row or two."""
     texts: dict[int, str | None] = dict(path.text)
     told = np.flatnonzero(path.kind != RowKind.COMMENT)
     for row, after in pairwise(told.tolist()):

@@ -338,7 +338,7 @@ def _ends_of_plain(toolpath: Toolpath) -> list[int]:
 
 
 class _Modal:
-    """What successive parts of a program go on from: pose with NaN for unknown axes, shape (6,), and number of rows."""
+    """State at the end of a part of a program, for the next part: pose with NaN for unknown axes, shape (6,), and number of rows."""
 
     def __init__(self) -> None:
         self.feed = self.corner_mm = math.nan

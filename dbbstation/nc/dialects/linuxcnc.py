@@ -25,8 +25,7 @@ MODES = "G21 G90 G94 G17 G40 G49"
 class LinuxCNC(WordDialect):
     """An axis word is written when its value changes, the motion code in every line.
 
-    - F under G94 is the speed along X, Y and Z alone, which is the feed of the tool tip. So F needs no correction for
-      tilting.
+    - F under G94 is the speed along X, Y and Z alone, which is the feed of the tool tip.
     - `G64 P Q0`: P bounds the rounding of corners; exact path (G61) would stop at each of 3600 corners. Q0 keeps
       LinuxCNC from merging short moves, which it does only while A, B and C are constant.
     - G61 and G64 apply to the end of each following move and cause no stop. A G61 move in pieces has G64 before its

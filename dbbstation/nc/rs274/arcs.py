@@ -18,9 +18,9 @@ CHORD_ERROR_MM = 5e-5
 
 RADIUS_ABSOLUTE_MM = {1.0: 0.02 * math.sqrt(2.0), 25.4: 0.0508 * math.sqrt(2.0)}
 RADIUS_RELATIVE, RADIUS_WORST = 1e-3, 100.0
-"""Limits of the difference between the radii to start and end of an arc. It must be less than the first, in the
-program's unit, or less than the second share of the radius and less than the first times the third. Such an arc is a
-spiral. [LinuxCNC's own limits]"""
+"""Limits of the difference between the radii to start and end of an arc. The difference may reach the first limit for
+the program's unit. It may also reach the second times the radius, but at most the third times the first. Such an arc is
+a spiral. [LinuxCNC's own limits]"""
 
 LEAST_RADIUS_MM = 0.00127
 """Arcs with a smaller radius are invalid. [LinuxCNC's own limit, RADIUS_TOLERANCE]"""

@@ -143,7 +143,7 @@ class Flow:
         return self._text[self._begins[at] : self._begins[at + 1] - 1]
 
     def _found(self, label: str, keyword: str) -> list[OLine]:
-        """Return the begin of a subprogram; if no line has it, look for its file."""
+        """Return the begin of a subprogram; if it is in no line, look for its file."""
         stem, begun = label.strip("<>"), {file for _, file in self.files}
         for name in (stem, f"o{stem}", f"{stem:0>4}", f"o{stem:0>4}"):
             if any(one.keyword == keyword for one in self._labels.get(label, [])):
@@ -216,7 +216,7 @@ class Flow:
         """Check after M2 and M30 that the program is complete.
 
         Raises:
-            BadLine: the percent sign that closes it.
+            BadLine: the closing percent sign is missing.
         """
         if self.percent and not any(is_percent(self._line(at)) for at in range(self._opening()[1], self._own_lines)):
             raise BadLine(self.cut_short())

@@ -52,7 +52,7 @@ def guard_lines(holds: Mapping[str, Sequence[float]]) -> list[str]:
 
 
 def length_lines(tool: str, length: Sequence[float], row: int) -> Iterator[str]:
-    """Yield the same for a tool length, `H1`, that a row of the toolpath activates."""
+    """Yield the guard for a tool length, `H1`, that a row of the toolpath activates."""
     parameters = [f"#{LENGTH + k}" for k in range(_AXES)]
     check = parameters, length, _LENGTHS.format(tool[1:], offset_text(length))
     yield from _stops([check], FIRST_LENGTH_LABEL + 2 * row)

@@ -229,7 +229,7 @@ class Moves(Modes):
         return np.array(target)
 
     def _cut_somewhere(self, block: ProgramBlock, unknown: list[str]) -> None:
-        """Allow a straight move at feed before the program first names all axes. The program must name them later."""
+        """Allow a straight move at feed although the program has not yet named all axes. It must name them later."""
         fault = unknown_place(block, unknown)
         left = any(AXES.index(letter) in self._away for letter in unknown)
         if left or self._motion != LINEAR or self._per_move or self._cutter is not None:

@@ -51,7 +51,7 @@ def letters_of(text: str) -> NDArray[np.uint8]:
 
 
 def plain_lines(letters: NDArray[np.uint8], at: int) -> PlainLines:
-    """Return the content of plain lines from a position up to the first other line."""
+    """Return the content of plain lines from a position up to the first line that is not plain."""
     for most in (LEAST_LINES, MOST_LINES):
         head, digits = np.full((most, 2), -1, dtype=np.int64), np.zeros((most, 7), dtype=np.int64)
         decimals = np.full((most, 7), -1, dtype=np.int64)

@@ -29,7 +29,7 @@ class ControlState:
         system: number of the work system, from 1.
         g92: in force, shape (6,) [mm, deg].
         length: of the tool in force, shape (6,) [mm, deg].
-        length_said: whether there is one.
+        length_said: whether a tool length is in force.
         tool: in the spindle; None if not known.
     """
 

@@ -28,7 +28,7 @@ _TOKEN = re.compile(
 LARGEST = {"N": 99_999_999.0, "F": 1e9, "S": 1e6, **dict.fromkeys("ABC", 36_000.0)}
 LARGEST_OTHER = 100_000.0
 """Greatest number after each letter: a hundred metres, a hundred turns, a dwell of a day. A greater number is a typing
-error. It would become millions of points before the machine's limits are checked."""
+error, and would become millions of points."""
 
 _NOT_READ = {
     "[": ("an expression ([ ]) without its letter", "write the letter before it"),
@@ -51,7 +51,7 @@ class Word(NamedTuple):
 
 
 class ParameterSetting(NamedTuple):
-    """A parameter by number or lower-case name, and the value that it has after the line."""
+    """A parameter, by number or lower-case name, and its value after the line."""
 
     parameter: int | str
     value: float
@@ -111,7 +111,7 @@ def tokens(
     """Yield the tokens of a line, in order.
 
     Raises:
-        BadLine: something that is neither, or has no value.
+        BadLine: text that is no token, or has no value.
     """
     position = 0
     while True:

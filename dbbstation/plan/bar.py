@@ -47,7 +47,7 @@ class Bar(Record):
     calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
     """Standard uncertainty of this length [mm]."""
     calibrated: Moment | None = None
-    """When."""
+    """Time of the calibration."""
     temp_c: TemperatureDegc | None = None
     """Temperature of the bar at its calibration [degC]."""
     expansion_um_m_k: ExpansionUmMK | None = None
@@ -59,11 +59,11 @@ class Bar(Record):
     temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
     """Standard uncertainty of a temperature of the bar; if stated, the fit accounts for the bar's growth [K]."""
     calibrator_serial_number: str | None = None
-    """Of the calibrator."""
+    """Serial number of the calibrator."""
     calibrator_certificate: str | None = None
-    """Number and issuer of its certificate."""
+    """Number and issuer of the calibrator's certificate."""
     calibrator_certified: Day | None = None
-    """Date of its certificate."""
+    """Date of the certificate."""
     calibrator_valid_until: Day | None = None
     """Last day on which the certificate is valid."""
     ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None

@@ -146,7 +146,7 @@ _PATHS: WeakKeyDictionary[RawCircle, BallPath] = WeakKeyDictionary()
 
 
 def figures(raw: RawCircle, length_mm: Floats | None = None) -> CircleFigures:
-    """Return figures of a raw circle, cached, or of other lengths, shape (n,) [mm], at its angles.
+    """Return figures of a raw circle, cached, or of given lengths, shape (n,) [mm], at the circle's angles.
 
     Raises:
         TraceError: the points do not determine a circle.

@@ -40,7 +40,7 @@ def steady(readings_mm: Floats, resolution_mm: float | None = None) -> Steady:
         resolution_mm: None for the smallest difference of readings.
 
     Raises:
-        ValueError: fewer readings, or all equal without resolution.
+        ValueError: too few readings, or equal readings without resolution.
     """
     if len(readings_mm) < 2 * BATCHES:
         raise ValueError(f"{len(readings_mm)} readings, at least {2 * BATCHES} are needed")

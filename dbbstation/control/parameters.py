@@ -1,7 +1,7 @@
 """Fit parameters and joint tables of LinuxCNC's genhexkins to a model over a volume.
 
-LinuxCNC's genhexkins drives joint i to |T + R a_i - b_i|, with platform joints a and base joints b; a table adds to a
-joint's position. Wrong joints imitate other errors, so fitted values describe a control, never the machine.
+Genhexkins drives joint i to |T + R a_i - b_i|, with platform joints a and base joints b; a table adds to a joint's
+position. Wrong joints imitate other errors, so fitted values describe a control, never the machine.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ POINTS = 256
 """Most triplets that LinuxCNC takes in a `COMP_FILE` [EMCMOT_COMP_SIZE]."""
 
 PER_WAVE = 4
-"""Least table points per wave, linearly interpolated: with four, a fifth of its rms remains; with three, more than a third."""
+"""Least table points per wave, linearly interpolated: with four, a fifth of the wave's rms remains; with three, more than a third."""
 
 BEYOND_MM = 5.0
 """How far tables go beyond the struts' lengths in the volume; beyond their ends LinuxCNC holds the last value [mm]."""

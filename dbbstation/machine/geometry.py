@@ -33,7 +33,7 @@ machine tools. Segments that keep their feed at this acceleration keep it at hig
 _Component = Annotated[float, Quantity("", 0, 1, signed=True)]
 
 _UNIT_WITHIN = 0.01
-"""How far the length of a direction may be from one, written with two or three digits."""
+"""Largest deviation of a unit vector's length from one in a file, which has two or three digits."""
 
 
 def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -96,7 +96,7 @@ class Travel(Record):
 
 @dataclass(frozen=True)
 class Masses(Record):
-    """What gravity acts on."""
+    """Masses that gravity acts on."""
 
     platform_kg: Annotated[float, Quantity("kg", 1, 100_000)]
     """Platform with spindle and tool [kg]."""
@@ -111,7 +111,7 @@ class Compliance(Record):
     at_1000mm_mm_per_n: Annotated[float, Quantity("mm/N", 1e-9, 1e-2)]
     """Elongation per force of a strut of 1000 mm between its joints, pulling positive [mm/N]."""
     growing_share: Annotated[float, Quantity("", 0, 1)] = 0.9
-    """Part of that which grows with the strut's length; the rest is the same at every length [1]."""
+    """Share of this elongation that grows with the strut's length; the remaining share is constant [1]."""
 
 
 @dataclass(frozen=True)

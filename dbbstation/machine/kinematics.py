@@ -165,9 +165,9 @@ def bar_sensitivity(
 ) -> BarSensitivity:
     """Return a bar's length and its exact derivatives by the adjoint method: one 6x6 solution per pose.
 
-    [CAL II-D] says "can be computed only numerically"; but by the implicit function theorem a strut error dL moves the
-    pose by J^-1 dL. With bar direction n and J^T g = [n, (R o) x n], the length changes by g dL. Joint errors act as
-    strut errors u dQ and -u R dP.
+    [CAL II-D] computes them numerically, but by the implicit function theorem a strut error dL moves the pose by J^-1
+    dL. With bar direction n and J^T g = [n, (R o) x n], the length changes by g dL. Joint errors act as strut errors u
+    dQ and -u R dP.
 
     Args:
         tool_ball_mm: platform frame, shape (3,) or (n, 3); default: the tool tip.

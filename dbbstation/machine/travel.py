@@ -23,8 +23,8 @@ ROUNDING = 1e-9
 
 LEAST_STIFFNESS = 0.02
 """Least Jacobian determinant, relative to the middle of the travel. Below it a pose counts as loose: the struts hardly
-hold the platform in some direction. Travel limits alone allow such poses. On a PM-600-like machine the determinant
-passes through zero at high tilt near the upper limit."""
+hold the platform in some direction. On a PM-600-like machine the determinant passes through zero at high tilt near the
+upper limit."""
 
 
 SMALLER = "move the circle, make it smaller or tilt it less"

@@ -206,7 +206,7 @@ class _Stretch:
         return driven, bent + Effect(strut_mm=sum(built_up, np.zeros_like(driven)))
 
     def with_history(self) -> Floats:
-        """Return driven lengths with memory, shape (n, 6) [mm]."""
+        """Return driven lengths for sources with memory, shape (n, 6) [mm]."""
         if not self._searched:
             return self._smooth
         count, row, together = len(self._wanted), 0, MOST_TOGETHER
@@ -235,7 +235,7 @@ class _Stretch:
             self._held_back = driven[row - 1] - self._smooth[row - 1]
 
     def _tried(self, rows: slice) -> tuple[Floats, int, tuple[State, ...]]:
-        """Solve rows together; return driven lengths, shape (k, 6) [mm], the number of solved rows, and the states after all."""
+        """Solve rows together; return driven lengths, shape (k, 6) [mm], the number of solved rows, and the states after all rows."""
         smooth = self._smooth[rows]
         driven = smooth + self._held_back
         slope = _Slope()

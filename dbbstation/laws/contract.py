@@ -64,7 +64,7 @@ class Parameter:
     def limits(self) -> tuple[float, float]:
         """Return a nonlinear parameter's limits in a fit; infinite for amplitudes and listed values.
 
-        Positive parameters may exceed their grid by one step (ratio), others by its length.
+        Positive parameters may exceed their grid by the ratio of its outer steps, others by the grid's length.
         """
         grid = sorted(self.grid)
         if len(grid) < 2 or self.listed:  # noqa: PLR2004 - a step needs two values
@@ -99,7 +99,7 @@ class TableSource(PortSource):
     """
 
     needs: ClassVar[tuple[str, ...]]
-    """Columns that it needs; without one of them it is omitted."""
+    """Required columns; if one is missing, the source is omitted."""
 
     texts: ClassVar[Texts]
 
@@ -108,7 +108,7 @@ class TableSource(PortSource):
     friction, play and warm-up."""
 
     follows: ClassVar[str] = ""
-    """Column over which they depart; if empty, the first needed one."""
+    """Column over which they depart from the formula; if empty, the first in `needs`."""
 
     @abstractmethod
     def columns(self, variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:

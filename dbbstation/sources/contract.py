@@ -329,7 +329,7 @@ class ErrorSource(ABC):
     happens_once: ClassVar[bool] = False
     """True for a single event in a session, such as a bump: other tests cannot show it again, so it is never called identified."""
     concealed_times: ClassVar[float] = 1.0
-    """Prior standard deviation of undetermined directions, in plausible sizes."""
+    """Prior standard deviation of undetermined directions, in units of plausible sizes."""
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for a mere description of an error."""
 
@@ -417,10 +417,7 @@ class ErrorSource(ABC):
         return True
 
     def by_temperature(self) -> ErrorSource | None:
-        """Return the cause's law by logged temperatures, or None.
-
-        Both laws have one name; a model contains only one.
-        """
+        """Return the cause's law by logged temperatures, or None."""
         return None
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
@@ -449,7 +446,7 @@ class ErrorSource(ABC):
         return None
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        """Return changes of the effect by other constants of the law, stacked along a last axis.
+        """Return changes of the effect if constants of the law differ, stacked along a last axis.
 
         They describe constants of the machine that recordings seldom determine. A diagnosis allows each change with a
         factor up to about one. None by default.

@@ -33,7 +33,7 @@ SAME = 1e-9
 """Largest rounding difference between two stretches and the whole, relative to the greatest effect."""
 
 MOST_KINKS = 0.05
-"""Largest share of samples with more difference: at kinks, as of play, no derivative exists."""
+"""Largest share of samples with larger differences: at kinks, such as those of play, no derivative exists."""
 
 FEWEST_LETTERS, FEWEST_WORDS = 10, 4
 """Fewest letters of a text and words of a parameter's meaning that help a reader of a verdict."""

@@ -110,7 +110,7 @@ class ReversalSpike(ErrorSource):
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return changes by a separate decay constant of each strut, and by an abrupt spike without rise."""
+        """Return changes of the effect if each strut has its own decay constant, and if spikes rise abruptly."""
         since, fading = self._since(motion, machine)
         height, constant = _sizes(values)
         at_once = -np.sign(since) * height * np.exp(-((fading / constant) ** self._power))

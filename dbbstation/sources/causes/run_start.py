@@ -23,7 +23,7 @@ FEWEST = 6
 """Fewest places of a path; a machine at rest during a set-up has one."""
 
 SAME_DEG = 1e-9
-"""Closer rows are one place."""
+"""Closer rows count as one place."""
 
 
 class RunStart(ErrorSource):

@@ -149,5 +149,5 @@ class _AlongTheScrew(ErrorSource):
 
 
 def _out(motion: Motion, machine: Machine) -> Floats:
-    """Return each strut's extension beyond mid-travel, shape (n, 6) [100 m]: one percent per metre."""
+    """Return each strut's extension beyond mid-travel, shape (n, 6) [100 m], to be multiplied by percent/m."""
     return 1e-5 * (motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0)

@@ -126,7 +126,7 @@ def _logged(source: ErrorSource, motions: Iterable[Motion]) -> ErrorSource | Non
 
 
 def not_given(source: ErrorSource, motions: Iterable[Motion]) -> str:
-    """Return inputs of a source that motions lack, including changing temperatures; may be empty."""
+    """Return which of a source's inputs motions lack, or that its temperatures hardly change; empty if neither."""
     try:
         for motion in motions:
             source.require(motion)

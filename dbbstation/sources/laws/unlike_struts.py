@@ -19,7 +19,7 @@ UNLIKE = 2.0
 
 
 def of_own_lengths(source: ErrorSource, motion: Motion, machine: Machine, values: Floats) -> Effect:
-    """Return changes of a source's effect if each strut has its own length.
+    """Return changes of a source's effect if each strut's length differs from the common one.
 
     Args:
         values: one per strut, then the common length, shape (7,).

@@ -26,7 +26,7 @@ class UnexplainedByForce(LinearSource):
     """A strut error that is piecewise linear in the force due to the platform's weight.
 
     Forces follow from equilibrium at the commanded pose; beyond the weight the error is constant. A diagnosis calls the
-    curve unexplained and never names this source.
+    curve unexplained.
     """
 
     name = "unexplained-by-force"

@@ -23,8 +23,8 @@ POINTS = 25
 class UnexplainedByLength(LinearSource):
     """A strut error that is piecewise linear in length.
 
-    Reference lengths and joints also explain constant and slope; priors divide them. A diagnosis calls the curve
-    unexplained and never names this source.
+    Errors of reference lengths and joints also cause a constant and a slope; priors separate these causes. A diagnosis
+    calls the curve unexplained.
     """
 
     name = "unexplained-by-length"

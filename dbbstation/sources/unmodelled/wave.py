@@ -23,8 +23,8 @@ PERIODS_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
 class UnexplainedWave(ErrorSource):
     """A strut error is a wave: dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i).
 
-    L_0 is mid-travel. For the period of the screw's lead `screw-cyclic` is the cause; the period p is another. A
-    diagnosis calls the wave unexplained and never names this source.
+    L_0 is mid-travel. A wave with the period of the screw's lead belongs to `screw-cyclic`; p is another period. A
+    diagnosis calls the wave unexplained.
     """
 
     name = "unexplained-wave"

@@ -32,9 +32,9 @@ FEWEST = 20
 
 CLIPPED_SAMPLES = 20
 CLIPPED_RATIO = 5.0
-"""Clipping needs this number of readings at one limit, and this ratio to the next value inside. At the crest of a
-quantised wave the last step has two or three times the readings of the step before. A saturated amplifier gives all of
-them at the limit."""
+"""A current is clipped if so many readings are at one limit, this multiple of those at the next value. At the crest of
+a quantised wave the last step has two or three times the readings of the step before. A saturated amplifier gives all
+of them at the limit."""
 
 
 def cleaned(labels: Sequence[str], current_a: Sequence[Floats]) -> tuple[list[Floats], list[str]]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Solution
 
 OPEN = 0.1
-"""Largest component in held directions of a determined parameter."""
+"""Largest component that a determined parameter may have in held directions."""
 
 MORE_THAN_NOISE = 1.2
 """Ratio of residual to fine noise above which the residual contains a slow misfit."""

@@ -64,8 +64,7 @@ NOISE_STEPS = 12
 missing physics, noise and residual might otherwise change without end."""
 
 MOST_KEPT = 50_000
-"""Most poses of all runs whose motions a fit keeps between steps: up to a hundred numbers per pose, 40 MB. A diagnosis
-of thirty circles has half as many."""
+"""Most poses of all runs whose motions a fit keeps between steps: up to a hundred numbers per pose, 40 MB."""
 
 MotionOf: TypeAlias = "Callable[[Observation], Motion]"
 """A function that returns a run's motion."""
@@ -232,7 +231,7 @@ def calibrate(
 
 
 def _with(lost: Floats, more: Floats | None) -> Floats:
-    """Return orthonormal rows that hold more directions, too, of the first columns."""
+    """Return orthonormal rows that also hold `more` directions of the first columns."""
     if more is None:
         return lost
     wide = np.pad(more, ((0, 0), (0, lost.shape[1] - more.shape[1])))

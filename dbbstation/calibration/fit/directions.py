@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 RECOGNISED = 0.02
-"""Largest share of a known pattern outside the lost directions if it counts as lost."""
+"""A known pattern counts as lost if at most this share is outside the lost directions."""
 
 ALONE = 1e-6
 """If a parameter's component in a direction is within this of 1, the direction is named after it."""
 
 SHOWS_IN_CIRCLES = 0.1
-"""Least component outside the drives' parameters of a direction that concerns circles."""
+"""A direction concerns circles if its component outside the drives' parameters is at least this."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,8 @@ CENTRED_MM = 2e-5
 """Centres so near the fixed ball cannot be measured ones, however accurate the set-up [mm]."""
 
 CENTRED_SHARE = 0.3
-"""Suspicious centres, relative to the stated scatter of mountings and CMM: thirty coordinates with less scatter have a
-probability of 1e-12. Centre compensation leaves less, the squared centre over the radius."""
+"""Centres nearer to the balls than this share of the stated scatter of mountings and CMM are suspicious: for thirty
+coordinates the probability is 1e-12. Centre compensation leaves less, the squared centre over the radius."""
 
 LEAST_CIRCULARITY_UM = 0.5
 """A smaller circular deviation indicates a simulated nominal machine, whose centres may be exact [µm]."""

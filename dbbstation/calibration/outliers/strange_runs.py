@@ -25,7 +25,7 @@ FALLS, AT_NOISE = 4.0, 4.0
 times the noise. Missing physics would remain in the other tests."""
 
 ALONE = 1.2
-"""A single run is the outlier if its omission leaves at most this multiple of the mean square without the whole test."""
+"""A single run is the outlier if its omission leaves at most this multiple of the mean square that remains without the whole test."""
 
 
 def strange_runs(calibration: Calibration) -> list[int]:

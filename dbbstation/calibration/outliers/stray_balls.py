@@ -32,7 +32,7 @@ SAME_SIGMAS = 3.0
 
 
 def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
-    """Give the run whose ball moved within its mounting a separate mounting, and refit; None without such a run."""
+    """Find a run whose ball moved within its mounting, give it a separate mounting, and refit; None without such a run."""
     k = _moved_in(calibration)
     if k is None:
         return None

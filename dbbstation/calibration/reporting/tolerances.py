@@ -25,11 +25,11 @@ class WorstRun:
 
 @dataclass(frozen=True)
 class EvaluatedTolerance:
-    """A tolerance, and the worst run under the nominal machine and under the model.
+    """A tolerance and its worst runs.
 
     Attributes:
         before: worst run under the nominal machine; None without applicable run.
-        after: worst run under the model; None without applicable run.
+        after: the same under the model.
     """
 
     quantity: str

@@ -1,4 +1,4 @@
-"""Refuse to write results into session folders; only this module has the rule."""
+"""Refuse to write results into session folders."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ SETTLED_SIGMA = 1e-2
 
 SECTORS = 1440
 """Sectors of a turn, a quarter of a degree each, over which currents of long runs are averaged. Within a sector loads
-change by a thousandth; samples of reversing friction are excluded anyway."""
+change by a thousandth; samples of reversing friction are excluded."""
 
 LONG = 2
 """Fewest readings per sector of a long run."""

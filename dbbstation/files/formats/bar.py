@@ -60,7 +60,7 @@ class BarFile(Schema):
     format: Literal["dbb-bar/1"]
     """Name and version of this format."""
     serial_number: Annotated[str, Field(min_length=1)]
-    """Of the bar."""
+    """Serial number of the bar."""
     calibrated: Moment
     """Time of the reading on the calibrator."""
     temp_c: TemperatureDegc

@@ -47,7 +47,7 @@ class JobFile(Schema):
     sessions: str = "."
     """Folder of the job's sessions, a path from this file's folder."""
     serial_number: str = ""
-    """Of the machine."""
+    """Serial number of the machine."""
     operator: str = ""
     """The operator, if always the same."""
     order: str = ""

@@ -84,8 +84,9 @@ class ColumnSchema(Schema):
     """One column of the files."""
 
     means: Annotated[str, AfterValidator(_meaning)]
-    """`time`, `angle`, `length` (between the ball centres), `deviation` (of the length from `zero_mm`, longer positive), `test`,
-    `direction`, `repeat`, `mounting`, `state`, `started`, `run` (the same in all rows of a run, whatever stands there), `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
+    """`time`, `angle`, `length` (between the ball centres), `deviation` (of the length from `zero_mm`, longer
+    positive), `test`, `direction`, `repeat`, `mounting`, `state`, `started`, `run` (any text, equal in all rows of a
+    run), `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
     unit: str | None = None
     """Unit of its numbers; absent if the column is a text, a count or ignored."""
 
@@ -120,7 +121,8 @@ class MappingFile(Schema):
     name: Annotated[str, Field(min_length=1)] | None = None
     """Name of the program that wrote the files."""
     encoding: Literal["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"] = "utf-8"
-    """Of the files' text: Windows code pages are western, central European, Cyrillic and Japanese, GB 18030 is Chinese; a byte order mark in a file takes precedence."""
+    """Encoding of the files' text: Windows code pages are western, central European, Cyrillic and Japanese, GB 18030 is
+    Chinese; a byte order mark in a file takes precedence."""
     separator: Literal["comma", "semicolon", "tab"] | None = None
     """Separator of columns; absent: a comma, or with decimal commas a semicolon."""
     decimal: Literal[".", ","] | None = None

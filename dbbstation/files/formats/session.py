@@ -90,9 +90,9 @@ class CommandedProgram(Record):
     path: PathInFolder
     """Path in the session folder."""
     sha256: Sha256Hex
-    """Of the program file."""
+    """SHA-256 of the program file."""
     model_sha256: Sha256OrEmpty = ""
-    """Of the model file that it was compensated with."""
+    """SHA-256 of the model file that compensated it."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class RunEntry(Record):
     reason: OrEmpty = ""
     """Why it was rejected, or accepted without a circle."""
     sha256: Sha256OrEmpty = ""
-    """Of the run file; absent only while recording."""
+    """SHA-256 of the run file; absent only while recording."""
     chain_sha256: Sha256OrEmpty = ""
     """Hash of this entry and the previous sealed run's `chain_sha256`."""
     counts: Counts | None = None
@@ -226,13 +226,13 @@ class Amendment(Record):
     former_sha256: Annotated[Sha256OrEmpty, Field(default="")]
     """Hash of the former file, or `chain_sha256` of the former list's last run; absent if there was none."""
     sha256: Annotated[Sha256OrEmpty, Field(default="")]
-    """The same now."""
+    """The same hash now."""
     former: Annotated[OrEmpty, AfterValidator(lambda path: path and _inside(path)), Field(default="")]
     """Path of the former file in the session folder."""
     reason: Annotated[str, Field(min_length=1)]
     """Reason, as the user stated it."""
     made: Moment
-    """When."""
+    """Date and time."""
 
     @property
     def text(self) -> str:
@@ -246,9 +246,9 @@ class Note(Record):
     """A note during the measurement."""
 
     made: Moment
-    """When."""
+    """Date and time."""
     text: OrEmpty = ""
-    """In their words."""
+    """Text of the note."""
     ambient_temp_c: TemperatureDegc | None = None
     """Temperature of the shop at this time [degC]."""
 
@@ -258,7 +258,7 @@ class SessionDetails(Record):
     """Facts that a session notes in addition to its runs."""
 
     serial_number: str = ""
-    """Of the machine."""
+    """Serial number of the machine."""
     operator: str = ""
     """Name of the operator."""
     job: OrEmpty = ""

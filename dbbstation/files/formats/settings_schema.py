@@ -131,7 +131,7 @@ class SettingsFile(Schema):
     baud: Annotated[int, Field(ge=1)] | None = None
     """Baud rate, if the instrument is not set to the usual one."""
     serial_number: _Word | None = None
-    """Of the machine; noted in every session."""
+    """Serial number of the machine; noted in every session."""
     bar: BarSettings | None = None
     """The ball bar."""
     program: ProgramSettings = ProgramSettings()

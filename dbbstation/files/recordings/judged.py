@@ -84,7 +84,7 @@ def run_of(
 
 
 def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
-    """Return a plan's circles as expected by a model; empty without a model, since they are then all alike."""
+    """Return a plan's circles as expected by a model; empty without a model."""
     return () if model is None else circles_of_plan(session, model)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 LOCK_FILE = ".lock"
-"""Name of the lock's file in the session folder; only this module reads it."""
+"""Name of the lock's file in the session folder."""
 
 PATIENCE_S = 2.0
 """Longest wait of a command that writes one note for another such command [s]."""

@@ -138,7 +138,7 @@ def added(
     """Add one thing, or a fault if its name is taken.
 
     Args:
-        whose: origin of each that is not the program's.
+        whose: origin of each thing that is not the program's.
         called: kind in words, with its article.
     """
     if one.name in found:
@@ -153,12 +153,12 @@ FOREIGN = (Exception, SystemExit)
 
 
 def in_words(error: BaseException) -> str:
-    """Return an exception of foreign code with its kind."""
+    """Return the type and text of foreign code's exception."""
     return f"{type(error).__name__}: {error}"
 
 
 def line_in(error: BaseException, file: str) -> int:
-    """Return the last line of a file in a traceback; 0 if it has none."""
+    """Return the number of a file's last line in a traceback; 0 if it has none."""
     frames = traceback.extract_tb(error.__traceback__)
     return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)
 
@@ -172,7 +172,7 @@ def looked_up(
         how_to_add: what may be missing, without a full stop.
 
     Raises:
-        StationError: nothing has this name; the nearest is named, or all that are known.
+        StationError: nothing has this name; the message gives the nearest name or all names.
     """
     if name in known:
         return known[name]

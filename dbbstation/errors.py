@@ -50,7 +50,7 @@ def few(problems: Sequence[Problem], count: int | None = None) -> list[Problem]:
     """Return the problems; of very many, return the first ones and the count of the others.
 
     Args:
-        count: total, if only the first `MOST_FAULTS` + 1 were made.
+        count: total number, if `problems` has only the first `MOST_FAULTS` + 1.
     """
     more = (count or len(problems)) - MOST_FAULTS
     if more <= 0:
@@ -76,7 +76,7 @@ class StationError(Exception):
         super().__init__(what, where, remedy)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Let the error be pickled although its arguments have names."""
+        """Let the error be pickled despite its keyword arguments."""
         return _as_it_was, (type(self), self.args, self.__dict__)
 
     def __str__(self) -> str:

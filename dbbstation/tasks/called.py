@@ -1,4 +1,4 @@
-"""Do a task by its name, as another process asks for it."""
+"""Do a task by its name, at another process's request."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def called(
     """Do a task, write its outputs and return its result.
 
     Args:
-        given: by parameter; what is missing comes from the settings.
-        outputs: files by `out`, `figure` or `page`, beside those that are parameters of the task.
+        given: values by parameter; missing values come from the settings.
+        outputs: files by `out`, `figure` or `page`, unless the task has them as parameters.
 
     Raises:
-        StationError: as the task does, or a file exists without `force`.
+        StationError: an error of the task, or a file exists without `force`.
     """
     function = getattr(import_module(f"dbbstation.tasks.{_MODULES[name]}"), name)
     task: Declared = function.declared

@@ -14,7 +14,7 @@ def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Se
     """Return the named tests in their order, or all tests, without the excluded ones.
 
     Raises:
-        StationError: an unknown name, or none is left.
+        StationError: an unknown name, or no test is left.
     """
     names = list(known)
     unknown = [name for name in (*tests, *exclude) if name not in names]

@@ -42,7 +42,7 @@ def load_circles(
 ) -> Circled:
     """Read sessions and compute the figures of accepted runs.
 
-    Findings compare with all accepted runs, also of excluded tests.
+    Findings compare each run with all accepted runs, also of excluded tests.
 
     Args:
         chosen: filter of G, F and H.
@@ -149,7 +149,7 @@ def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUp
 
 
 def _form_um(bar: Bar, ball: Ball) -> float | None:
-    """Return the standard uncertainty by the form of both balls, assumed rectangular [GUM 4.3.7]; None unless both are stated."""
+    """Return the standard uncertainty due to both balls' form, assumed rectangular [GUM 4.3.7]; None if unknown."""
     if bar.ball_form_um is None or ball.form_um is None:
         return None
     return float(np.hypot(bar.ball_form_um, ball.form_um) / np.sqrt(3.0))

@@ -71,9 +71,9 @@ def kinematics(
 
     Raises:
         InputError: faults of files.
-        ModelError: the model is of another machine, without uncertainty, or a source cannot be held by a kinematics.
+        ModelError: the model is of another machine or lacks uncertainty, or a kinematics cannot hold a source.
         OutputError: `out` exists without `force`.
-        StationError: a name that is not C.
+        StationError: the component's name is no C name.
     """
     if out.suffix != SUFFIX:
         raise StationError(f"{out.name} cannot be the name of a component file", remedy=f"end it with {SUFFIX}")

@@ -48,15 +48,15 @@ class Option:
         help: one or two sentences, the unit in brackets; for a flag that is True by default, the meaning of its
             absence.
         kind: `argument` and `argument-file` have no flag; `path`, `file` or `folder`; empty: by the type.
-        usual: what its absence means, shown as default.
-        least: `most`, `above`: range of a number.
-        factor: of a setting in another unit.
-        goes_with: option beside which the setting counts for nothing.
-        objects: scripts may give other objects than paths.
-        whole: commas part no values.
-        flag: on the command line; empty: the name.
-        required: on the command line, though scripts may leave it out.
-        parse: makes a value of the command line's texts, or raises ValueError.
+        usual: effect of its absence, shown as default.
+        least: with `most` and `above`, the range of a number.
+        factor: converts a setting from another unit.
+        goes_with: option that makes the command ignore the setting.
+        objects: scripts may give objects instead of paths.
+        whole: commas do not separate values.
+        flag: name on the command line; empty: the parameter's.
+        required: needed on the command line; scripts may omit it.
+        parse: converts the command line's texts to a value, or raises ValueError.
     """
 
     help: str = field(kw_only=False)
@@ -107,7 +107,7 @@ class TaskParameter:
         """Return a checked value for the task.
 
         Raises:
-            ArgumentError: the task does not take it.
+            ArgumentError: the task does not accept the value.
         """
         if value is self.default:
             return value
@@ -215,7 +215,7 @@ class Declared:
         """Return checked arguments for the task.
 
         Raises:
-            ArgumentError: a value that it does not take, or that cannot be combined with another.
+            ArgumentError: the task does not accept a value, or a combination of values.
         """
         bound = self.signature.bind(*args, **named)
         there = []

@@ -121,7 +121,7 @@ def diagnose(
 
 
 def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
-    """Return the fit with an effect of the machine that other tests confirm, or None."""
+    """Return the fit with an effect of unknown cause that other tests confirm, or None."""
     from dbbstation.diagnosis.unexplained_model import KEPT_AS, keep_unexplained
 
     curve = found.unexplained.curve

@@ -164,7 +164,7 @@ def refuse_other_program(identity: dict[str, str], whose: str) -> None:
     """Refuse workers with another program, because their numbers may differ.
 
     Raises:
-        SchedulerError: it differs.
+        SchedulerError: a worker's program differs.
     """
     if unlike := differences_of(program_identity(), identity):
         raise SchedulerError(f"{whose} has another program: {unlike}", remedy="install the same version everywhere")

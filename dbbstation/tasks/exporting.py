@@ -95,7 +95,7 @@ def angles_deg(recording: Recording, circle: Circle) -> Floats:
     """Return each sample's commanded angle on the full turn, from 0 to 360, shape (n,) [deg]; NaN outside the turn.
 
     Raises:
-        TraceError: neither angles nor edges of a circle.
+        TraceError: the run has neither angles nor edges of a circle.
     """
     if recording.theta_deg is not None:
         return np.mod(recording.theta_deg, FULL_TURN_DEG)

@@ -74,7 +74,7 @@ class _Named:
 
     @property
     def started(self) -> str | None:
-        """Return the first noted start of a run."""
+        """Return the earliest noted start of a run."""
         moments = () if self.session is None else [run.started for run in self.session.runs if run.started is not None]
         return min(moments).isoformat() if moments else None
 
@@ -107,8 +107,8 @@ def fleet(
         folders: of sessions, at most four levels deep, or sessions.
         task: `calibrate`, `circles`, `diagnose` or `report`.
         scheduler: address of a Dask scheduler; empty for none.
-        false_alarms: probability that like machines show any unlike value.
-        apart: sessions without serial number are different machines; else machines of one name are one.
+        false_alarms: probability of any unlike value if all machines are alike.
+        apart: sessions without serial number are different machines; else equal names mean one machine.
         anew: ignore kept results.
 
     Raises:

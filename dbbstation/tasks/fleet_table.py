@@ -27,7 +27,7 @@ _YES_OR_NO = frozenset({"unlike"})
 
 
 def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *, force: bool = False) -> None:
-    """Write every value of a fleet in one row.
+    """Write each value of a fleet as one row.
 
     Raises:
         OutputError: another extension; the file exists without `force`; pyarrow is missing.

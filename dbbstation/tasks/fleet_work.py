@@ -229,7 +229,7 @@ COMPARED = ("G", "X", "Y", "R")
 
 
 def _of_circles(runs: Sequence[RunFigures]) -> tuple[FleetValue, ...]:
-    """Return means of figures over repeats; u keeps the part that repeats share."""
+    """Return means of figures, and of their standard uncertainties, over repeats."""
     grouped: dict[tuple[str, str, str, str], list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
         for figure in run.figures:

@@ -57,7 +57,7 @@ def histories_in(
 
     Raises:
         InputError: no usable session; an unknown test.
-        StoppedError: `stop` returned True; what was read is indexed.
+        StoppedError: `stop` returned True; the index keeps the figures read so far.
     """
     folder = Path(folder)
     counted = Telling(progress, stop).counted(READING)

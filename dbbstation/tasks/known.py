@@ -25,7 +25,7 @@ def known_sources(
 
     Raises:
         InputError: every fault of every file and entry point.
-        ModelError: the machine lacks data of a source.
+        ModelError: the machine lacks data that a source needs.
     """
     nominal = None if machine is None else read_machine(Path(machine))
     every = every_source([Path(file) for file in source_files])

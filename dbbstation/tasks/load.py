@@ -40,7 +40,7 @@ class Recorded:
     """Accepted runs of one or more sessions of one machine.
 
     Attributes:
-        machine: nominal, equal in all sessions but for its name (the first's).
+        machine: nominal machine, equal in all sessions; it has the first session's name.
     """
 
     machine: Machine
@@ -72,7 +72,7 @@ def load(
         tests: names; empty for all.
         exclude: names of tests.
         progress: called with each stage.
-        stop: asked after each run.
+        stop: called after each run.
         say: called with notes.
 
     Raises:
@@ -119,11 +119,11 @@ def load_sessions(
     """Read sessions, cut accepted runs to circles and attach commands.
 
     Args:
-        paths: folders or session files, or what was read of them.
+        paths: folders or session files, or their content.
         only: tests; empty for all.
 
     Raises:
-        InputError: every fault of every file and trace; a session twice; different machines; no accepted run; an unknown test.
+        InputError: faults of files and traces; a repeated session; different machines; no accepted run; unknown tests.
     """
     sessions = _unique_names([opened(path) for path in paths])
     warnings = _check_one_machine(sessions)

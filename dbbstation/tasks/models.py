@@ -48,7 +48,7 @@ def read_model(path: str | PathLike[str], *, source_files: Sequence[str | PathLi
     """Read a model of `calibrate` or `diagnose`.
 
     Args:
-        path: of the file.
+        path: file.
         source_files: own error sources that it names; they are executed.
 
     Raises:
@@ -63,7 +63,7 @@ def write_model(
     """Write a model, completely or not at all.
 
     Args:
-        path: of the file.
+        path: file.
         model: a model, or the result of `calibrate` or `diagnose`.
         provenance: None: not stated.
         force: overwrite an existing file.

@@ -58,7 +58,7 @@ def inverse_of(
     """Return the model to compensate with; the header names its file and sessions by hash.
 
     Args:
-        unexplained: with errors of unknown cause.
+        unexplained: also compensate errors of unknown cause.
 
     Raises:
         InputError: every fault with its place.

@@ -65,7 +65,7 @@ def session_figures(folder: Path) -> SessionFigures:
 
 
 def run_figures(circles: Sequence[MeasuredCircle]) -> tuple[RunFigures, ...]:
-    """Return the comparable figures of circles, without runs that show no circle."""
+    """Return the comparable figures of all runs that show a circle."""
     shown = [one for one in circles if one.analysis is not None]
     return tuple(map(_figures, shown, tolerated_circles(shown)))
 

@@ -83,7 +83,7 @@ RESULT = "result"
 def stated_variables(
     given: str | Mapping[str, Meaning | str | None] | Sequence[str],
 ) -> dict[str, Meaning | None] | None:
-    """Return variables of an option, `q1=deg,temperature,torque=N m:result`, of a mapping or of names; None to guess.
+    """Return variables from an option (`q1=deg,temperature,torque=N m:result`), a mapping or names; None to guess.
 
     Raises:
         ArgumentError: an unknown unit or kind.
@@ -112,7 +112,7 @@ def stated_variables(
 
 
 def stated_uncertainties(given: str | Mapping[str, float]) -> dict[str, float]:
-    """Return standard uncertainties of an option, `mass=0.2,stiffness=300`, or of a mapping.
+    """Return standard uncertainties from an option (`mass=0.2,stiffness=300`) or a mapping.
 
     Raises:
         ArgumentError: one that is no positive number.
@@ -171,7 +171,7 @@ def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table
     """Read other rows with the columns of a table; they need no measured values.
 
     Raises:
-        InputError: a column that is not there, or no row with all values.
+        InputError: a column is missing, or no row has all values.
     """
     clock = like.clock.name if like.clock is not None else None
     derivatives = {name: f"{DERIVATIVE}{name}" for name in like.derivatives}
@@ -248,7 +248,7 @@ def _greatest(files: Sequence[TableFile], name: str) -> float:
 def load_sources(
     files: Sequence[Path], columns: Container[str], where: str = "the table"
 ) -> tuple[list[TableSource], dict[str, str]]:
-    """Return own physics whose columns exist, and by name the missing columns of the others.
+    """Return user physics whose columns exist, and the missing columns of other user physics by name.
 
     Raises:
         InputError: faults of the files.
@@ -368,7 +368,7 @@ class _Reader:
         return False
 
     def _refuse_constant(self, measured: Floats, simulated: Floats) -> None:
-        """Refuse a measured constant, and values that differ by one number: what rounding adds to it is no noise."""
+        """Refuse a constant measured value, or a constant difference; rounding is no noise."""
         apart, what = measured - simulated, f"`{self._asked.measured}`"
         if np.ptp(measured) > 0.0:
             rounding = 8.0 * np.spacing(max(float(np.abs(measured).max()), float(np.abs(simulated).max())))
@@ -470,7 +470,7 @@ class _Reader:
         return kept
 
     def _is_the_difference(self, variable: Variable, kept: Mapping[str, Floats]) -> bool:
-        """Return whether a column is computed from the measured value, and not from the simulated value alone, such as a speed for friction."""
+        """Return whether measured and simulated values together give a column, and simulated values alone do not."""
         asked = self._asked
         both = np.column_stack([np.ones(len(variable.values)), kept[asked.simulated], kept[asked.measured]])
         alone, beside = (float(np.sum(np.square(left_by(columns, variable.values)))) for columns in (both[:, :2], both))

@@ -52,10 +52,10 @@ def says_no_reading(cell: str) -> bool:
 def samples_of(
     table: ForeignTable, rows: Integers, mapping: MappingFile, faults: list[Problem]
 ) -> tuple[Integers, tuple[str, ...]]:
-    """Return a run's rows with readings, and notes on the others.
+    """Return a run's rows with readings, and notes on rows without.
 
     Args:
-        faults: grows by unreadable cells with line and column.
+        faults: gets unreadable cells with line and column.
     """
     whole = np.ones(len(rows), dtype=bool)
     words: Counter[str] = Counter()

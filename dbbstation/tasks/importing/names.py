@@ -26,7 +26,7 @@ class RunName:
 
     Attributes:
         test: empty if not named.
-        repeat: None: the next.
+        repeat: number; None: the next.
     """
 
     test: str = ""

@@ -51,7 +51,7 @@ def unlike_a_bar(
     Args:
         means: `length` or `deviation`.
         zero_mm: length at deviation 0.
-        feed_in_mm: spanned too; None for a turn alone.
+        feed_in_mm: feed-in that the readings include; None for a turn alone.
     """
     least_mm = LEAST_RANGE_MM if feed_in_mm is None else max(LEAST_RANGE_MM, 0.5 * feed_in_mm)
 
@@ -120,7 +120,7 @@ def check_units(
     """Refuse numbers that contradict their unit if another unit fits.
 
     Raises:
-        UnusableTravelError: with the fitting units.
+        UnusableTravelError: names the fitting units.
     """
     means = LENGTH if LENGTH in values else DEVIATION
     named = {one: name for one in (means, ANGLE, TIME) if (name := mapping.column(one)) is not None}

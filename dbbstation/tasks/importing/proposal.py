@@ -173,7 +173,7 @@ def proposed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Propos
     """Return probable meanings by name, each once; unknown columns are ignored.
 
     Args:
-        units: below the names, by name.
+        units: texts below the names, by name.
     """
     found: dict[str, Proposed] = {}
     for name in names:

@@ -77,7 +77,7 @@ class Reader:
 
     Args:
         trusted: doubtful properties to accept: `unit`.
-        left_out: grows by skipped runs with reasons.
+        left_out: gets skipped runs with reasons.
     """
 
     mapping: MappingFile

@@ -61,10 +61,10 @@ def machine_angles(angle_deg: Floats, said: AngleSchema, circle: Circle) -> Floa
     """Return machine angles from +X towards +Y, shape (n,) [deg].
 
     Args:
-        said: its zero and sense.
+        said: zero and sense of the file's angles.
 
     Raises:
-        UnusableTravelError: they turn against the run's direction.
+        UnusableTravelError: the angles turn against the run's direction.
     """
     sense = circle.direction.sign if said.grows == "travel" else Direction(said.grows).sign
     zero = circle.start_deg if said.zero_deg is None else said.zero_deg
@@ -94,7 +94,7 @@ def check_span(theta_deg: Floats, stated_deg: float | None, circle: Circle) -> t
     """Return notes on a confirmed range that differs from the plan's.
 
     Args:
-        stated_deg: confirmed; None if not.
+        stated_deg: confirmed range; None if not confirmed.
 
     Raises:
         UnusableTravelError: an unconfirmed span other than the plan's.
@@ -115,10 +115,10 @@ def travel(t_s: Floats | None, theta_deg: Floats | None, circle: Circle, trace: 
     """Return a run's times and angles.
 
     Args:
-        trace: without angles: `whole` or `turn`.
+        trace: extent of a trace without angles: `whole` or `turn`.
 
     Raises:
-        UnusableTravelError: both are missing, times do not rise, or a turn would take longer.
+        UnusableTravelError: both are missing, times do not rise, or they are too short for a turn.
     """
     if t_s is None:
         if theta_deg is None:

@@ -1,4 +1,4 @@
-"""The command line: parse, call, print. A command is loaded when called."""
+"""The command line. A command is loaded when called."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Asked:
         """Refuse missing options.
 
         Raises:
-            click.UsageError: names them.
+            click.UsageError: names the missing options.
         """
         needed = {
             "--plan": self.plan,

@@ -41,7 +41,7 @@ class Asker:
         )
 
     def give(self, option: str, why: str) -> None:
-        """Note that an option is required which no answer can replace; `check` then refuses, even on a terminal."""
+        """Note a required option that no answer can replace; `check` then refuses, even on a terminal."""
         self._missing.append(f"{option} ({why})")
 
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Finite(click.FloatRange):
-    """A finite number, with a range as of `click.FloatRange`.
+    """A finite number, with a range as in `click.FloatRange`.
 
     Without this check, click accepts `nan` in every range, and `inf` in open ones.
     """
@@ -68,11 +68,11 @@ class CommandOutput:
     """A file written from a command's result.
 
     Attributes:
-        field: of the result, which gets the file's name; empty: as the option.
+        field: result's field for the file's name; empty: named as the option.
         write: takes result, path and `force`; by default saves the main product.
-        table: has a provenance file beside it.
+        table: gets a separate provenance file.
         refused: reason not to write the result, raised at the end.
-        only_with: parameter of the task that it needs.
+        only_with: task parameter that must be given too.
     """
 
     name: str
@@ -89,7 +89,7 @@ class CommandOutput:
 
     @property
     def option(self) -> click.Parameter:
-        """Return the click option of this parameter."""
+        """Return the click option of this output."""
         of = o.OUTPUTS[self.name]
         kind = "folder" if self.folder else "file"
         said = Option(of, kind=kind, metavar=self.metavar, parse=self.check, required=self.required)
@@ -118,7 +118,7 @@ def command(
     """Make a command from a task.
 
     Args:
-        show: prints the result; its parameters with an `Option` are options too, others are the task's.
+        show: prints the result; its parameters with an `Option` become options, its others come from the task.
         remarks: printed on standard error, also beside JSON.
     """
     task: Declared = function.declared  # type: ignore[attr-defined]
@@ -179,13 +179,13 @@ class Answer:
 def made(
     name: str = "", group: click.Group | None = None, kind: type[click.Command] = click.Command
 ) -> Callable[[Callable[..., Any]], click.Command]:
-    """Make a command from a function. Its options are parameters with an `Option`, and such fields of a dataclass.
+    """Make a command from a function. Parameters, and a dataclass's fields, with an `Option` become options.
 
     A command that returns an `Answer` also has `--json`.
 
     Args:
-        name: empty: the function's.
-        group: gets the command.
+        name: command's; empty: the function's.
+        group: to which the command is added.
     """
 
     def give(function: Callable[..., Any]) -> click.Command:

@@ -29,13 +29,13 @@ MOST_NAMES = 6
 
 
 def first_names(names: Sequence[str]) -> str:
-    """Return a list of names as text: the first ones, and the count of the others."""
+    """Return the first names of a list as text, with the count of omitted names."""
     shown = ", ".join(names[:MOST_NAMES])
     return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
 
 
 def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
-    """Return the count of held-out parts with gain as text; empty if other parts cannot confirm it."""
+    """Return the number of held-out parts with gain as text; empty if other parts cannot confirm the effect."""
     return gains.counted if gains is not None and acts == "always" else ""
 
 
@@ -56,7 +56,7 @@ def print_finding(finding: CauseFinding | PortTerm, most_values: int, about: str
 
 
 def print_left(result: MismatchResult | SimulatorResult, beyond: str = "") -> None:
-    """Print the residual beyond noise, effects that are not there, and the next measurements."""
+    """Print the residual beyond noise, absent effects, and the next measurements."""
     left, text = result.left, "Nothing is left beyond noise."
     if not left.is_noise:
         where = f", {left.worst.where}" if left.worst.where else ""

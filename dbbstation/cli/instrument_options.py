@@ -55,10 +55,10 @@ class ProtocolOptions:
         """Return the instrument's protocol.
 
         Args:
-            bar_length_mm: zero of a relative one, if no other is given.
+            bar_length_mm: length at a relative instrument's zero, if no other is given.
 
         Raises:
-            InstrumentError: unknown instrument or profile, or a relative one without zero.
+            InstrumentError: unknown instrument or profile, or a relative instrument without zero.
             InputError: faults of the protocol file.
         """
         from dbbstation.instrument.library import load_instrument, with_zero
@@ -79,7 +79,7 @@ class LineOptions(ProtocolOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class OpenLine(LineOptions):
-    """The same options, none required."""
+    """The options of `LineOptions`, none required."""
 
     instrument: Annotated[str, INSTRUMENT] = ""
     port: Annotated[str, PORT] = ""

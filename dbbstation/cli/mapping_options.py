@@ -1,4 +1,4 @@
-"""Options for the meaning of foreign columns, and their mapping."""
+"""Options for the meaning of other programs' columns, and the resulting mapping."""
 
 from __future__ import annotations
 
@@ -122,11 +122,11 @@ class MappingOptions(AsWritten):
 def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, ForeignTable]:
     """Read all files with the number format of the mapping, else of options, else of settings.
 
-    Otherwise, and for this program's own tables, the format is detected.
+    If none states it, and for this program's own tables, the format is detected.
 
     Raises:
         InputError: every fault of every file.
-        click.UsageError: an option says what the mapping says too.
+        click.UsageError: an option repeats a fact of the mapping.
     """
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.mapping import read_mapping
@@ -168,7 +168,7 @@ def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | Non
 
 
 def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, asker: Asker) -> Callable[[], MappingFile]:
-    """Return a function that gives the mapping after all answers: from its file, or names, options and answers."""
+    """Return a function that gives the mapping after all answers: from its file, or from names, options and answers."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION, IGNORED, LENGTH, UNITS, read_mapping
     from dbbstation.tasks.importing.proposal import EXPORTED, Proposed
 

@@ -1,4 +1,4 @@
-"""Dialogue of `measure`: lines, a progress bar, keys."""
+"""Dialogue of `measure`."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Talk:
             echo(f"  {of_wrong if doubtful else _ASKED[event.state]}", err=True)
 
     def end(self) -> None:
-        """Remove the progress bar after any end."""
+        """Remove the progress bar, however the sequence ended."""
         self._bar.end()
 
 

@@ -43,7 +43,7 @@ def on_screen(asked: Asked, *, virtual: bool) -> int:
 
     Raises:
         click.UsageError: options that do not go together.
-        StationError: every fault of the files and of the instrument's name.
+        StationError: as `Asked.job`.
     """
     noted = asked.noted
     stated = any(given is not None for given in (asked.plan, asked.machine, asked.out))
@@ -217,7 +217,7 @@ def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
     """End the sequence between samples on SIGTERM or SIGHUP, and restore the terminal.
 
     Yields:
-        Whether that happened.
+        Whether a signal came.
     """
     stopped = threading.Event()
 

@@ -54,7 +54,7 @@ def provenance() -> Provenance:
 
 
 def command_of(context: click.Context) -> str:
-    """Return a command as typed, with options of settings, files without folders."""
+    """Return a command as typed, plus options from settings; files lose their folders."""
     words = context.command_path.split()
     for parameter in context.command.params:
         given = context.get_parameter_source(parameter.name or "") in _GIVEN

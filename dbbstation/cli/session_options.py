@@ -51,7 +51,7 @@ class SessionOptions:
         """Return the facts that a session notes.
 
         Raises:
-            click.UsageError: a blank name, length without uncertainty, something of the bar without either, or a file and options of the bar.
+            click.UsageError: a blank name, incomplete facts of the bar, or options in addition to its file.
             InputError: faults of the bar's file.
         """
         from dbbstation.files.formats.session import SessionDetails
@@ -79,7 +79,7 @@ class SessionOptions:
 
     @property
     def of_bar(self) -> list[str]:
-        """Return the options of the bar that were given in addition to its file, without settings."""
+        """Return options of the bar given in addition to its file, without settings."""
         given = {
             "bar_serial_number": self.bar_serial_number,
             "bar_length_mm": self.bar_length_mm,
@@ -115,7 +115,7 @@ class SessionOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingOptions(SessionOptions):
-    """The same options, and those for recording runs."""
+    """`SessionOptions` and options for recording runs."""
 
     spy: Spy = None
     largest_loss_percent: Annotated[
@@ -182,7 +182,7 @@ class RecordingOptions(SessionOptions):
         return read_model(self.model, every_source(self.source_files))
 
     def require_bar(self, job: Job) -> None:
-        """Refuse a new session whose plan needs the bar's length without fresh calibration or reason.
+        """Refuse a new session whose plan needs the bar's length, unless a fresh calibration or a reason is given.
 
         Raises:
             InputError: what is wrong with the bar, and what to do.

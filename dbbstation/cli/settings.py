@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class _WithShipped(click.Command):
-    """A command that takes a session, with one subcommand."""
+    """A command that takes a session or its one subcommand."""
 
     def make_context(
         self,
@@ -29,7 +29,7 @@ class _WithShipped(click.Command):
         parent: click.Context | None = None,
         **extra: Any,  # noqa: ANN401
     ) -> click.Context:
-        """Return the context of the subcommand if the line names it."""
+        """Return the subcommand's context if the user names it."""
         if args[:1] == [SHIPPED]:
             from dbbstation.cli.shipped import shipped
 

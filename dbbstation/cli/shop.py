@@ -52,7 +52,7 @@ class ShopOption(click.Option):
         self._factor = factor
 
     def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> tuple[Any, ParameterSource]:
-        """Return the value by command line, settings or program, and note which."""
+        """Return the value from command line, settings or program, and note its origin."""
         value, source = super().consume_value(ctx, opts)
         if ctx.resilient_parsing:
             return value, source

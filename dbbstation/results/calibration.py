@@ -22,7 +22,7 @@ class CalibrationResult(Framed, CalibrationFigures):
 
     Attributes:
         centre_u_um: greatest u of the tool's X, Y and Z at the circles' centres; None if unknown.
-        method: of ball positions: `jig`, `conv-a` or `conv-b`.
+        method: knowledge of ball positions: `jig`, `conv-a` or `conv-b`.
         model: for prediction or compensation; `save` writes it.
     """
 

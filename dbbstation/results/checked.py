@@ -24,8 +24,8 @@ class CheckedFile:
     """A file, or a session.
 
     Attributes:
-        runs: judged ones of a session; else absent.
-        virtual: whether a session is of a virtual machine; absent where nothing says it.
+        runs: judged runs of a session; else absent.
+        virtual: whether a session's machine is virtual; absent if unknown.
     """
 
     file: str

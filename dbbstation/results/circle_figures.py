@@ -32,7 +32,7 @@ class PlaneVector:
 
 @dataclass(frozen=True)
 class ShownFeed:
-    """The feed as computed from the recording, with standard uncertainty [mm/min]."""
+    """The feed computed from the recording, with standard uncertainty [mm/min]."""
 
     value: float
     u: float

@@ -35,12 +35,12 @@ class ComparedCause:
 
     Attributes:
         verdict: see docs/verdicts.md.
-        persists: a single event that other tests confirm.
-        recurs: a wave over time, predicted by other tests.
+        persists: whether other tests confirm a single event.
+        recurs: whether other tests predict a wave over time.
         gains: in tests that did not choose it; None if not tested.
         equivalent: causes indistinguishable by these sessions; `class` in JSON.
-        taken_up: share that a new calibration absorbs; None if absent.
-        opposite: share that changes sign with direction; None if absent.
+        taken_up: the effect's share that a new calibration absorbs; None if absent.
+        opposite: the effect's share that changes sign with direction; None if absent.
         spans: ranges of variables with a large effect.
     """
 
@@ -68,7 +68,7 @@ class ComparedCause:
 
 @dataclass(frozen=True)
 class CauseNotAsked:
-    """A cause that needs missing data."""
+    """A cause that was not tested, because it needs missing data."""
 
     name: str
     form: str
@@ -92,8 +92,8 @@ class ComparisonResult(Framed):
 
     Attributes:
         held_out_worse: whether predictions get worse; None if not tested.
-        held_out_rms_um: errors of tests that took no part.
-        unlike: other differences; `notes` in JSON.
+        held_out_rms_um: errors of held-out tests.
+        unlike: other differences of the sessions; `notes` in JSON.
         levels: existence, variables and cause of a difference.
     """
 
@@ -125,12 +125,12 @@ class ComparisonResult(Framed):
     levels: Levels
 
     def sentences(self) -> list[str]:
-        """Return the answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words."""
         values = {one.name: one.parameters for one in self.causes if isinstance(one, ComparedCause)}
         return level_sentences(self.levels, "µm", values, rows="tests", what="The sessions")
 
     def headline(self) -> str:
-        """Return whether they differ."""
+        """Return whether the sessions differ."""
         return self.text
 
     def rows(self) -> list[dict[str, object]]:

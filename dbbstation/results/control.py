@@ -36,7 +36,7 @@ class ParametersResult:
     """Output of `control parameters`.
 
     Attributes:
-        low: of the volume, X, Y, Z [mm], A, B, C [deg].
+        low: lower end of the volume, X, Y, Z [mm], A, B, C [deg].
         home_mm: added to HOME and HOME_OFFSET of each joint.
     """
 

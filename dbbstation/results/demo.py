@@ -32,7 +32,7 @@ class DemoResult:
     """Files and figures of a demonstration.
 
     Attributes:
-        calibration: JSON of `calibrate` as objects, as are `diagnosis` and `report`.
+        calibration: JSON of `calibrate` as objects; `diagnosis` and `report` likewise.
         printed: JSON of `diagnose` and `report`, by command.
     """
 
@@ -49,7 +49,7 @@ class ControlWay:
     """Measured figures of a machine with one kind of correction.
 
     Attributes:
-        runs: of `evaluate`, as objects.
+        runs: those of `evaluate --json`, as objects.
         seconds: LinuxCNC's time for all programs [s].
     """
 

@@ -79,7 +79,7 @@ class DiagnosisFigures(Framed):
     limits: tuple[LimitReached, ...] = ()
 
     def sentences(self) -> list[str]:
-        """Return the answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words."""
         values = {one.name: one.parameters for one in self.sources}
         what = "Measured circles and the kinematic model"
         return level_sentences(self.levels, "µm", values, rows="tests", what=what)

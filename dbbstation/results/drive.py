@@ -25,7 +25,7 @@ class DriveResult(Framed, DriveFindings):
     figure: Annotated[str | None, Absent] = None
 
     def sentences(self) -> list[str]:
-        """Return the answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words."""
         values = {one.name: one.parameters for one in self.sources}
         what = "Measured force and the law with mass and friction"
         return level_sentences(self.levels, "N", values, rows="samples", what=what)

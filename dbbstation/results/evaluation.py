@@ -16,11 +16,11 @@ class EvaluationResult(Framed):
     """Residuals of a model, and the uncompensated machine's accuracy.
 
     Attributes:
-        nominal_rms_um: measured less nominally predicted length over all runs.
-        flatness_um: of X, Y = ±190 mm without compensation, by the model.
+        nominal_rms_um: rms of measured less nominally predicted lengths over all runs.
+        flatness_um: flatness of X, Y = ±190 mm without compensation, by the model.
         parallelism_um: of a move along X without compensation.
-        held_out: no session made the model, by name and hash.
-        plane_without: sources left out, since they need more than a pose.
+        held_out: whether the model's fit used none of the sessions, by name and hash.
+        plane_without: sources left out of both, since they need more than a pose.
         tolerances: None if another result holds them.
     """
 

@@ -34,7 +34,7 @@ class FleetValue:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """Return what it is, within a session."""
+        """Return the words that identify the value within a session."""
         return self.kind, self.quantity, self.of
 
 
@@ -66,7 +66,7 @@ class FleetSession:
     """One session of a fleet.
 
     Attributes:
-        session: folder relative to the named one.
+        session: its folder, relative to the folder in the command.
         machine: serial number or name, with the session if it counts apart; empty if unreadable.
         started: first run, ISO 8601; None if not noted.
         state: `done`, `up-to-date` or `failed`.
@@ -90,11 +90,11 @@ class Scored:
     """One quantity of one machine, compared with like machines.
 
     Attributes:
-        usual: middle of the sisters; None if unknown.
-        scatter: their standard deviation beyond uncertainties; None if unknown.
+        usual: mean of like machines; None if unknown.
+        scatter: standard deviation of like machines beyond uncertainties; None if unknown.
         score: standard normal for a like machine; None if unknown.
         smallest_seen: departure that would count as unlike; None if unknown.
-        unlike: at the stated rate of false alarms.
+        unlike: whether it differs, at the stated rate of false alarms.
     """
 
     machine: str
@@ -133,7 +133,7 @@ class FleetComparison:
     """Machines compared with one another.
 
     Attributes:
-        false_alarms: probability that like machines have any marked value.
+        false_alarms: probability of any marked value if all machines are alike.
     """
 
     false_alarms: float

@@ -32,7 +32,7 @@ class Framed:
     """A result that can be shown.
 
     Attributes:
-        drawing: draws by file extension, a panel, or with None a figure; None without figure.
+        drawing: draws a file by its extension, a panel, or (given None) a figure; None: no figure.
     """
 
     drawing: Annotated[Callable[[object], Any] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)
@@ -70,12 +70,12 @@ class Framed:
         """Draw the result.
 
         Args:
-            ax: Axes for one panel; None: a figure of all.
-            panel: its name, or the begin of it; None: the first.
+            ax: Axes for one panel; None: a figure of all panels.
+            panel: name, or its begin; None: the first.
 
         Raises:
-            OutputError: it has no figure.
-            ArgumentError: it has no such panel.
+            OutputError: the result has no figure.
+            ArgumentError: the figure has no such panel.
         """
         if ax is None and panel is None:
             return self._drawing(None)

@@ -77,7 +77,7 @@ class HistoryValue:
     """One quantity in one session, with the values of the chart; None if not watched.
 
     Attributes:
-        z: standard normal without change.
+        z: standardised value, standard normal if nothing changed.
     """
 
     session: str
@@ -100,8 +100,8 @@ class QuantityHistory:
         why_not: None if watched.
         limit: greatest size by the shop's tolerances.
         conformity: of the last value [ISO 14253-1].
-        exceeded_sessions: beyond it by more than U.
-        scatter_in_u: of the last stretch, in stated uncertainties.
+        exceeded_sessions: number of sessions beyond the limit by more than U.
+        scatter_in_u: scatter since the last change, in stated uncertainties.
         decided_by: `stated-uncertainty` or `control-chart`, or None.
     """
 
@@ -140,7 +140,7 @@ class MachineHistoryResult:
     """Sessions and quantities of one machine.
 
     Attributes:
-        false_alarms_expected: over this history without change.
+        false_alarms_expected: number over this history if nothing changes.
     """
 
     machine: str

@@ -29,7 +29,7 @@ class VariableResult:
     """A column that the difference may follow.
 
     Attributes:
-        period: in that unit, or None.
+        period: period of the column in its unit, or None.
     """
 
     name: str
@@ -132,7 +132,7 @@ class MismatchResult(Framed):
     table: Annotated[Mapping[str, tuple[str | float, ...]], AsItIs, Kept]
 
     def sentences(self) -> list[str]:
-        """Return the answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words."""
         found = level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
         if self.offset is not None and self.offset.significant:
             found[0] += f" On average they differ by {self.offset.in_words}, which is fitted and not counted here."

@@ -53,7 +53,7 @@ def _sizes(one: ToleratedCircle) -> dict[str, MeasuredSize]:
 
 
 def means_of(measured: Sequence[MeasuredFigures]) -> Iterable[MeasuredMean]:
-    """Yield mean and largest of each figure, also over the circles that were measured both times."""
+    """Yield mean and largest of each figure, over circles measured both times, if any, else over all."""
     both = [one for one in measured if one.before is not None]
     taken = both or measured
     for figure in OF_A_MODEL:

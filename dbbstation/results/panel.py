@@ -22,7 +22,7 @@ class OnePanel:
         """Draw the panel and return its Axes.
 
         Raises:
-            ArgumentError: there is none of that name.
+            ArgumentError: no panel has that name.
         """
         fits = [name for name in panels if self.name is None or f"{name} ".startswith(f"{self.name} ")]
         if not fits:

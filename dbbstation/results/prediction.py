@@ -26,11 +26,11 @@ class PredictionResult(Framed):
     """Actual poses for commanded ones.
 
     Attributes:
-        common_shift_um: mean of X, Y and Z, which a zero set on the part removes.
-        error_about_mean_rms_um: without the common shift.
-        greatest_uncertainty_um: standard, of a position; None if unknown.
-        greatest_uncertainty_by_axis_um: the same of X, Y and Z each.
-        uncertainty_mm: standard, of X, Y and Z, shape (n, 3); NaN if unknown.
+        common_shift_um: mean error of X, Y and Z, which a zero set on the part removes.
+        error_about_mean_rms_um: rms error without the common shift.
+        greatest_uncertainty_um: greatest standard uncertainty of a position; None if unknown.
+        greatest_uncertainty_by_axis_um: the same for each of X, Y and Z.
+        uncertainty_mm: standard uncertainty of X, Y and Z, shape (n, 3); NaN if unknown.
     """
 
     file: Annotated[str | None, Absent] = None

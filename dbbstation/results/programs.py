@@ -72,7 +72,7 @@ class ProgramsResult(Framed):
 
     @property
     def greatest_correction_um(self) -> float | None:
-        """Return the greatest correction of all; None in nominal programs."""
+        """Return the greatest correction of all programs; None in nominal programs."""
         return max((one.greatest_correction_um for one in self.programs if one.greatest_correction_um), default=None)
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - the text states it

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Ranked:
-    """Causes beside the circles.
+    """Causes shown with the circles.
 
     Attributes:
         why_not: reason if there are no causes; else empty.
         said: the model's diagnosis in two sentences; may be empty.
-        picture: its errors in held-out tests as lines of a picture; may be empty.
+        picture: the diagnosis's errors in held-out tests as lines of a picture; may be empty.
     """
 
     session: str = ""

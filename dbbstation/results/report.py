@@ -70,8 +70,8 @@ class ReportResult(Framed):
 
     Attributes:
         circles: figures after ISO 230-4.
-        causes_of: session of these circles, or None.
-        model: its residual; None without a model.
+        causes_of: session whose circles the causes affect, or None.
+        model: residual of the model; None without a model.
     """
 
     report: str

@@ -35,7 +35,7 @@ class ListedSession:
     """The runs of a session.
 
     Attributes:
-        virtual: whether of a virtual machine; None where nothing says it.
+        virtual: whether the machine is virtual; None if unknown.
     """
 
     session: str
@@ -60,7 +60,7 @@ class SessionEvents:
     """The event log of a session.
 
     Attributes:
-        anchor: last link; None without a log.
+        anchor: last link of the hash chain; None without a log.
     """
 
     session: str

@@ -150,7 +150,7 @@ class SimulatorResult(Framed):
     rows_csv: Annotated[str, Kept] = ""
 
     def sentences(self) -> list[str]:
-        """Return the answer in three levels, in words; a notebook shows it above the table."""
+        """Return the answer in three levels, in words."""
         return level_sentences(self.levels, self.unit, {one.name: one.values for one in self.findings})
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - code states none

@@ -26,9 +26,9 @@ class SourceDescription:
     """A cause's description.
 
     Attributes:
-        role: always fitted, candidate of the diagnosis, or keeper of a curve.
-        varies_with: variable of real machines' departure from its formula; None: the pose.
-        form_uncertainty: share of that departure, one standard deviation.
+        role: always fitted, candidate of the diagnosis, or holder of a curve.
+        varies_with: variable that real machines' departure from the formula follows; None: the pose.
+        form_uncertainty: size of that departure as a share of the effect, one standard deviation.
     """
 
     name: str

@@ -149,7 +149,7 @@ def filter_words(tolerance: Tolerance) -> str | None:
 
 
 def held_tolerance(tolerance: Tolerance, circles: Iterable[ToleratedCircle], coverage_factor: float) -> HeldTolerance:
-    """Compare a tolerance with its circles; arguments as of `conformity`."""
+    """Compare a tolerance with its circles; arguments as in `conformity`."""
     sized = [
         (one, size)
         for one in circles

@@ -46,7 +46,7 @@ def visibility_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a resul
 
 
 def fit_sentences(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or objects
-    """Yield whether a calibration can be trusted."""
+    """Yield sentences on whether a calibration can be trusted."""
     check, misfit = found.plan_check, found.misfit
     if not check.enough:
         yield (
@@ -76,7 +76,7 @@ def residual_lines(found: Any) -> Iterator[str]:  # noqa: ANN401 - a result, or 
 
 
 def use_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return whether the model of a calibration can be used, judged by its own figures."""
+    """Return a sentence on whether a calibration's model can be used, judged by its own figures."""
     check = found.plan_check
     if found.misfit.missing_physics:
         return (
@@ -98,7 +98,7 @@ def use_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
 
 
 def evaluated_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return whether an evaluated model can be used, judged by its residual in recordings that did not enter its fit."""
+    """Return a sentence on whether a model can be used, by its residual in recordings outside its fit."""
     left, nominal = f"{found.residual_rms_um:.2f} µm rms", f"the nominal machine {found.nominal_rms_um:.2f}"
     if not found.held_out:
         return f"Use this model: cannot tell. It was made of these circles, of which it leaves {left}; evaluate another session"
@@ -108,7 +108,7 @@ def evaluated_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or object
 
 
 def mismatch_sentence(found: Any) -> str:  # noqa: ANN401 - a result, or objects
-    """Return whether recordings contradict the kinematic model."""
+    """Return a sentence on whether recordings contradict the kinematic model."""
     if not found.mismatch:
         return f"The kinematic model explains these circles (probability {found.probability:.2g})."
     return (

@@ -1,4 +1,4 @@
-"""Figure of a calibration: circles before and after, residuals, centres, balls, leverages."""
+"""Figure of a calibration."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def circles_figure(plotted: Plotted, wanted: Wanted = FigureFormat.SVG) -> Any: 
     """Return a reproducible sheet; one panel is a run's deviation over the angle.
 
     Raises:
-        StationError: no run shows a circle; a comparison has only one session with circles.
+        StationError: as `Plotted.panels`.
     """
     with in_style(), warnings.catch_warnings():
         # A name in letters that no font here has becomes boxes in PNG and PDF; in SVG the viewer's fonts have them.
@@ -144,7 +144,7 @@ def draw_circles(plotted: Plotted) -> Figure:
     """Draw a sheet.
 
     Raises:
-        StationError: no run shows a circle; a comparison has only one session with circles.
+        StationError: as `Plotted.panels`.
     """
     panels = plotted.panels()
     match plotted.kind:

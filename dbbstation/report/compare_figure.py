@@ -1,4 +1,4 @@
-"""Figure of a comparison: the differences of sessions and runs."""
+"""Figure of a comparison of sessions."""
 
 from __future__ import annotations
 

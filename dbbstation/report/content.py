@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
-    """Return source, parameter, value, U and unit; a dash for unknown U."""
+    """Return rows of source, parameter, value, U and unit; a dash for unknown U."""
     u = identified.uncertainties
     rows = []
     for fitted in identified.model.sources:
@@ -76,7 +76,7 @@ def quality_of_fit(identified: IdentifiedModel) -> str:
 
 
 def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
-    """Return sentences on what a model's recordings could not determine, or determined least."""
+    """Return sentences on what a model's recordings could not determine, or determined worst."""
     seen = as_objects(identified.report.get("observability"))
     return (
         *map(unseen_sentence, identified.directions_lost),

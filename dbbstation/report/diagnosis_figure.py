@@ -1,4 +1,4 @@
-"""Figure of a diagnosis: misfit, found errors, gains."""
+"""Figure of a diagnosis."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[Resi
     """Draw maps by direction with one scale, white at zero.
 
     Args:
-        noise_um: of a reading, the least range of the scale.
+        noise_um: noise of a reading; the scale's range is at least this.
     """
     reach = max(noise_um, *(one.reach_um for one in maps))
     drawn = [(title, one, direction) for title, one in zip(titles, maps, strict=True) for direction in Direction]

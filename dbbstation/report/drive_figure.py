@@ -1,4 +1,4 @@
-"""Figure of one drive: measured and modelled force, residual, friction."""
+"""Figure of one drive."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ Wanted = FigureFormat | Stamped | OnePanel | None
 
 
 def figure_format(wanted: object) -> Wanted:
-    """Return a format, from an extension such as `.svg` too."""
+    """Return a format; an extension such as `.svg` is converted."""
     return wanted if wanted is None or isinstance(wanted, Stamped | OnePanel) else FigureFormat(str(wanted))
 
 

@@ -27,7 +27,7 @@ class MachineRow:
     """A machine on the page.
 
     Attributes:
-        session: shown one: the last done, or a failed one.
+        session: the last finished session, or a failed one.
     """
 
     name: str

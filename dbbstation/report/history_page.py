@@ -1,4 +1,4 @@
-"""Histories as one HTML file: changes, table, drawings."""
+"""Histories as one HTML file."""
 
 from __future__ import annotations
 

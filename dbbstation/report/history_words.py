@@ -33,7 +33,7 @@ def rounded(value: float | None, u: float | None, coverage_factor: float) -> str
 
 
 def verdict_in_words(one: QuantityHistory) -> str:
-    """Return a quantity's verdict in words, with the reason if there is none."""
+    """Return a quantity's verdict in words, or the reason for its absence."""
     if one.why_not:
         return one.why_not if one.limit is not None or one.figure == "C" else f"{one.verdict}: {one.why_not}"
     lacking = one.sessions_lacking

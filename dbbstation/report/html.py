@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
     """Return a reproducible report without external references.
 
-    Its one script enlarges polar traces; its policy forbids others.
+    Its one script enlarges polar traces; its policy forbids other scripts.
     """
     script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()
     digest = b64encode(sha256(script.encode()).digest()).decode()

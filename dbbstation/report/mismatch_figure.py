@@ -1,4 +1,4 @@
-"""Figure of a table's mismatch over its leading variables."""
+"""Figure of a table's mismatch."""
 
 from __future__ import annotations
 

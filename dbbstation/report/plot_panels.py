@@ -1,4 +1,4 @@
-"""Panels of a test: polar, over the angle, undulations."""
+"""Panels of a test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Polar traces for SVG: points, rings, labels."""
+"""Polar traces for SVG."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int =
 
 
 def step_of(most_um: float) -> float:
-    """Return the largest of 1, 2, 5, 10, ... up to a deviation [µm], at least 0.001."""
+    """Return the largest step of ..., 1, 2, 5, 10, ... µm within a deviation, at least 0.001 µm."""
     most_um = max(most_um, 1e-3)
     power = 10.0 ** np.floor(np.log10(most_um))
     return float(max(step for step in _STEPS if step * power <= most_um * (1.0 + 1e-9)) * power)

@@ -74,8 +74,8 @@ class ReportContent:
     """Content of the report's template.
 
     Attributes:
-        number: of the report, by program, command and inputs.
-        issued: day on which it was written, where it was written.
+        number: of the report, computed from program, command and inputs.
+        issued: local date on which it was written.
         before_name: earlier session; may be empty.
         files: name and SHA-256 of every underlying file.
         logo: address of the picture with its content; may be empty.

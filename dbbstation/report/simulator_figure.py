@@ -1,4 +1,4 @@
-"""Figure of a simulator: residual before and after, and held-out errors."""
+"""Figure of a simulator."""
 
 from __future__ import annotations
 

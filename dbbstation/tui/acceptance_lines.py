@@ -30,7 +30,7 @@ _DIGEST = 8
 
 
 def test_line(one: ToleranceOfTest) -> Content:
-    """Return the row of a test and figure: worst circle before and now, limit, U, and verdict."""
+    """Return the row of one figure of a test: its worst circle before and now, limit, U, and verdict."""
     row = _ROW.format(
         test=cut(one.test, _WIDE),
         figure=texts.FIGURE_NAMES[one.quantity],

@@ -80,7 +80,7 @@ class Sequence(Protocol):
 
     @property
     def crash(self) -> Exception | None:
-        """Return the programming error that ended it."""
+        """Return the programming error that ended the sequence."""
 
     def start(self) -> None:
         """Open instrument and session and run."""
@@ -95,7 +95,7 @@ class Sequence(Protocol):
         """Wait until an ended sequence has released the session."""
 
     def close(self) -> None:
-        """End the sequence and wait for that."""
+        """End the sequence and wait for its end."""
 
 
 class StationApp(App[None]):
@@ -104,7 +104,7 @@ class StationApp(App[None]):
     Args:
         shown: None: the start screen chooses the measurement.
         front: finds sessions and opens jobs; None: only `runner`.
-        operated: the operator's one job; None: everything.
+        operated: the operator's one job; None: no restriction.
     """
 
     TITLE = "dbbstation"

@@ -1,4 +1,4 @@
-"""The bar on its calibrator: live reading, stated facts and calibration."""
+"""The bar on its calibrator."""
 
 from __future__ import annotations
 

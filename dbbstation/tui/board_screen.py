@@ -48,7 +48,7 @@ class Desk(Protocol):
 
 
 class BoardScreen(ExplainedScreen):
-    """A screen with panels and other parts that show the board."""
+    """A screen whose parts show the board."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The screen at the machine: live reading, trace, set-up, figures and all runs."""
+"""The screen at the machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The last messages in single lines, the newest last; and all messages in full, the newest first."""
+"""The last messages in single lines, newest last; all messages in full, newest first."""
 
 from __future__ import annotations
 

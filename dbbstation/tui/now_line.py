@@ -44,7 +44,7 @@ class NowLine(Panel):
 
 
 class OperatorNowLine(NowLine):
-    """The same for an operator."""
+    """`NowLine` for an operator."""
 
     def __init__(self, trouble: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)

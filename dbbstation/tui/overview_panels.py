@@ -1,4 +1,4 @@
-"""Parts of the overview: remaining runs, plate, tests, chosen run."""
+"""Parts of the overview."""
 
 from __future__ import annotations
 

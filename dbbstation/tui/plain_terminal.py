@@ -23,7 +23,7 @@ _ALIKE = dict(zip("µ°±…·→›▸▶–×●○✓√⇧│┃║▊▎▌
 
 
 def plain_driver(usual: type[Driver]) -> type[Driver]:
-    """Return a driver that writes only this terminal's characters, one for one, so that the layout is kept."""
+    """Return a driver that writes only this terminal's characters and keeps the layout."""
     encoding = getattr(sys.__stderr__, "encoding", None) or ""  # where Textual draws
     every = "utf" not in encoding.lower() or _foreign_locale()
     if not every and os.environ.get("TERM") != "linux":

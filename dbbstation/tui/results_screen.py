@@ -1,4 +1,4 @@
-"""Tasks after a session (calibrate, diagnose, programs, report) and their results."""
+"""Tasks after a session and their results."""
 
 from __future__ import annotations
 

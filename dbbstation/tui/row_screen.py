@@ -55,7 +55,7 @@ class RowScreen(ExplainedScreen):
 
     @property
     def stands(self) -> bool:
-        """Return whether the screen's parts exist: background work may end before or after."""
+        """Return whether the screen's parts exist; background work may end earlier or later."""
         return bool(self.query("#row-text"))
 
     @property

@@ -31,7 +31,7 @@ def now(board: Board) -> str:
 
 
 def now_for_operator(board: Board, trouble: str = "") -> str:
-    """Return the same for an operator, who can only repeat a faulty run. For trouble it is the shop's text."""
+    """Return the sentence for an operator, who can only repeat a faulty run. In trouble it is the shop's text."""
     completed = board.completed
     if board.fault is not None:
         return f"{_fault(board, commands=False)} {trouble}".rstrip()

@@ -50,7 +50,7 @@ class CircleAnalysis:
         steps: at reversals of X and Y on the turn.
         closure: end less beginning of the turn; None for too few samples.
         passes: None without overlap.
-        feed_mm_min: from the overlap, with standard uncertainty; or None.
+        feed_mm_min: feed computed from the overlap, with standard uncertainty; or None.
         residual_um: from the least-squares circle, unfiltered, in time order, shape (n,).
     """
 
@@ -122,7 +122,7 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
     """Return a circle with another filter of G, F and H.
 
     Raises:
-        TraceError: the points do not determine a circle.
+        TraceError: as `analyse`.
     """
     if chosen is one.chosen:
         return one
@@ -186,7 +186,7 @@ def analyse_pair(one: CircleAnalysis, other: CircleAnalysis) -> PairAnalysis:
     """Compute the figures of both directions of a circle.
 
     Raises:
-        TraceError: the points do not determine a circle.
+        TraceError: as `analyse`.
     """
     together = both(one.path, other.path)
     theta_deg = np.sort(one.path.theta_deg)

@@ -1,4 +1,4 @@
-"""Uncertainty budgets of circle figures, with unstated causes."""
+"""Uncertainty budgets of circle figures; they name causes of unstated size."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SetUpKnowledge:
 
     Attributes:
         u_temperature_um: standard uncertainty of corrected growth.
-        u_ball_um: standard uncertainty in X and Y, coordinate and mounting.
+        u_ball_um: standard uncertainty of a ball's X and Y, due to coordinate and mounting.
         u_form_um: standard uncertainty of a reading due to the form of both balls.
     """
 
@@ -66,7 +66,7 @@ class Budget:
 
     Attributes:
         u_um: standard uncertainty; None if a contribution is unknown.
-        value_um: without noise's contribution.
+        value_um: figure without the contribution of noise.
     """
 
     u_um: float | None

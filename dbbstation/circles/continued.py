@@ -79,9 +79,9 @@ def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> Conti
     """Extrapolate one turn's noise to lines 0, 1, ... low.
 
     Args:
-        below: power at these lines, with form, shape (low + 1,) [µm²].
-        above: noise power above, shape (h,) [µm²].
-        freedom: of each line.
+        below: power at these lines, form included, shape (low + 1,) [µm²].
+        above: noise power at the lines above, shape (h,) [µm²].
+        freedom: degrees of freedom of each line.
     """
     low = len(below) - 1
     found = continuations(freedom * above, low, freedom, _processes)
@@ -108,7 +108,7 @@ def _processes(harmonic: Floats) -> Floats:
 
 
 def _through_a_turn(line: int) -> Floats:
-    """Return the power of laws f^-a, cut off at `SLOWEST`, at a line, shape (exponents,)."""
+    """Return the power of laws f^-a at one line, cut off below `SLOWEST`, shape (exponents,)."""
     # The result is the mean over positive and negative frequencies, each filtered by sinc², the window of one turn
     # [Priestley, Spectral Analysis and Time Series, 1981, sec. 6.2].
     cycles = np.concatenate([np.geomspace(SLOWEST, 0.3, 2001)[:-1], np.linspace(0.3, 30.0, 30001)])

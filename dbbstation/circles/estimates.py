@@ -66,10 +66,10 @@ def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
 
 
 def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
-    """Return the white noise per sample that affects a figure equally [µm].
+    """Return the white noise per sample with the actual noise's effect on a figure [µm].
 
     Args:
-        one: with too few samples only rounding counts.
+        one: circle; with too few samples only its rounding counts.
         undulations: 0 for radius and mean, 1 for a centre.
     """
     if not one.noise.known:
@@ -100,7 +100,7 @@ OF_A_CIRCLE = 2
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Form at samples, shape (n,) [µm], with noise drawn about the own and the common least-squares circle."""
+    """Form at samples, shape (n,) [µm], with noise drawn about its own and about the common least-squares circle."""
 
     form_um: Floats
     alone: DrawnPath

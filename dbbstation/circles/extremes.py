@@ -71,7 +71,7 @@ class DrawnPath:
         highest_um: greatest noise, shape (draws, s).
         lowest_um: least noise, shape (draws, s).
         theta_deg: of the sectors, ascending, shape (s,).
-        least: relative noise if the whole spectrum were as low as its end.
+        least: share of the noise if the whole spectrum were as low as its end.
         order: samples by angle, shape (m,).
         starts: each sector's first index in `order`, shape (s,).
     """
@@ -103,7 +103,7 @@ def drawn_paths(
         apart: form, already filtered, and noise of the deviations in time order.
         theta_deg: angles of its samples, shape (n,) [deg].
         passed: amplitude that the filter passes, by line, shape (n // 2 + 1,).
-        taken: numbers of lines, from 0, that the fit removes.
+        taken: for each path, how many of the lowest lines the fit removes.
     """
     count = len(theta_deg)
     order, starts, middle_deg = _sectors(theta_deg, passed)

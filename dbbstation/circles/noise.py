@@ -29,7 +29,7 @@ class CircleNoise:
     """Noise of one circle.
 
     Attributes:
-        slow_um: white noise per sample that affects slow figures equally; NaN for too few samples.
+        slow_um: white noise per sample with the actual noise's effect on slow figures; NaN for too few samples.
         resolution_um: reading step; zero if undetectable.
         freedom: degrees of freedom of `slow_um`.
     """

@@ -108,7 +108,7 @@ def both(one: CirclePath, other: CirclePath) -> CirclePath:
     """Join two paths about their common least-squares circle, with equal weights.
 
     Raises:
-        TraceError: the points do not determine a circle.
+        TraceError: as `path_of`.
     """
     theta_deg = np.linspace(0.0, FULL_TURN_DEG, max(len(one.theta_deg), len(other.theta_deg)), endpoint=False)
     even = [np.interp(theta_deg, path.theta_deg, path.about_ball_mm, period=FULL_TURN_DEG) for path in (one, other)]

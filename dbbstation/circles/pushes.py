@@ -40,7 +40,8 @@ class Pushes:
     """Distribution of innovations with unit variance.
 
     Attributes:
-        weights: probabilities of the normal, Student's t by `TAILS`, and `EXPONENTS`, shape (1 + t + e,).
+        weights: probabilities of the normal, of Student's t by `TAILS`, and of exp(-|x|^b) by `EXPONENTS`,
+            shape (1 + t + e,).
         excess: kurtosis less 3 if significantly negative; else zero.
     """
 

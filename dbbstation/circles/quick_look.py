@@ -84,7 +84,7 @@ class QuickLook:
 
     Attributes:
         left_rms_um: residual rms, with noise.
-        sigma_um: white noise per sample that affects signatures equally.
+        sigma_um: white noise per sample with the actual noise's effect on signatures.
     """
 
     symptoms: tuple[Symptom, ...]
@@ -120,7 +120,7 @@ def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     mismatch; the result then lacks both.
 
     Args:
-        turns: one or two of opposite sense.
+        turns: one turn, or two of opposite sense.
 
     Returns:
         None if a turn has too few samples.

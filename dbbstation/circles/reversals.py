@@ -56,7 +56,7 @@ class Harmonic:
 
 
 def step_at(raw: RawCircle, deviation_um: Floats, theta_deg: float, sigma_um: float) -> ReversalStep | None:
-    """Return the step at a place from lines on both sides; None for few samples or at the turn's ends, whose step is the closure.
+    """Return the step at a place from fits on both sides; None for few samples or at the turn's ends (`closure_of`).
 
     Args:
         deviation_um: shape (n,).

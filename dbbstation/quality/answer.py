@@ -64,7 +64,7 @@ def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> 
 
 
 def _doubted(finding: Finding) -> bool:
-    """Return whether an undecided fault is likelier than not, with prior probability 0.001."""
+    """Return whether an undecided fault is likelier than not, given a prior probability of 0.001."""
     return (finding.value or 0.0) > LOG_ODDS_LIMIT and finding.verdict is FindingVerdict.CANNOT_TELL
 
 

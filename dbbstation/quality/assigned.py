@@ -52,7 +52,7 @@ class FormerSitting:
     read_um: Mapping[tuple[str, str], Floats]
 
     def moved(self, circles: Sequence[Planned]) -> tuple[Planned, ...]:
-        """Return circles with this session's readings as expectation."""
+        """Return circles that expect the previous session's readings."""
         found = []
         for one in circles:
             more = along_travel(one.circle) * (self.read_um[key_of(one)] - expected_um(one))
@@ -75,7 +75,7 @@ class Assigned:
 
     Args:
         effects: on the plan's circles, relative to the same reference.
-        runs: the last is the new one, whose circle `finding` decides.
+        runs: the last one is new; `finding` decides its circle.
     """
 
     def __init__(self, effects: PlanEffects, runs: Sequence[Seen], reference: FormerSitting | None = None) -> None:
@@ -141,7 +141,7 @@ class Assigned:
         return known
 
     def _follow(self, base: _Changes, known: dict[_Changes, float]) -> None:
-        """Add assignments near a given one, the most probable first, until the rest cannot affect a decision."""
+        """Add assignments near a given one, the most probable first, until further ones cannot affect a decision."""
         beside = NearAssignments(
             self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels)
         )
@@ -203,7 +203,7 @@ class Assigned:
         return list(found.values())
 
     def _as_test(self, group: Sequence[int], test: str) -> list[int]:
-        """Return the labels of a group's runs as runs of a test; empty if the plan lacks such a circle."""
+        """Return labels for a group's runs, taken as runs of a test; empty if the plan lacks such a circle."""
         labels = [self.effects.labels.get((test, self.runs[k].run.circle.direction)) for k in group]
         known = [label for label in labels if label is not None]
         return known if len(known) == len(labels) else []
@@ -261,7 +261,7 @@ class Assigned:
         return Readings.of(self.read)
 
     def since(self, one: Seen) -> Finding | None:
-        """Return the finding on changes since the previous session; None without one."""
+        """Return the finding on changes since the previous session; None without such a session."""
         if self.reference is None:
             return None
         label = self.planned[self.runs.index(one)]
@@ -296,7 +296,7 @@ class _Asked:
         self._most = np.where(given, -np.inf, mean_of(self._logs) - self._fewest)
 
     def wanted(self, limits: _Limits) -> Floats:
-        """Return upper bounds of assignments that can affect a decision, shape (m, j); minus infinity for the others."""
+        """Return upper bounds of assignments that can affect a decision, shape (m, j); minus infinity elsewhere."""
         limit = np.full(self._most.shape, limits.any_run)
         for run, own in limits.suspects.items():
             limit = np.where(self._changed(run), limit, np.minimum(limit, own))
@@ -305,7 +305,7 @@ class _Asked:
         return np.where(self._most >= self._limit, self._most, -np.inf)
 
     def scored(self, places: tuple[Integers, ...]) -> Iterator[tuple[list[int], list[int], float]]:
-        """Yield runs, labels and log densities of assignments that reach their limit; each place is scored once."""
+        """Yield runs, labels and log densities of assignments that reach their limit, each once."""
         runs, instead = self._runs[places[0]], self._instead[places]
         self._most[places] = -np.inf
         limit = self._limit[places] + self._fewest[places]
@@ -325,8 +325,8 @@ class _Limits:
     """Log posterior densities below which an assignment cannot affect a decision.
 
     Attributes:
-        any_run: below, it is neither extended nor makes a run suspect.
-        suspects: by suspect run, for assignments that keep its planned circle; the odds compare them.
+        any_run: below it, an assignment is not extended and makes no run suspect.
+        suspects: by suspect run, for assignments that keep the run's planned circle, which the odds compare.
         new: for assignments that change the new run's planned circle.
     """
 
@@ -349,7 +349,7 @@ class _Limits:
 
 
 def _odds(known: Mapping[_Changes, float], run: int) -> tuple[float, float]:
-    """Return the greatest log posterior densities with another circle of a run, and with its planned one."""
+    """Return the greatest log posterior density with another circle for a run, and with its planned circle."""
     others = max((score for changes, score in known.items() if run in dict(changes)), default=-np.inf)
     return others, max(score for changes, score in known.items() if run not in dict(changes))
 

@@ -38,8 +38,8 @@ class Readings:
     Attributes:
         circles: index of the circle whose effects a run has, shape (n, l + 3).
         off: readings minus expectation, shape (n, l + 3, 7) [µm].
-        scatter: covariance of their own part, shape (n, l + 3, 7, 7) [µm²].
-        alone: half its log determinant, shape (n, l + 3).
+        scatter: covariance of the runs' own part, shape (n, l + 3, 7, 7) [µm²].
+        alone: half the log determinant of `scatter`, shape (n, l + 3).
     """
 
     circles: Integers
@@ -109,12 +109,12 @@ class NearAssignments:
         return found
 
     def changed(self, runs: Integers, instead: Integers, most: Floats, limit: Floats) -> Floats:
-        """Return log densities with other labels of some runs, shape (q,); below a limit, upper bounds.
+        """Return log densities with other labels of some runs, shape (q,); values below a limit are upper bounds.
 
         Args:
             runs: shape (q, k).
             instead: their other labels, shape (q, k).
-            most: as of `most`, shape (s, q).
+            most: bounds from `most`, shape (s, q).
             limit: shape (q,).
         """
         sizes = np.flatnonzero((most >= limit - NEGLIGIBLE).any(axis=1))
@@ -130,7 +130,7 @@ class NearAssignments:
         return mean_of(found)
 
     def _without(self, runs: Integers, sizes: Integers) -> tuple[NDArray[np.floating], NDArray[np.floating], Floats]:
-        """Return the root of covariance of removed runs, their whitened residuals, and log densities of the other readings."""
+        """Return the removed runs' covariance root and whitened residuals, and log densities of the other readings."""
         circles, off, scatter = self._of(runs, self.labels[runs])
         root = np.linalg.cholesky(scatter - self._between(circles, circles, sizes))
         pull = np.linalg.solve(root, (off - self._means(circles, sizes))[..., None])
@@ -183,7 +183,7 @@ class NearAssignments:
         return self._readings.circles[runs, labels], off, scatter
 
     def _between(self, one: Integers, other: Integers, sizes: Integers) -> Floats:
-        """Return covariances of circles, shape (s, m, 7 k, 7 k) [µm²]."""
+        """Return covariances between circles, shape (s, m, 7 k, 7 k) [µm²]."""
         found = self._covariance[sizes][:, one[:, :, None], :, other[:, None, :], :]
         wide = COEFFICIENTS * one.shape[1]
         return found.transpose(3, 0, 1, 4, 2, 5).reshape(len(sizes), len(one), wide, wide)

@@ -100,7 +100,7 @@ def repeat(one: Seen, others: Others) -> Finding:
 def _beside(
     name: Name, one: Seen, other: Seen, usual: Sequence[tuple[float, float]], sigmas: Sequence[float]
 ) -> Finding:
-    """Compare a run with another of its test."""
+    """Compare a run with another run of its test."""
     # With few other pairs, plan, machine file and usual causes give the limit. With enough pairs, their scatter gives
     # it, and raises it if it exceeds stated uncertainties. The limit is at least the limit by noise and plan, and at
     # most the largest stated allowance.

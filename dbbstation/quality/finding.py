@@ -51,7 +51,7 @@ class Finding:
     """Result of one check of a run.
 
     Attributes:
-        limit: for sound runs, or None.
+        limit: limit for sound runs, or None.
         text: description with place and remedy, or the reason for no decision.
     """
 

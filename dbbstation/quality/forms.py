@@ -66,7 +66,7 @@ def form_of(one: Seen, off_um: Floats) -> RunForm:
 
 
 def own_um2(one: Seen) -> Floats:
-    """Return each coefficient's variance by the run's own part, shape (7,) [µm²]."""
+    """Return each coefficient's variance due to the run's own part, shape (7,) [µm²]."""
     own = np.full(COEFFICIENTS, max(0.5 * unseen_um2(one, one), LEAST_UM2))
     if one.run.expected is not None and not one.run.expected.place_known:
         own[[FIRST_COSINE, FIRST_SINE]] += ANYWHERE_UM**2
@@ -89,7 +89,7 @@ class Forms:
         self._log_determinants: list[Floats] = []
 
     def hold(self, runs: Sequence[Held]) -> None:
-        """Compute these runs; stored runs after the first difference are discarded."""
+        """Compute these runs; discard stored runs from the first difference on."""
         pairs = enumerate(zip(runs, self._held, strict=False))
         alike = next((k for k, (one, (held, _)) in pairs if _key(one) != _key(held)), min(len(runs), len(self._held)))
         del self._held[alike:], self._log_determinants[alike:]
@@ -128,7 +128,7 @@ class Forms:
             self._whitening, self._white = wider, white
 
     def part(self, runs: Sequence[Held], beside: Held | None = None) -> FormsBesides:
-        """Return the distribution of some stored runs, which predicts the others.
+        """Return the distribution of some stored runs, which predicts the remaining ones.
 
         Args:
             beside: run to be compared, whose overlap also counts for the drift.
@@ -197,7 +197,7 @@ class FormsBesides:
         return own_um[:, None] * (off - drift @ self._amount), own_um[:, None] * covariance * own_um
 
     def length_without(self, size: int, rows: Integers) -> float:
-        """Return the distance of some rows from their prediction by the others, in standard deviations."""
+        """Return the distance of some rows from their prediction by all other rows, in standard deviations."""
         basis, drift = self._basis[size], self._drift[size]
         seen = self._whitening[size][:, rows]
         seen = seen - basis @ (basis.T @ seen)

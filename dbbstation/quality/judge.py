@@ -65,7 +65,7 @@ class _Pair:
     other: Seen
 
     def has(self, run: Seen) -> bool:
-        """Return whether a run is one of them."""
+        """Return whether a run belongs to the pair."""
         return run is self.one or run is self.other
 
     @cached_property

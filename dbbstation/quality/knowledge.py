@@ -71,7 +71,7 @@ class Expected:
         form_um: as `Seen.coefficients_um`, shape (7,).
         effects_um: changes of `form_um` by one standard deviation of each cause, shape (7, p) each; keys are the cause
             and the label of runs with shared values.
-        local_um: the same for causes that depend on path or time, on `local_columns`, shape (59, p) each.
+        local_um: the same for causes that depend on path or time, in `local_columns`, shape (59, p) each.
         moving: keys of causes that act only in motion.
         again_um2: covariance of the difference of two remounted runs, shape (7, 7).
         place_um: stated standard deviation of the ball's place, CMM and holder, per axis.

@@ -41,7 +41,7 @@ def quantile(freedom: float, share: float = SHARE) -> float:
     """Return the size, in standard deviations, that a sound value exceeds with probability `share` [Student].
 
     Args:
-        freedom: of the standard deviation; infinite if known.
+        freedom: degrees of freedom of the standard deviation; infinite if known.
         share: probability of both sides together.
     """
     freedom = min(max(freedom, 1.0), _MANY)
@@ -49,7 +49,7 @@ def quantile(freedom: float, share: float = SHARE) -> float:
 
 
 def largest_of(count: float, freedom: float) -> float:
-    """Return the same quantile for the largest of `count` independent values."""
+    """Return `quantile` for the largest of `count` independent values."""
     return quantile(freedom, SHARE / max(count, 1.0))
 
 
@@ -59,7 +59,7 @@ def length_quantile(dimensions: int) -> float:
 
 
 def scaled_length_quantile(freedom: float) -> float:
-    """Return the root of the chi-square quantile for any real freedom."""
+    """Return the root of the chi-square quantile for real degrees of freedom."""
     return float(np.sqrt(chdtri(max(freedom, 1.0), SHARE)))
 
 

@@ -69,7 +69,7 @@ class PlanEffects:
 
     @cached_property
     def of_session(self) -> Floats:
-        """Return effects of other causes common to all circles: bar, tool ball, plate."""
+        """Return effects of causes common to all circles, without the machine's: bar, tool ball, plate."""
         return self._effects({key for key in self._of_all if key[1]})
 
     @cached_property

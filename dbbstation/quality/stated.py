@@ -1,4 +1,4 @@
-"""Compute the allowed difference of two runs from plan, machine file and session, or usual errors.
+"""Compute the allowed difference of two runs from errors that the files state, or from usual errors.
 
 Shared causes cancel if their effects are equal; the difference has the covariance of [GUM 5.2.2].
 """

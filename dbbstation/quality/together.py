@@ -74,7 +74,7 @@ def expected_beside(both: Together | None) -> Expected | None:
     """Return the first run's expected circle given the others.
 
     Args:
-        both: None returns None.
+        both: from `together`; None gives None.
     """
     # Sizes of machine errors are weighted by likelihood. Each other test is compared with its prediction by the
     # remaining tests [R. and W., section 5.4.2]. If they disagree, causes may be missing, so the covariance grows.
@@ -138,12 +138,12 @@ def read_um(one: Seen) -> Floats:
 
 
 def read_along_um(circle: Circle, form_um: Floats) -> Floats:
-    """Return the same coefficients for a form on a circle, shape (7,) [µm]."""
+    """Return coefficients as `read_um` does, for a form on a circle, shape (7,) [µm]."""
     return along_travel(circle) * form_um + _length_um(circle)
 
 
 def expected_um(one: Run | Planned) -> Floats:
-    """Return the same coefficients as expected without other runs."""
+    """Return coefficients as `read_um` does, as expected without other runs."""
     form = np.zeros(COEFFICIENTS) if one.expected is None else one.expected.form_um
     return along_travel(one.circle) * form + _length_um(one.circle)
 

@@ -75,7 +75,7 @@ def chart_for(false_alarms: float, reference: float = REFERENCE, single_share: f
 
     Args:
         false_alarms: per value, both directions: one over the average run length.
-        single_share: share of them from single values; 0 for a plain CUSUM.
+        single_share: share of false alarms from single values; 0 for a plain CUSUM.
     """
     single = -float(ndtri(false_alarms * single_share / 2.0)) if single_share else np.inf
 

@@ -60,10 +60,10 @@ class Standardised:
     """Values compared with earlier values; arrays have shape (n,).
 
     Attributes:
-        z: standard normal without change; NaN for the first.
-        by_stated: whether z rests on stated uncertainties alone.
-        u_level: standard uncertainty of the level by the stated ones alone; NaN for the first.
-        scatter: standard deviation of the values before, in stated uncertainties; NaN if not known.
+        z: standard normal if nothing changed; NaN for the first.
+        by_stated: whether z uses stated uncertainties alone.
+        u_level: standard uncertainty of the level, from stated uncertainties alone; NaN for the first.
+        scatter: standard deviation of earlier values, in stated uncertainties; NaN if not known.
     """
 
     z: Floats
@@ -81,7 +81,7 @@ def standardised(
     before: ScatterRatio = ScatterRatio(),
     hindsight: ScatterRatio | None = None,
 ) -> Standardised:
-    """Compare each value with those before it, weighted by stated uncertainties.
+    """Compare each value with earlier values, weighted by stated uncertainties.
 
     The scatter is a common factor of all uncertainties. It may be below one, since sessions share parts such as the bar's
     length.

@@ -53,7 +53,7 @@ class Subject:
         test: empty for a parameter.
         direction: `ccw` or `cw`; empty for a parameter.
         of: circle in words, or a parameter's error source.
-        beside: other sources of a parameter's models, since only like models compare.
+        beside: other sources of a parameter's models; only models with equal sources are comparable.
     """
 
     figure: str

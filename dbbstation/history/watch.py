@@ -54,11 +54,11 @@ class Watched:
     """One quantity over all sessions; arrays have shape (n,).
 
     Attributes:
-        z: standard normal without change; NaN if not compared.
-        high: CUSUM upwards, NaN as above.
-        level: mean between two changes, computed from all its values.
+        z: standard normal if nothing changed; NaN if not compared.
+        high: CUSUM upwards; NaN if not compared.
+        level: mean of all values between two changes.
         u_level: standard uncertainty by stated uncertainties or scatter, whichever is larger.
-        scatter: of the last stretch, in stated uncertainties; NaN for too few values.
+        scatter: scatter since the last change, in stated uncertainties; NaN for too few values.
         lacking: values needed before the next comparison: one just after a change, else zero.
         by_stated: whether the last comparison uses stated uncertainties alone.
     """

@@ -1,4 +1,4 @@
-"""The control address of the virtual machine, on the loopback address only. It reads a line of text and answers with a line of JSON."""
+"""The virtual machine's control address, loopback only. The server reads lines of text and answers in lines of JSON."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class CellCommands:
         """Execute one line and return the answer.
 
         Raises:
-            StationError: it cannot be obeyed.
+            StationError: the line cannot be obeyed.
         """
         match line.split():
             case ["mount", test]:

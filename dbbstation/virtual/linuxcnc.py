@@ -5,8 +5,8 @@ as root. If root calls this module, it starts LinuxCNC as the user who called su
 
 LinuxCNC runs in real time. `faster` speeds up its clock: the servo period and all times are divided by it, speeds are
 multiplied by it, and accelerations by its square. So the distance and its change in a servo cycle stay the same.
-Samples have the times of the usual clock. The interpreter does not use this clock. If the interpreter falls behind the
-planner, the program runs again with a slower clock.
+Samples have the times of the usual clock. The interpreter does not use this clock. If it falls behind the planner, the
+program runs again with a slower clock.
 """
 
 from __future__ import annotations
@@ -103,8 +103,8 @@ class ControlKins:
     Attributes:
         home_mm: joints at which the machine is switched on, shape (6,).
         offset_mm: added to HOME and HOME_OFFSET, shape (6,).
-        home_z_mm: height at which it is switched on, upright over the middle: where LinuxCNC begins to look for its pose.
-        hal: lines behind the module's loading.
+        home_z_mm: height at switch-on, upright over the middle; LinuxCNC's search for the pose starts there.
+        hal: lines after the one that loads the module.
         tables: text of each joint's `COMP_FILE`; empty for none.
     """
 
@@ -192,7 +192,7 @@ def started(
     """Run LinuxCNC to its end in a new folder; yield the folder and the printed text.
 
     Args:
-        driver: takes the place of `drive.py`.
+        driver: replaces `drive.py`.
     """
     with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, alone():
         folder = Path(made)

@@ -99,11 +99,11 @@ class VirtualMachine:
 
         Args:
             path: None: the plan's circle.
-            begin_s: in the session, for errors over time.
+            begin_s: time in the session, for errors over time.
 
         Raises:
             MachineError: an unplanned run, or an impossible pose.
-            ModelError: a source of the truth needs missing data, such as temperatures.
+            ModelError: as `check`.
         """
         planned = self._planned(test, direction)
         if self.mounted is None or self.mounted.name != planned.ball.name:

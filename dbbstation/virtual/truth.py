@@ -36,7 +36,7 @@ class MeasurementErrors:
 
     Args:
         seed: a ball's errors do not depend on other mountings.
-        set_up_mm: under the spindle by hand, standard deviation per axis.
+        set_up_mm: standard deviation per axis of a set-up by hand under the spindle.
     """
 
     seed: int

@@ -56,7 +56,7 @@ class SetUp:
 
 
 def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s: float = 0.0) -> tuple[Fitted, Fitted]:
-    """Return the effect of a set-up on the bar, by fixed and moving ball.
+    """Return the effects of the fixed and the moving ball on the bar.
 
     Raises:
         KinematicsError: the machine cannot take the pose.

@@ -83,16 +83,16 @@ class _Outgoing:
 
 
 class VirtualInstrument:
-    """A virtual length instrument; a `with` block switches it.
+    """A virtual length instrument; a `with` block switches it on and off.
 
     Args:
         length_mm_at: length at a virtual time [s]; None: no bar, reported as a fault. Called in the instrument's
             thread.
         clock: virtual time; None: real time.
         rate_hz: of a stream, instead of the protocol's.
-        baud: of the device. A pseudo-terminal knows the other side's rate and garbles bytes if different.
-        pty: pseudo-terminal, else loopback socket.
-        seed: of latching moments within bounds.
+        baud: rate of the device. A pseudo-terminal knows the other side's rate and garbles bytes if different.
+        pty: use a pseudo-terminal, else a loopback socket.
+        seed: of random latching times within bounds.
     """
 
     def __init__(

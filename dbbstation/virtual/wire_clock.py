@@ -82,11 +82,11 @@ class WaitingClock(ScaledClock):
         self._stands = threading.Condition()
 
     def __call__(self) -> float:
-        """Return the time of the stopped clock [s]."""
+        """Return the machine time [s]."""
         return self._now_s
 
     def real_s(self, virtual_s: float) -> float:
-        """Return 0 while time can pass."""
+        """Return 0 during a run, else the virtual duration [s]."""
         return virtual_s if self._now_s >= self._until_s else 0.0
 
     def stand_s(self) -> float:

@@ -83,7 +83,7 @@ def key_of_simulator(path: Path, file: SimulatorFile) -> str:
 
 
 def files_of_simulator(path: Path, file: SimulatorFile) -> list[Path]:
-    """Return the files that `model.yaml` names, and files beside them with the same ending; for Python also packages."""
+    """Return the files that `model.yaml` names, and their neighbours with the same ending; for Python also packages."""
     words = file.program and whole_command(file.program, path.parent)
     named = [Path(word) for word in words or () if Path(word).is_file()]
     named += [path.parent / one for one in (file.python, file.fmu) if one]

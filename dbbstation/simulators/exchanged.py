@@ -36,7 +36,7 @@ class ExchangedSimulator(Simulator):
     @property
     @abstractmethod
     def said(self) -> str:
-        """Return its name for failures."""
+        """Return its name for error messages."""
 
     @abstractmethod
     def simulate_once(

@@ -49,7 +49,7 @@ class FmuSimulator(ExchangedSimulator):
     """An FMU with outputs at equal steps, interpolated linearly.
 
     Args:
-        variables: FMU names by ours; signals are `port.signal` or `signal`.
+        variables: FMU's names by the program's names; signals are `port.signal` or `signal`.
     """
 
     def __init__(

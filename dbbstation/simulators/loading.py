@@ -122,7 +122,7 @@ def simulator_of(python: Path) -> Simulator:
     """Return the simulator of an executed Python file.
 
     Raises:
-        InputError: it cannot be run, or has no simulator that can be made.
+        InputError: the file cannot be run, or defines no simulator that can be made.
     """
     return _simulator_of(python, content_of(python))
 

@@ -84,7 +84,7 @@ class Runs:
 
         Raises:
             BudgetSpentError: more simulations than allowed.
-            CalibrationError: one failed, returned something invalid, or took too long; with its input.
+            CalibrationError: a simulation failed, returned something invalid, or took too long; names its input.
         """
         fresh = [ask for ask in dict.fromkeys(asks) if ask not in self._known]
         if self._kept is not None and fresh:

@@ -1,4 +1,4 @@
-"""A lock on a file for one process; the system ends it with the process."""
+"""A lock on a file for one process; the system releases it at the process's end."""
 
 from __future__ import annotations
 

@@ -127,11 +127,11 @@ class Job:
     """A measurement: machine, plan and session folder.
 
     Attributes:
-        plan: jig inlined.
-        details: for a new session; an existing one keeps its own.
+        plan: contains its jig.
+        details: facts for a new session; an existing one keeps its own.
         programs: by test and direction; empty: plain nominal circles.
-        time_scale: speed of that time; other than 1 only for a virtual machine.
-        range_mm: lowest and highest length that it reads; None: not known.
+        time_scale: machine time over real time; other than 1 only for a virtual machine.
+        range_mm: lowest and highest length that the instrument reads; None: not known.
         model: source of expected circles; None: the nominal geometry.
     """
 

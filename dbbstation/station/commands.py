@@ -16,7 +16,7 @@ class Start:
 
     Attributes:
         remounted: the holder was touched although the program did not ask for it, so the run gets a new mounting.
-        after_s: earlier readings, by machine time, do not count.
+        after_s: machine time before which readings do not count.
     """
 
     remounted: bool = False
@@ -29,8 +29,8 @@ class Accept:
 
     Attributes:
         reason: reason for accepting a finding; empty: the findings are kept.
-        back: the doubted runs are withdrawn and measured next.
-        alone: an earlier run of the same test and direction is withdrawn.
+        back: withdraw the doubted runs and measure them next.
+        alone: withdraw an earlier run of the same test and direction.
     """
 
     reason: str = ""
@@ -43,7 +43,7 @@ class Repeat:
     """Discard this run and measure it again.
 
     Attributes:
-        reason: empty: the finding, else the operator's wish.
+        reason: empty: the finding, or without one the operator's wish.
     """
 
     reason: str = ""

@@ -34,8 +34,8 @@ class Patience:
     """The station's longest waiting times, in machine time.
 
     Attributes:
-        for_machine_s: for the bar at the feed-in point, and there for the feed-in.
-        turn_factor: in units of the circle's time at its feed.
+        for_machine_s: for the bar to reach the feed-in point, and then for the feed-in.
+        turn_factor: for a turn, in units of the circle's time at its feed.
     """
 
     for_machine_s: float = 600.0

@@ -47,9 +47,9 @@ class Sample:
     """One reading for the sequencer.
 
     Attributes:
-        t_s: machine time; since the first sample while recording, else of the driver's clock.
+        t_s: machine time: while recording, since the first sample; else of the driver's clock.
         status: `ok`, `doubtful`, `overrange` or `fault`.
-        phi_deg: live progress: 0 to 360 on the full turn, negative before, above 360 behind; None off the circle.
+        phi_deg: live progress: 0 to 360 on the full turn, negative before it, above 360 after it; None off the circle.
         t_uncertainty_s: standard uncertainty of `t_s`; None if the instrument sends by itself.
     """
 
@@ -138,7 +138,7 @@ class RunCompleted:
         problem: why it is unusable; empty if usable.
         doubtful: possibly damaged samples, kept but unused.
         to_come: circles of the plan that are still to be measured.
-        counts_beside: accepted run of the same test and direction, counted besides the plan; or None.
+        counts_beside: another accepted run of the same test and direction, which counts too; or None.
     """
 
     run: RunId
@@ -246,7 +246,7 @@ class SessionStopped:
 
     Attributes:
         left_to_do: planned runs without an accepted one.
-        interrupted: kept as far as recorded; None if none.
+        interrupted: run whose recording was cut short and kept; or None.
     """
 
     accepted: int

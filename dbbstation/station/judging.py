@@ -136,7 +136,7 @@ class RunJudge:
         return self._doubted
 
     def _assigned(self, runs: list[Seen]) -> Assigned | None:
-        """Return all runs of the session together; None if the plan's circles are unknown."""
+        """Return the joint decision on all runs; None if the plan's circles are unknown."""
         known = {(one.test, one.circle.direction) for one in self._circles}
         if any((one.run.test, one.run.circle.direction) not in known for one in runs):
             return None

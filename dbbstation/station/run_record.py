@@ -56,9 +56,9 @@ class RunRecord:
     """One run while it is recorded.
 
     Attributes:
-        fed_in_s: feed-in edge since the first sample; None before.
-        lost_on_turn: from feed-in to feed-out, with doubtful ones.
-        held: duration of the standstill on the turn, with noise from earlier runs.
+        fed_in_s: time of the feed-in edge since the first sample; None before it.
+        lost_on_turn: samples lost from feed-in to feed-out, or doubtful.
+        held: detector of a standstill on the turn, with noise from earlier runs.
     """
 
     run: RunId

@@ -72,7 +72,7 @@ class Schedule:
 
     @property
     def accepted(self) -> int:
-        """Return tasks with an accepted recording."""
+        """Return the number of tasks with an accepted recording."""
         return len(self.tasks) - len(self.open)
 
     @property
@@ -87,7 +87,7 @@ class Schedule:
         return sum(task != mine for task in self.open)
 
     def counts_beside(self, run: RunId) -> RunId | None:
-        """Return another accepted run of the same task, which would count beside this one, or None."""
+        """Return another accepted run of the same task, which would also count, or None."""
         if any((task.test, task.direction) == (run.test, run.direction) for task in self.open):
             return None
         mine = [
@@ -102,7 +102,7 @@ class Schedule:
         return self._place_of(run.test, run.direction) + 1
 
     def next(self) -> NextRun | None:
-        """Return the next open task after the last one that was not skipped, or None."""
+        """Return the run of the next open task that was not skipped, or None."""
         task = self._current()
         if task is None:
             return None

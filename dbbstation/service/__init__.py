@@ -1,1 +1,1 @@
-"""Services for a screen: sessions, choices, ports, the running sequence and the evaluation."""
+"""Services for a screen."""

@@ -1,4 +1,4 @@
-"""Tasks on a measured session: calibrate, diagnose, programs, report."""
+"""Tasks on a measured session."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ class After:
     Args:
         model: of an earlier calibration, for comparison until a new one exists; None: none.
         settings: named file of the shop's settings; None: searched for.
-        tolerances: settings with those of an operator's job, which replace the shop's; None: none.
+        tolerances: settings with an operator's tolerances, which replace the shop's; None: none.
 
     Attributes:
         former: session compared by an acceptance, or None.

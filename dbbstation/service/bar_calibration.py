@@ -86,7 +86,7 @@ class BarCalibration:
                 self._thread.start()
 
     def close(self) -> None:
-        """Return the instrument."""
+        """Give the instrument back."""
         self._stop.set()
         self._thread.join()
 

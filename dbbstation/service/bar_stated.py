@@ -29,7 +29,7 @@ _DAYS_PER_YEAR = 365.25
 def fault_of(
     name: str, text: str, reads_mm: float | None = None, stroke_mm: float | None = None, today: date | None = None
 ) -> str:
-    """Return the fault of a typed text, or an empty text."""
+    """Return a typed text's fault, or an empty text."""
     if name == "certified" or (name == "valid_until" and text):
         return _fault_of_day(name, text, today or datetime.now().astimezone().date())
     if name not in _RANGES:

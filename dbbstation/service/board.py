@@ -78,10 +78,10 @@ class Board:
     Attributes:
         lost: samples lost in the latest run.
         doubtful: possibly damaged samples of that run.
-        swept_deg: since the feed-in.
+        swept_deg: angle since the feed-in.
         traces: of the last started test, by direction.
-        last: its circles in the session before, by direction; may be empty.
-        difference: of the directions; None before both are complete.
+        last: that test's circles in the previous session, by direction; may be empty.
+        difference: difference of both directions; None before both are complete.
         running: direction on its circle, or None.
         completed: run awaiting its verdict, or the last one.
         doubted: accepted runs that contradict the others, by name.
@@ -156,7 +156,7 @@ class Board:
 
     @property
     def accepted(self) -> int:
-        """Return planned runs with an accepted recording."""
+        """Return the number of planned runs with an accepted recording."""
         return self.marks.count(Mark.ACCEPTED)
 
     @property

@@ -79,7 +79,7 @@ class Choice:
         machine: nominal; None: not chosen, or the session's own.
         bar_waiver: reason for no bar file; may be empty.
         programs: folder; None: plain nominal circles.
-        ambient_temp_c: now; None: not read. An existing session gets a note.
+        ambient_temp_c: present temperature; None: not read. An existing session gets a note.
     """
 
     folder: Path | None = None

@@ -51,7 +51,7 @@ class BeforeAndNow:
     """This session, and the earlier sessions that an acceptance can compare it with.
 
     Attributes:
-        formers: the last first.
+        formers: earlier sessions, the last first.
     """
 
     now: InForce

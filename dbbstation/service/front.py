@@ -77,7 +77,7 @@ class Front:
 
     Attributes:
         model: for judging circles; None: the nominal machine.
-        given: by command line or settings; overrides the memory.
+        given: choices of command line or settings, which override the memory.
         settings: named file of the shop's settings.
     """
 
@@ -181,7 +181,7 @@ class Front:
         """Write NC programs into a new folder beside the session; return number and folder.
 
         Raises:
-            StationError: what the task says.
+            StationError: an error of the task.
             ValueError: plan or machine is missing.
         """
         plan, machine = choice.plan, choice.machine
@@ -235,10 +235,10 @@ class Front:
         return Stated(**texts, **numbers)  # type: ignore[arg-type] # texts are texts, numbers numbers
 
     def fault_of_stated(self, name: str, text: str, line: Line, reads_mm: float | None) -> str:
-        """Return the fault of a typed text, or an empty text.
+        """Return a typed text's fault, or an empty text.
 
         Args:
-            line: relative instruments do not show the calibrator's length.
+            line: its instrument; a relative one does not show the calibrator's length.
             reads_mm: current reading, or None.
         """
         length = load_instrument(line.instrument, line.profile or None).length
@@ -286,7 +286,7 @@ class Front:
         return Opened(replace(prepared, job=job), runner)
 
     def close(self) -> None:
-        """End the sequence, virtual parts and instrument."""
+        """End sequence, virtual parts and instrument."""
         self._open.close()
         self.release()
 

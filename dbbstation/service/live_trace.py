@@ -166,7 +166,7 @@ class Derived:
 
 
 def difference(ccw: Derived, cw: Derived) -> Derived | None:
-    """Return counter-clockwise minus clockwise at equal angles, or None without common ones."""
+    """Return counter-clockwise minus clockwise at equal angles, or None without common angles."""
     placed = np.isfinite(cw.theta_deg)
     if not placed.any():
         return None

@@ -1,4 +1,4 @@
-"""A driver's patience in real and scaled time."""
+"""A driver's waiting limits in real and scaled time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class DriverPatience(TypedDict):
 
 
 def driver_patience(time_scale: float, *, waits: bool = False) -> DriverPatience:
-    """Return arguments of `Instrument` on a clock `time_scale` times faster than real."""
+    """Return arguments of `Instrument` on a clock `time_scale` times as fast as real time."""
     if waits:
         return {"memory_s": _MEMORY_S, "timeout_s": _WAITING_TIMEOUT_S}
     if time_scale == 1.0:

@@ -16,8 +16,8 @@ class BarAtFeedIn:
     """The bar's position at the feed-in point.
 
     Attributes:
-        long_mm: reading less the feed-in point's.
-        seated: whether the sequence accepts it: beyond the middle of the feed-in by the detector's margin.
+        long_mm: reading less the length at the feed-in point.
+        seated: whether the sequence accepts it: nearer than half the feed-in, less the detector's margin.
         backwards: on the opposite side, as with an inverted gauge.
     """
 

@@ -48,7 +48,7 @@ class BackgroundWork:
     """One job, begun at once.
 
     Attributes:
-        stage: by its own report; empty at first.
+        stage: reported by the work; empty at first.
     """
 
     def __init__(self, call: Call, folder: Path) -> None:
@@ -109,7 +109,7 @@ class BackgroundWork:
         return "\n".join(self._said[-4:])
 
     def cancel(self) -> None:
-        """Ask it to end, as Ctrl-C does, by ending its input."""
+        """Ask the work to end, as Ctrl-C does, by ending its input."""
         self._cancelled = self._cancelled or self._process.poll() is None
         if self._process.stdin is not None:
             with suppress(OSError):

@@ -73,7 +73,7 @@ def done(call: Call) -> Mapping[str, object]:
     """Do a task in the working folder; return its JSON result.
 
     Raises:
-        StationError: as of the task.
+        StationError: an error of the task.
     """
     from dbbstation.facts.serialise import plain  # noqa: PLC0415 - the call is read before half a second of imports
     from dbbstation.tasks.called import called  # noqa: PLC0415 - the same

@@ -55,7 +55,7 @@ class HeldTolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedTolerance(HeldTolerance):
-    """A tolerance compared with the circles of now and of before; None without applicable circles."""
+    """A tolerance compared with present and former circles; None without applicable circles."""
 
     before: HeldTolerance | None
 

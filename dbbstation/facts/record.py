@@ -54,7 +54,7 @@ class Record:
 
 @dataclass(frozen=True)
 class AsArray:
-    """Marks an array that is a tuple of this kind in a file."""
+    """Marks an array that a file stores as a tuple of this kind."""
 
     kind: Any
 

@@ -91,7 +91,7 @@ def as_objects(data: Any) -> Any:  # noqa: ANN401 - of any result
 
 
 def read_plain(kind: type[_Kind], data: Mapping[str, object]) -> _Kind:
-    """Read a dataclass from the data of `plain`; another class reads the keys that it has.
+    """Read a dataclass from the data of `plain`, which may come from a class with more keys.
 
     Args:
         data: further keys are ignored.

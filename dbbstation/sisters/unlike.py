@@ -44,8 +44,8 @@ class Sisters:
     """Comparison of machines with like machines, shape (q, n), NaN if unknown.
 
     Attributes:
-        score: standard normal for a like machine, by the like ones.
-        scatter: beyond uncertainties, in the quantity's unit.
+        score: departure from like machines, standard normal for a like machine.
+        scatter: scatter of like machines beyond uncertainties, in the quantity's unit.
         smallest_seen: departure that would count as unlike, in the quantity's unit.
     """
 

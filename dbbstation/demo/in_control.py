@@ -79,11 +79,11 @@ def run_ways(
     """Measure one machine under LinuxCNC, nominal and corrected in three ways, and a faultless machine for comparison.
 
     Args:
-        folder: made, or one whose job was interrupted.
+        folder: new folder, or folder of an interrupted job.
         tell: receives each command before it runs.
         progress: receives each circle, and how many are done.
         tests: names; None: all fifteen of [CAL Table II].
-        model: file in the folder that corrects: what a session of its own diagnoses, or `truth.yaml`.
+        model: correcting model file in the folder: diagnosed from a separate session, or `truth.yaml`.
 
     Raises:
         StationError: a step failed; earlier results stay.

@@ -68,7 +68,7 @@ def run_demo(
     """Do the whole job and write its files into a folder.
 
     Args:
-        folder: made anew.
+        folder: new folder.
         tell: receives each command before it runs.
         progress: receives each circle, and how many are done.
         tests: names; None: all fifteen of [CAL Table II].

@@ -2,8 +2,8 @@
 
 Noise widens a range by an amount that depends on the form. Simulated paths combine this form, scaled, with noise of the
 measured spectrum (parametric bootstrap [Efron and Tibshirani, An Introduction to the Bootstrap, ch. 12 to 14]). The
-estimate is the size whose mean range equals the measured range. Sizes that give it at the 2.5th and 97.5th percentile
-bound the interval [confidence interval by inversion of a test, Casella and Berger, Statistical Inference, 9.2.1]. The
+estimate is the size whose mean range equals the measured range. Sizes whose 2.5th or 97.5th percentile equals it bound
+the interval [confidence interval by inversion of a test, Casella and Berger, Statistical Inference, 9.2.1]. The
 interval starts at zero if noise alone suffices.
 """
 

@@ -92,7 +92,7 @@ def stricter(one: Finding, other: Finding) -> Finding:
     """Return the decisive one of two findings from different knowledge.
 
     Wrong precedes good, and good precedes undecided. Equal decisions are ranked by value over limit. If another circle
-    fits better, the knowledge with more circles decides.
+    fits better, the finding from more circles decides.
     """
     if one.wrong or other.wrong:
         return max((each for each in (one, other) if each.wrong), key=_share)

@@ -1,8 +1,8 @@
 """Detect a constant length: a stuck plunger, a mechanical stop, a held display.
 
 With white noise sigma and step r, the next reading equals any given value with a probability of at most p = r / (sigma
-sqrt(2 pi)), the greatest normal density times the step. So n equal readings have at most p^(n - 1). A step coarser than
-the noise gives no bound.
+sqrt(2 pi)), the greatest normal density times the step. So the probability of n equal readings is at most p^(n - 1). A
+step coarser than the noise gives no bound.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def unseen_um2(one: Seen, other: Seen) -> float:
 
 
 def limit_along(covariance: Floats, off: Floats) -> float:
-    """Return a sound vector's limit in the direction of `off`, from the ellipsoid exceeded with probability SHARE."""
+    """Return a sound vector's limit along `off`, from the ellipsoid that it leaves with probability SHARE."""
     size = float(np.linalg.norm(off))
     along = off / size if size > 0.0 else np.eye(len(off))[0]
     return length_quantile(len(off)) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))

@@ -1,8 +1,8 @@
 """Detect runs that show another test's circle: wrong bore, height, tilt, start or direction.
 
-A bar does not measure its place. Likelihoods compare two normal distributions: of the run's own circle, and of another
-test's circle, by this test's run or a model. A sound run favours another circle by a factor f with a probability of at
-most 1 / f [Markov's inequality], in any dimension and usually far less.
+A bar does not measure its place. Likelihoods compare two normal distributions: one for the run's own circle, and one
+for another test's circle, from that test's run or a model. A sound run favours another circle by a factor f with a
+probability of at most 1 / f [Markov's inequality], in any dimension and usually far less.
 """
 
 from __future__ import annotations

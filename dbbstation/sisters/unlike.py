@@ -99,8 +99,8 @@ def _share(values: Floats, false_alarms: float) -> float:
 def _middle(values: Floats, variance: Floats, taken: Flags) -> tuple[Floats, Floats]:
     """Return weighted mean and squared scatter, shape (q,) each.
 
-    The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero. Newton starts below, with the greatest u
-    for all.
+    The scatter solves sum((x - mean)^2 / (scatter^2 + u^2)) = n - 1, or is zero. Newton's method starts below it, with
+    the greatest u for all machines.
     """
     count = taken.sum(axis=1)
     x = np.where(taken, values, 0.0)

@@ -69,7 +69,7 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
     """Return these runs with the columns of all of them.
 
     Raises:
-        InputError: no run, or a file is no run.
+        InputError: there is no run, or a file is no run.
     """
     faults: list[Problem] = []
     found: dict[str, None] = {}

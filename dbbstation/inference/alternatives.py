@@ -33,7 +33,7 @@ class Alternatives:
         form_uncertainty: relative inaccuracy of a member's formula.
 
     Attributes:
-        classes: equivalent causes by member, the member first.
+        classes: equivalent causes of each member, the member first.
         ambiguities: results of `ambiguity` by uncertain member.
     """
 
@@ -61,7 +61,7 @@ class Alternatives:
         return min(1.0, float(self._weights @ self._inside[:, columns].any(axis=1))) if columns else 0.0
 
     def ambiguity(self, name: str) -> tuple[str, ...]:
-        """Return causes, most probable first, of which one is present if the named cause is not."""
+        """Return alternatives, most probable first: if the named cause is absent, one of these is present."""
         chosen = list(next((equal for equal in self.classes.values() if name in equal), (name,)))
         own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
         both = (self._weights * own) @ self._inside
@@ -97,7 +97,7 @@ class Alternatives:
         return self._best.log_factor(member.cause.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
 
     def _cosine(self, one: Integers, other: Integers, others: tuple[Member, ...]) -> float:
-        """Return the least cosine between two causes' spans, given base and others; 1 means equal effects."""
+        """Return the least cosine between two causes' spans, given base and other members; 1 means equal effects."""
         products = self._comparison.beside(others, np.concatenate([one, other]))
         size = len(one)
         a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
@@ -145,7 +145,7 @@ jig is ambiguous with a step over time in two of two sessions; with 6 four sessi
 
 
 def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:
-    """Return the best replacements of a member that are at most slightly worse."""
+    """Return the best replacements of a member, each with over half of its log Bayes factor."""
     scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)
     return [scan.best[k] for k in np.argsort(-scan.log_factor)[: BOUNDS.rivals] if scan.log_factor[k] > enough]
@@ -155,7 +155,7 @@ def standing_out(products: Floats, plausible: Floats) -> Floats:
     """Return significances of combinations of plausible amplitudes, ascending, shape (p,).
 
     Args:
-        products: of a cause's columns given others, over noise, shape (p, p).
+        products: products of a cause's columns, given other causes, over noise, shape (p, p).
         plausible: shape (p,).
     """
     return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))

@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Random effects of some blocks only, as a triangular factor.
+    """Random effects that affect only some blocks, as a triangular factor.
 
     Attributes:
         columns: of the group, shape (j,).
         border: shared columns, shape (b,).
         inner: triangular factor of the group, shape (j, j).
-        across: same rows over the border, shape (j, b).
-        target: same rows, shape (j,).
+        across: factor rows over the border, shape (j, b).
+        target: factor rows over the target, shape (j,).
         left: remaining information on the border as rows, target last, shape (r, b + 1).
     """
 
@@ -88,7 +88,7 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
 def triangles_without(
     blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
 ) -> Iterator[tuple[Floats, Floats, float]]:
-    """Yield the information on fitted columns without the blocks of each part.
+    """Yield, for each part, the information on fitted columns from blocks outside it.
 
     Yields:
         Triangular factor, shape (f, f), its target, shape (f,), and the irreducible sum of squares.
@@ -122,7 +122,7 @@ class _Border:
 
     Attributes:
         order: shape (m + f,).
-        place: index of each column in `order`, shape (k,); -1 for others.
+        place: index of each column in `order`, shape (k,); -1 for other columns.
     """
 
     order: Integers
@@ -139,7 +139,7 @@ class _Border:
         return rows
 
     def rows(self, group: Group) -> Floats:
-        """Return a group's remaining information over these columns, target last."""
+        """Return a group's remaining information as rows over these columns, target last."""
         wide = np.zeros((len(group.left), len(self.order) + 1))
         wide[:, self.place[group.border]] = group.left[:, :-1]
         wide[:, -1] = group.left[:, -1]

@@ -93,7 +93,7 @@ class Bank:
         self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
 
     def copy(self) -> Bank:
-        """Return an independently extensible copy that shares present columns, laws and patterns."""
+        """Return a copy that shares present columns, laws and patterns; later additions are separate."""
         other: Bank = copy(self)
         other.patterns, other._of_patterns = dict(self.patterns), dict(self._of_patterns)
         other._of_laws, other._everywhere = dict(self._of_laws), list(self._everywhere)
@@ -132,7 +132,7 @@ class Bank:
         return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}
 
     def kind_of(self, name: str) -> tuple[str, ...]:
-        """Return a cause's name, or family and variables for a picked pattern."""
+        """Return a cause's name; for a picked pattern its family and variables."""
         pattern = self.patterns.get(name)
         if pattern is None or pattern.family not in LOOKED_FOR:
             return (name,)
@@ -157,7 +157,7 @@ class Bank:
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
-        """Return causes with the base projected out; `but_for` marks rows to ignore, shape (m,), with zero target.
+        """Return causes with the base projected out; `but_for` marks rows to ignore, shape (m,), whose target must be zero.
 
         Args:
             only: needed columns, ascending, shape (q,); None for all.
@@ -250,7 +250,7 @@ class Bank:
         return float(np.sum(student - np.log(self.trust) + 0.5 * left**2))
 
     def may_have_long_tails(self, members: Sequence[Member]) -> bool:
-        """Return whether innovations given members have longer than normal tails."""
+        """Return whether innovations, with members fitted, have longer tails than normal."""
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0]
         return has_long_tails(left / self.trust)
 
@@ -337,7 +337,7 @@ class Bank:
             self._columns.add(part)
 
     def whitened(self, rows: Floats) -> Floats:
-        """Return the kept ones of all rows, whitened, shape (m, ...)."""
+        """Return the kept part of these rows, whitened, shape (m, ...)."""
         return _whitened(self.channel.kept, self.whitening, rows)
 
     def _whitener(self) -> Callable[[Floats], Floats]:
@@ -359,7 +359,7 @@ class Bank:
         return self._columns.axes
 
     def base_values(self, effect: Floats) -> Floats:
-        """Return the refitted base's values for the residual less an effect, shape (k,)."""
+        """Return the base's values, shape (k,), refitted to the residual minus an effect."""
         target = self.whitened(self.channel.residual - effect)
         block = compress(np.arange(self.base.shape[1]), self.base, target)
         return solve([block], self.channel.known, self.noise.innovation, self.channel.held).x
@@ -368,7 +368,7 @@ class Bank:
         """Add columns of a law at parameter values, with tangents and slack.
 
         Args:
-            amplitudes: of all the law's columns, zero for other forms, shape (p,).
+            amplitudes: of all the law's columns, shape (p,); zero outside this form.
         """
         law = self.laws[name]
         exact = law.columns(nonlinear) if law.at is None else law.at(nonlinear, amplitudes)
@@ -488,7 +488,7 @@ def amplitudes_of(variant: Variant) -> Integers:
 
 
 def alike(one: Coloured, other: Coloured) -> bool:
-    """Return whether two noises have equal spectra and innovations."""
+    """Return whether two noise models have similar spectra and innovations."""
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
     if any(abs(a - b) >= SETTLED * max(a, b) for a, b in pairs):
         return False
@@ -508,7 +508,7 @@ SETTLED = 0.03
 
 
 def spacing_of(grid: Sequence[float], value: float) -> float:
-    """Return a grid's spacing about a value; for a single point, its size."""
+    """Return a grid's spacing about a value; for a single point, its absolute value."""
     if len(grid) == 1:
         return max(abs(grid[0]), 1e-300)
     k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))

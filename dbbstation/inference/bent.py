@@ -1,4 +1,4 @@
-"""Nonlinear effects of a signal: saturation, dead zone, knee, friction with a transition speed, scaled hysteresis, integral."""
+"""Nonlinear effects of a signal, such as saturation."""
 
 from __future__ import annotations
 

@@ -20,10 +20,10 @@ class Block:
     """One run's information on its columns.
 
     Attributes:
-        columns: that affect the run, shape (k,).
+        columns: columns that affect the run, shape (k,).
         triangle: triangular factor of J, shape (r, k), r at most k + 1.
         square: sum of squares of the target, an upper bound of fitted squares.
-        noise: of another instrument; None for the channel's.
+        noise: of another instrument; None for the channel's noise.
     """
 
     columns: Integers
@@ -87,7 +87,7 @@ class Columns:
 
     Attributes:
         prior: standard deviation about zero, infinite if unknown, shape (k,).
-        scale: relevant size, shape (k,); directions with more uncertainty are lost.
+        scale: relevant size, shape (k,); directions with larger uncertainty are undetermined.
         random: random effects, marginalised and not reported, shape (k,).
     """
 
@@ -97,7 +97,7 @@ class Columns:
 
 
 def with_random(known: Columns, sd: Floats) -> Columns:
-    """Return columns with random effects of these standard deviations appended."""
+    """Append random effects with these standard deviations to columns."""
     return Columns(
         np.concatenate([known.prior, sd]),
         np.concatenate([known.scale, sd]),

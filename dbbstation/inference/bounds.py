@@ -1,4 +1,4 @@
-"""Limits of searches for every client: iterations, numbers, and sizes of blocks.
+"""Limits of searches for every client.
 
 The limits save time, memory or output. A search that ends at a limit reports it, or finds the same with twice the limit.
 """

@@ -27,7 +27,7 @@ class Cancelling:
 
 
 def cancelling(effects: Mapping[str, Floats], unit: str, scale: float = 1.0) -> Cancelling | None:
-    """Return effects that exceed their sum if most squares cancel, else None."""
+    """If most squares cancel, return the effects that exceed their sum, else None."""
     rms = {name: float(np.std(effect)) for name, effect in effects.items()}
     whole = float(np.std(np.sum(list(effects.values()), axis=0))) if effects else 0.0
     if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):

@@ -5,7 +5,7 @@ hypothesis refits the base. `settle` compares sets of laws and of patterns witho
 
 residual = base + sum of laws + sum of patterns + noise
 
-Columns cover all rows, but only `kept` rows are fitted. The other rows can then be predicted.
+Columns cover all rows, but only `kept` rows are fitted, to predict the other rows.
 """
 
 from __future__ import annotations
@@ -71,23 +71,23 @@ class Law:
         plausible: one standard deviation of amplitudes, shape (p,).
         grids: starting values of nonlinear parameters, ascending.
         positive: amplitudes that cannot be negative, shape (p,); may be empty.
-        form_uncertainty: relative departure of real objects, one standard deviation.
-        follows: variable of this departure; None if exact or given by `discrepancy`.
+        form_uncertainty: relative departure of real objects from the formula, one standard deviation.
+        follows: variable that this departure follows; None if exact or given by `discrepancy`.
         discrepancy: function from effect, shape (n,), nonlinear parameters and amplitudes, shape (p,), to columns of
             departure, shape (n, q), with standard deviation `form_uncertainty`. Default: the effect times smooth
             functions of `follows`.
-        at: function to columns linearised about amplitudes, shape (p,); None if the effect is proportional.
+        at: function from nonlinear parameters and amplitudes, shape (p,), to linearised columns; None if proportional.
         choices: alternative forms: columns, log probability, label; `positive` then applies to each form's columns.
-        zero_from: reference value of the variable of the first amplitude; the second amplitude over the first shifts
-            the zero from it. None without such a zero.
-        reach: prior standard deviation of each amplitude's effect, in the residual's unit, as a limit; None for
-            `plausible` alone.
+        zero_from: reference value of the first variable; the effect is zero at this value minus the ratio of second to
+            first amplitude. None without such a zero.
+        reach: prior standard deviation of each amplitude's greatest effect, in the residual's unit; None to use
+            `plausible`.
         family: of a pattern; None for a client's physics.
         followed: names followed instead of variables, such as port signals.
-        driven: names that result from the simulation.
+        driven: followed names that result from the simulation.
         way: `direction` or `late` for laws without family; empty for value.
         acts_once: whether it is a single event that other rows cannot show.
-        confirm: a measurement that shows it alone; empty if unknown.
+        confirm: a measurement that shows this cause alone; empty if unknown.
         possible: function that tests its values and other laws' values, by name.
     """
 
@@ -128,26 +128,26 @@ class Channel:
 
     Attributes:
         residual: measured less simulated, by block in time order, shape (n,).
-        blocks: rows of each, covering all in order.
+        blocks: rows of each block, covering all in order.
         time: ascending within blocks, shape (n,); None for unordered rows.
         simulated: simulated values, to test delays; None for no test.
         kept: fitted rows, shape (n,); default all.
-        apart: spacing of kept rows, without held-back rows.
+        apart: spacing of kept rows, ignoring gaps of held-back rows.
         static: patterns that need no search; None for all kinds over all variables.
         least_noise: least noise of a row, in the residual's unit.
-        step: of measured values, in the residual's unit; zero if unknown.
+        step: resolution of measured values, in the residual's unit; zero if unknown.
         surely: probability of the noise bound [interval of a variance by chi-square; JCGM 101:2008, sec. 6.4.9.4]; None
             for the estimate.
         grows: size of a proportional noise component, shape (n,); None for constant noise.
         noise_follows: alternative sizes of this component by name, shape (n,) each; at most one applies.
         known_noise: additional standard deviation per row, in the residual's unit, shape (n,); or None.
-        levels: kind of each row, from 0, with separate noise, shape (n,); None for one kind.
+        levels: kind of each row, from 0, shape (n,); each kind has separate noise. None for one kind.
         clock: for omitted rows or gradual steps; None for immediate steps.
         direction: of travel, shape (n,); None to omit direction-dependent effects in time.
         interchangeable: share of a fitted effect's squares that a cause over another variable must explain for both
             variables to be named. The remainder is then less than a third of the effect; 0.8 and 0.95 gave equal
-            answers on ten tables. Circles and sessions use the share of equivalent causes, because a tenth means
-            thousands in log evidence there.
+            answers on ten tables. Circles and sessions use the share of equivalent causes, because there a tenth
+            changes log evidence by thousands.
         rows_are: name of the rows in answers: `rows` or `tests`.
     """
 
@@ -181,7 +181,7 @@ class Channel:
             object.__setattr__(self, "kept", np.ones(len(self.residual), dtype=bool))
 
     def without(self, rows: Flags) -> Channel:
-        """Return the channel with rows held back, shape (n,)."""
+        """Return the channel with marked rows, shape (n,), held back."""
         return replace(self, kept=self.kept & ~rows)
 
     def thinned(self, most: int) -> Channel:

@@ -1,9 +1,9 @@
 """Gain of each effect in held-out parts, by predictive density.
 
-For each part the set is selected from all causes without this part; nonlinear parameters stay within half a grid step.
-The set, refitted with and without each effect, then predicts the part. The score is the log density [Good, Rational
-decisions, J. R. Stat. Soc. B 14 (1952) 107], the part's contribution to the log evidence. The same comparisons give
-selection frequencies without some tests.
+For each part the set is selected from all causes by the other parts; nonlinear parameters stay within half a grid step.
+The set, refitted with and without each effect, then predicts the part. The score is the log density [Good, J. R. Stat.
+Soc. B 14 (1952) 107], the part's contribution to the log evidence. The same comparisons give selection frequencies
+without some tests.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ class KnownGains:
 
     Attributes:
         rows: of each part, shape (n,).
-        gains: by the class's variables; the empty set for all effects.
+        gains: gain of each class by its variables; the empty set is for all effects.
         errors: rms error with all effects, per part or overall.
-        anew: the selections without each part; None if unknown.
+        anew: gains by the selections without each part; None if unknown.
     """
 
     rows: Sequence[Flags]
@@ -74,15 +74,15 @@ class KnownGains:
     anew: ChosenAnew | None = None
 
     def of(self, wanted: Collection[str] | None) -> ClassGain:
-        """Return the gain of all effects of these variables, None for all effects; zero for an unknown class."""
+        """Return the gain of a class by its variables, None for all effects; zero if unknown."""
         return self.gains.get(frozenset(wanted or ()), ClassGain(DensityGains(()), 0.0, 0.0))
 
     def but_for(self, _ignored: Collection[str]) -> KnownGains:
-        """Return these gains: events in tests are random effects here, and simulator terms do not follow time."""
+        """Return unchanged gains, because events in tests are random effects here and simulator terms do not follow time."""
         return self
 
     def errors_with(self, _wanted: Collection[str]) -> list[float]:
-        """Return the rms errors with all effects, because they enter together."""
+        """Return the rms errors with all effects, because they are applied together."""
         return list(self.errors)
 
 
@@ -103,7 +103,7 @@ def gains_of_tests(
 
     Args:
         rows: of each group, shape (n,).
-        errors: function from several sets of names to rms errors of predicting groups without these causes.
+        errors: function from sets of names to rms errors of predicting groups without each set's causes.
         limits: options of the searches without a group.
     """
 
@@ -174,7 +174,7 @@ def chosen_anew(
     """Select causes without each part, and predict this part.
 
     Args:
-        choose: function to the most probable members, starting from the selection of all rows.
+        choose: function from a comparison to its most probable members, starting from all rows' selection.
         kind_of: function from a cause to its kind.
         classes: effects of a class are omitted together.
     """

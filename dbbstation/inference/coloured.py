@@ -75,8 +75,8 @@ class Coloured:
     """Noise of a channel.
 
     Attributes:
-        partial: partial autocorrelations from lag 1; none if white.
-        told_by: number of free parameters, if smaller.
+        partial: partial autocorrelations from lag 1; empty if white.
+        told_by: number of free parameters, if fewer than these.
     """
 
     sigma: float
@@ -116,7 +116,7 @@ class Coloured:
 
     @property
     def effective(self) -> float:
-        """Return the white noise with equal power at frequency zero."""
+        """Return the standard deviation of white noise with equal power at frequency zero."""
         return self.innovation / abs(float(self.filter.sum()))
 
     @property
@@ -150,7 +150,7 @@ class Coloured:
         return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
 
     def independent_samples(self, stretches: Sequence[slice]) -> float:
-        """Return how many independent samples have squares that average as precisely as these stretches."""
+        """Return how many independent samples give as precise a mean square as these stretches."""
         # n / (1 + 2 sum of rho(k)²) = n mean(S)² / mean(S²), S averaged over 1 / n [Bartlett, J. R. Stat. Soc. 98
         # (1935) 536; Priestley 1981, sec. 5.3.2].
         power = np.exp(
@@ -165,7 +165,7 @@ class Coloured:
         return total
 
     def whitening(self, stretches: Sequence[slice]) -> csr_array | None:
-        """Return the whitening matrix to noise of size `innovation`; None if white."""
+        """Return the matrix that whitens to noise of size `innovation`; None if white."""
         if self.is_white:
             return None
         coefficients, left = self._predictors
@@ -213,7 +213,7 @@ def _state(taps: Floats, before: Floats) -> Floats:
 
 
 def partial_autocorrelations(correlation: Floats) -> tuple[float, ...]:
-    """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last ones."""
+    """Return partial autocorrelations [Levinson-Durbin recursion], without negligible last values."""
     coefficients, left, found = np.zeros(0), 1.0, []
     for order in range(1, len(correlation)):
         partial = float((correlation[order] - coefficients @ correlation[1:order][::-1]) / left)
@@ -355,7 +355,7 @@ def with_put_back(noise: Coloured, bands: Floats, taken: Floats, rows: int) -> C
 
     Args:
         bands: ascending frequencies [cycles per row], shape (b,).
-        taken: log of the remaining share, shape (b,).
+        taken: log of the remaining share of power, shape (b,).
     """
     frequency = np.linspace(0.0, 0.5, BOUNDS.frequencies + 1)
     power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))

@@ -94,6 +94,6 @@ class Stretches(Form):
         return len(self.first)
 
     def columns(self, values: Floats) -> Floats:
-        """Return the visible part of each stretch, shape (n, p)."""
+        """Return each stretch's curve at values, shape (n, p)."""
         begun, ended = (self.response(values[..., None] - np.array(edges)) for edges in (self.first, self.last))
         return np.asarray(begun - ended, dtype=np.float64)

@@ -33,7 +33,7 @@ ENTIRELY = 1e-9
 
 
 def detectable(settled: Settled) -> tuple[Detectable, ...]:
-    """Return detectable sizes, before absorption by the base, over variables and for the user's causes; the least detectable first."""
+    """Return detectable sizes of effects over variables and of the user's causes, before absorption by the base; the least detectable first."""
     asked: dict[str, Cause] = {}
     for cause in settled.causes:
         family = _family(settled.bank, cause.name)

@@ -130,7 +130,7 @@ class VariableProbabilities:
         return min(1.0, sum(p for key, p in self._sets.items() if key & wanted))
 
     def class_of(self, name: str) -> tuple[str, ...]:
-        """Return a variable with rivals, added until the probability is sure."""
+        """Return a variable and its rivals, added until the class is sure."""
         chosen = [name]
         every = sorted(frozenset[str]().union(*self._sets))
         unsure = [other for other in every if self.of([other]) < SURE]
@@ -153,7 +153,7 @@ class VariableClass:
 
     @property
     def wanted(self) -> frozenset[str]:
-        """Return all pooled variables."""
+        """Return all variables of the class."""
         return frozenset(self.others).union(*self.each)
 
 
@@ -225,7 +225,7 @@ def estimated(settled: Settled, names: Collection[str]) -> tuple[Integers, Float
 
 
 def share_made(products: Floats, values: Floats) -> float:
-    """Return the share of an effect's squares that the other columns explain."""
+    """Return the share of an effect's squares that the columns after its own explain."""
     p = len(values)
     whole = float(values @ products[:p, :p] @ values)
     axes_of = np.linalg.pinv(products[p:, p:], rcond=1e-9, hermitian=True)
@@ -247,7 +247,7 @@ class ClassGain:
 
     @property
     def predicts(self) -> bool:
-        """Return whether the class predicts: a sure gain without the best part, in half of the rows, with less error."""
+        """Return whether the class predicts: it gains surely without the best part, gains in half of the rows, and reduces the error."""
         return self.gains.predicts and self.gains.share_with_gain >= MOST_PARTS and self.after < self.before
 
 
@@ -276,7 +276,7 @@ class ChosenWithoutParts:
         return gain_of(self.parts, wanted, self.ignored)
 
     def but_for(self, ignored: Collection[str]) -> ChosenWithoutParts:
-        """Return the selections with other ignored variables, such as time."""
+        """Return the selections with other ignored variables."""
         return replace(self, ignored=frozenset(ignored))
 
     def errors_with(self, wanted: Collection[str]) -> list[float]:

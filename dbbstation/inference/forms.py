@@ -240,7 +240,7 @@ class Proportional(Form):
 
 @dataclass(frozen=True, eq=False)
 class Plane(Form):
-    """Proportional to coordinates, with `constant` also constant."""
+    """Proportional to coordinates; `constant` adds a constant."""
 
     unit: float
     coordinates: int

@@ -90,7 +90,7 @@ def basis(phase_rad: Floats, highest: int) -> Floats:
 
 
 def _waves(phase_rad: Floats, highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return waves whose products are harmonics a + AT_ONCE b, ten times faster than computing cosines."""
+    """Return waves whose products are harmonics a + AT_ONCE b, ten times faster than cosines."""
     first = np.exp(1j * phase_rad)
     return _powers(first, min(AT_ONCE, highest + 1)), _powers(np.exp(1j * AT_ONCE * phase_rad), highest // AT_ONCE + 1)
 

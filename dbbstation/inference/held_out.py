@@ -22,7 +22,7 @@ class HeldOut:
 
     Attributes:
         rms: with the omitted blocks' random effects fitted under priors, in the channel's unit.
-        normalised: root of squares over predicted covariance and freedom; near 1 if correct.
+        normalised: root of chi-square by predicted covariance per degree of freedom; near 1 if correct.
     """
 
     rms: float
@@ -44,7 +44,7 @@ def held_out(
         groups: group of each block, such as the fold of its test.
         noise: white noise of equal low-frequency power.
         held: directions held at zero, in scaled columns.
-        single: noise of a single measurement if smaller; None for `noise`.
+        single: noise of a single measurement, if smaller than `noise`; else None.
     """
     used = Columns(known.prior[active], known.scale[active], known.random[active])
     thin = [_restricted(block, active) for block in blocks]

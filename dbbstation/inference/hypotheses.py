@@ -47,7 +47,7 @@ class SearchWork:
 
     Attributes:
         most: limit of the work.
-        whole: total work to which this part is added.
+        whole: counter of the total work, which includes this part.
     """
 
     most: float = np.inf
@@ -63,7 +63,7 @@ class SearchWork:
         self._spend(times * SCAN * sum(len(one.columns) for cause in causes for one in cause.variants))
 
     def fit(self, rows: int, columns: int) -> None:
-        """Count one fit of all columns, rows times squared columns, for noise estimates and feature searches."""
+        """Count one fit of all columns, rows times squared columns."""
         self._spend(rows * float(columns) ** 2 / FIT)
 
     def _spend(self, work: float) -> None:
@@ -72,7 +72,7 @@ class SearchWork:
             self.whole._spend(work)  # noqa: SLF001 - of the same class
 
     def part(self, stages: int) -> SearchWork:
-        """Return the work limit of one of several stages, which share the remaining work evenly."""
+        """Return one stage's work limit: an even share of the remaining work."""
         return SearchWork(max(self.most - self.spent, 0.0) / stages, whole=self)
 
     @property
@@ -163,7 +163,7 @@ def search(
         seeds: further sets to examine, such as earlier ones.
         most_expanded: most sets whose neighbours are examined.
         most_members: largest size of a set; None for no limit.
-        likely: log odds below the best of examined sets; `CLOSE` to find only the best.
+        likely: expand sets within these log odds of the best; `CLOSE` to find only the best.
         thorough: also replace two members by one, and one by two.
         work: limit of counted work, at which the best set so far is returned; None for no limit.
     """
@@ -445,7 +445,7 @@ class _Beside:
 
 
 def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[Member]:
-    """Return a member with each other law that has slack columns, because scans compare laws without slack."""
+    """Return a member once with each other law that has slack columns, because scans compare laws without slack."""
     if not (causes := other_laws(members[k], lambda variant: len(variant.slack) > 0)):
         return []
     comparison, others = beside.others(members, k)
@@ -453,7 +453,7 @@ def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[M
 
 
 def other_laws(member: Member, wanted: Callable[[Variant], bool] = lambda _: True) -> list[Cause]:
-    """Return one cause per other law of a member, named after the law, with the wanted forms."""
+    """Return one cause per law that a member does not use, named after the law, with the wanted forms."""
     laws: dict[str, list[Variant]] = {}
     for variant in member.cause.variants:
         if variant.law != member.variant.law and wanted(variant):

@@ -1,8 +1,7 @@
 """Uncertainty of least squares by omitting each block.
 
-The jackknife includes correlated and uneven noise without a noise model. [Tukey 1958; delete-a-group jackknife in
-Künsch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989) 1217, sec.
-2]
+The jackknife includes correlated and uneven noise without a noise model. [Tukey 1958; by groups in Künsch, Annals of
+Statistics 17 (1989) 1217, sec. 2]
 """
 
 from __future__ import annotations

@@ -39,8 +39,8 @@ def law_form(
     named if it is surely better than every other candidate and than no law, even without its best part. If a sum is
     best, each of its laws is tested against alternatives.
 
-    A more flexible candidate that contains a law predicts about equally well. The evidence of all rows penalises
-    amplitudes and may refute it; otherwise the law stays open.
+    A more flexible candidate that contains a law predicts about as well. The evidence of all rows penalises amplitudes
+    and may refute the candidate; otherwise the law stays open.
 
     Args:
         parts: rows of each part, shape (n,); None to decide by the evidence of all rows.
@@ -136,7 +136,7 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
 
 
 def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:
-    """Return whether all rows, or held-out parts without the best one's strongest part, surely prefer the best one."""
+    """Return whether the best candidate is surely preferred by all rows, or by held-out parts without its strongest part."""
     apart = best - other
     return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
 

@@ -1,4 +1,4 @@
-"""Test whether a residual is noise: squares, periodogram, runs of sign, blocks, variables.
+"""Test whether a residual is noise.
 
 The residual must pass all tests. Each gives a chance probability times the number of trials [Bonferroni; Miller,
 Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
@@ -38,7 +38,7 @@ class ResidualTest:
 
     Attributes:
         name: `sum of squares`, `wave in time`, `runs of sign`, `blocks`, or a variable.
-        rms: residual beyond noise, in its unit.
+        rms: residual beyond noise, in the residual's unit.
     """
 
     name: str

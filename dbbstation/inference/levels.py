@@ -98,7 +98,7 @@ class ScoredLaw:
     """A law, or a sum of laws, as candidate for one class.
 
     Attributes:
-        log_density: held-out, relative to no candidate.
+        log_density: held-out log density, relative to no candidate.
     """
 
     name: str
@@ -111,9 +111,9 @@ class LawForm:
 
     Attributes:
         name: the law; None if open.
-        not_worse: causes about as good as this law or the best, with equivalents.
+        not_worse: causes about as good as the law, or as the best if open, with equivalents.
         together: laws that are each named, if a sum is best.
-        rivals: equally good causes for each other member of the sum.
+        rivals: for each unnamed member of the sum, equally good causes.
     """
 
     name: str | None
@@ -238,7 +238,8 @@ def difference_of(
 ) -> DifferenceFound:
     """Derive answer 1 from answers 2 and 3.
 
-    A single event is no evidence together with effects that other rows refute, because it may only compensate for them.
+    A single event is no evidence together with effects that other rows refute, because the event may only compensate
+    for these.
 
     Args:
         rest: size of interest, whether it is stated, independent samples, detectable sizes.

@@ -114,7 +114,7 @@ def _doubts_about_noise(settled: Settled) -> tuple[str, ...]:
 
 
 def slow_chance(settled: Settled) -> float:
-    """Return the chance probability of so much power at the slowest frequencies, relative to the next."""
+    """Return the chance probability of so much power at the slowest frequencies, relative to the next higher ones."""
     channel = settled.channel
     if channel.time is None:
         return 1.0

@@ -1,4 +1,4 @@
-"""Limits at which a computation ended, for reports of incomplete results."""
+"""Limits at which a computation ended."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def louder(residuals: Sequence[Floats], begins: Sequence[Integers], length: int)
     Correlated mean squares have 2 mean² / variance degrees of freedom [Satterthwaite, Biometrics Bulletin 2 (1946) 110].
 
     Args:
-        begins: rows per run, unordered.
+        begins: first rows of stretches per run, unordered.
     """
     inside, outside = [], []
     for residual, rows in zip(residuals, begins, strict=True):

@@ -127,7 +127,7 @@ def _middle(variable: Variable) -> float:
 
 
 def lagging(values: Floats, time: Floats, constant: float) -> Floats:
-    """Return values after a first-order lag, less the values, shape (n,); the initial state is steady.
+    """Return values after a first-order lag minus values before it, shape (n,); the initial state is steady.
 
     Args:
         constant: in `time`'s unit.

@@ -3,7 +3,7 @@
 The model target = base + causes + noise is linear in amplitudes; the base is projected out. Gaussian priors give closed
 forms [MacKay, Bayesian interpolation, Neural Computation 4 (1992), eqs 2.5 and 4.1]. The evidence is averaged over
 prior sizes and variants. The slack of a variant represents its formula's inaccuracy, proportional to its amplitudes
-[Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, on model discrepancy].
+[Kennedy and O'Hagan 2001; see `model_form`].
 """
 
 from __future__ import annotations
@@ -150,17 +150,17 @@ class Scan:
 
     @cached_property
     def log_best(self) -> Floats:
-        """Return the best log Bayes factors without weights, shape (c,)."""
+        """Return each cause's best log Bayes factor without weights, shape (c,)."""
         best = (self._best(k) for k in range(len(self.causes)))
         return np.array([self.factors[self.first[k] + form, scale] for k, (form, scale) in enumerate(best)])
 
     @cached_property
     def narrow(self) -> tuple[Member | None, ...]:
-        """Return the best inflexible variants; None if equal to `best` or missing."""
+        """Return each cause's best inflexible variant; None if equal to `best` or missing."""
         return tuple(self._narrow(k) for k in range(len(self.causes)))
 
     def of(self, kept: Sequence[int]) -> Scan:
-        """Return the scan of some causes."""
+        """Return the scan of only these causes."""
         numbers = np.array(kept, dtype=np.int64)
         return replace(
             self,
@@ -267,7 +267,7 @@ class ModelComparison:
         self._forms_of_many: _Forms | None = None
 
     def among(self, causes: Iterable[Cause]) -> ModelComparison:
-        """Return the comparison of some causes, with contiguous arrays for speed."""
+        """Return the comparison of some causes, in contiguous arrays."""
         every = [part for cause in causes for one in cause.variants for part in (one.columns, one.slack)]
         columns = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *every]))
         own = self._at(columns)
@@ -374,7 +374,7 @@ class ModelComparison:
         return Around(tuple(members), forms, lower, z, evidence, across, self._towards[forms.needed])
 
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
-        """Scan each member given the others, in its variant, without slack, over all sizes.
+        """Scan each member's present variant given the other members, without slack, over all sizes.
 
         Returns:
             Per member: the member with its best size, the log Bayes factor averaged over sizes with the variant's
@@ -492,7 +492,7 @@ class Around:
         self._places = {m.cause.name: np.arange(a, b) for m, a, b in zip(members, ends[:-1], ends[1:], strict=True)}
 
     def without(self, names: Collection[str]) -> tuple[Scan, float]:
-        """Return the scan given members without some, and the remaining members' log evidence."""
+        """Return the scan given all members but some, and the remaining members' log evidence."""
         if not names:
             return self._of_absent(_scanned(self._forms, self._towards, self._left), names), self._evidence
         own = np.concatenate([self._places[m.cause.name] for m in self.members if m.cause.name in names])

@@ -54,7 +54,7 @@ def modulated(
 
 
 def _other_transits(effects: Sequence[Floats], signs: Sequence[Floats], mover: int) -> Floats:
-    """Return changes of one effect if its transition after a reversal is instantaneous, and if it is delayed, shape (n, 2)."""
+    """Return two changes of one effect, for an instantaneous and for a delayed transition after reversals, shape (n, 2)."""
     found = []
     for effect, sign in zip(effects, signs, strict=True):
         own, way = effect[:, mover], np.sign(sign[:, mover])

@@ -49,7 +49,7 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
 
 
 def values_of_law(law: Law, member: Member, values: Floats, covariance: Floats, share: float) -> dict[str, Value]:
-    """Return a law's amplitudes and nonlinear parameters; `share` is the least relative uncertainty of amplitudes, and a parameter without tangent has NaN."""
+    """Return a law's amplitudes and nonlinear parameters; `share` is the least relative uncertainty of amplitudes, and without tangent a parameter's uncertainty is NaN."""
     sigma, width, every = np.sqrt(np.diag(covariance).clip(0.0)), len(member.variant.columns), len(law.plausible)
     found = {
         law.parameters[j]: Value(float(values[k]), float(np.hypot(sigma[k], share * values[k])), law.units[j])

@@ -29,7 +29,7 @@ class Noise:
 
     @property
     def effective(self) -> float:
-        """Return the white noise that affects smooth quantities equally."""
+        """Return the size of white noise that affects smooth quantities equally."""
         return self.sigma * float(np.sqrt(self.correlation_samples))
 
 

@@ -85,7 +85,7 @@ class Pattern:
     Attributes:
         samples: effects of unit amplitudes, all rows, shape (n, p), at most about one.
         form: curve over the first variable or row number; None for a product.
-        units: of amplitudes, shape (p,); empty: the channel's.
+        units: of amplitudes, shape (p,); empty for the channel's.
         per: divisors that convert to these units, shape (p,).
         tried: number of independent forms from which it was picked.
         choices: alternative forms: columns, log probability, label.

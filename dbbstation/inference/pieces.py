@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """A whitened residual over noise, with the directions of the fit.
+    """A whitened residual divided by noise, with the fitted directions.
 
     Attributes:
         axes: orthonormal fitted directions, reduced by priors, shape (n, k).
@@ -116,7 +116,7 @@ class Fitting:
         return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
 
     def without_axes(self, columns: Floats) -> Floats:
-        """Return columns over noise, shape (n, k), less their projection on `axes`, shape (n + b, k)."""
+        """Subtract from columns over noise, shape (n, k), their projection on `axes`; return shape (n + b, k)."""
         new = np.vstack([columns, np.zeros((len(self.axes) - self.rows, columns.shape[1]))])
         for _ in range(2 if self.axes.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
             new = new - self.axes @ (self.axes.T @ new)
@@ -130,7 +130,7 @@ class Fitting:
 
 
 class LeftBesideOthers:
-    """Residuals of a fit with all groups of columns but one; common parts are cached."""
+    """Residuals of a fit with all groups of columns but one."""
 
     def __init__(
         self,

@@ -1,7 +1,7 @@
 """Columns of causes with a refitted base projected out.
 
-Base columns are orthonormalised once, then for each noise with a row per prior. The projection does not square the
-base's condition number.
+Base columns are orthonormalised once, then again for each noise, with a row per prior. The projection does not square
+the base's condition number.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ class CauseColumns:
         whitened: function from columns, shape (m, q), to samples, shape (n, q), called on demand; None for identity.
 
     Attributes:
-        numbers: columns with products, if not all.
+        numbers: columns whose products are computed, if not all.
         axes: orthonormal axes of the base, shape (n, k).
-        on_axes: base along these, shape (k, k).
+        on_axes: base components along these axes, shape (k, k).
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class CauseColumns:
         return self._buffer[:, : self.count]
 
     def copy(self) -> CauseColumns:
-        """Return an independently extensible copy that shares columns."""
+        """Return a copy that shares columns; later additions are separate."""
         other: CauseColumns = copy(self)
         other._waiting = list(self._waiting)
         self._free, other._free, other._changed = [], [], list(self._changed)
@@ -185,7 +185,7 @@ class CauseColumns:
 
 
 class _Without(CauseColumns):
-    """Columns without one part's rows; axes are updated by few products."""
+    """Columns without one part's rows."""
 
     def __init__(self, whole: CauseColumns, rows: Flags, only: Integers | None) -> None:
         self._whole, self.numbers, self.count = whole, only, whole.count

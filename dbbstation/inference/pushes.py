@@ -22,7 +22,7 @@ ONE_SIZE = 0.999
 
 
 def too_many(sizes: Sequence[Value]) -> str:
-    """Return why so many sizes are not events, else an empty text."""
+    """Return why there are too many sizes for events, else an empty text."""
     distinct = distinct_sizes(sizes)
     if distinct <= MOST_PUSHES:
         return ""
@@ -33,9 +33,9 @@ def too_many(sizes: Sequence[Value]) -> str:
 
 
 def within_a_step(sizes: Sequence[Value], step: float) -> str:
-    """Return why sizes may be rounding, else an empty text.
+    """Return why sizes may be rounding errors, else an empty text.
 
-    Rounding of slow values keeps its sign over many rows, up to half a step.
+    The rounding error of slow values, up to half a step, keeps its sign over many rows.
 
     Args:
         step: zero without rounding.
@@ -51,7 +51,7 @@ def distinct_sizes(sizes: Sequence[Value]) -> int:
 
 
 def most_of_one_size(sizes: Sequence[Value]) -> list[int]:
-    """Return the largest group of equal sizes by chi-square, ascending."""
+    """Return the largest group of sizes equal by chi-square, as ascending indices."""
     order = sorted(range(len(sizes)), key=lambda k: sizes[k].value)
     best: range = range(0)
     for first in range(len(order)):

@@ -61,10 +61,10 @@ class CauseFinding:
         rows_there: number of rows with the effect; 0 if not computed.
         rows: first and last row of each stretch; may be empty.
         equivalent: indistinguishable causes, this one first; may be empty.
-        ambiguous_with: causes of which one is present if this is not.
+        ambiguous_with: if this cause is absent, one of these is present.
         gains: held-out gains; None if not tested.
         persists: whether held-out parts confirm a single event.
-        recurs: whether a wave over time is found without each predicted part.
+        recurs: whether every selection that omits a part finds a wave over time.
     """
 
     name: str
@@ -293,7 +293,7 @@ class CauseJudge:
         return frozenset() if name in self._members else self._levels.instead_of(name)
 
     def _alike(self, name: str) -> str:
-        """Return a member equivalent to a cause, alone or with others; may be empty."""
+        """Return a member equivalent to a cause or ambiguous with it; may be empty."""
         equal = any(name in names for names in self._classes.values())
         if self.is_catalogue and not equal and self._alternatives.probability((name,)) <= ABSENT:
             return ""

@@ -1,7 +1,7 @@
-"""Find where a residual differs from noise: harmonic, run, pulse.
+"""Find where a residual differs from noise.
 
-A total sum of squares hides single features. Probabilities are multiplied by the number of trials [Bonferroni; Miller,
-Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
+A total sum of squares hides single features. Probabilities are multiplied by the number of trials [Bonferroni; see
+`left_over`].
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class _How:
     work: SearchWork = field(default_factory=SearchWork)
 
     def part(self, stages: int) -> _How:
-        """Return the options for one of several stages, with its share of the work."""
+        """Return one stage's options, with its share of the work."""
         return replace(self, work=self.work.part(stages))
 
 

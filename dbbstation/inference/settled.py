@@ -71,11 +71,11 @@ class Settled:
         return total
 
     def base_values(self, effect: Floats | None = None) -> Floats:
-        """Return the refitted base's values, shape (k,), given an effect; None for all members."""
+        """Return the refitted base's values, shape (k,), given an effect; None for all members' effect."""
         return self.bank.base_values(self.effect() if effect is None else effect)
 
     def predicted(self) -> Floats:
-        """Return base and members over all rows, shape (n,)."""
+        """Return the sum of base and members over all rows, shape (n,)."""
         effect = self.effect()
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
 

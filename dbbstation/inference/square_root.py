@@ -69,7 +69,7 @@ class Spreads:
         )
 
     def square_of(self, columns: Integers, rows: Floats) -> float:
-        """Return the trace of rows, shape (r, j), times covariance times rows."""
+        """Return the trace of R C R^T for rows R, shape (r, j), and covariance C."""
         square = float(np.sum((rows @ self.shared[columns]) ** 2))
         for group, root in self.own:
             _, place, within = np.intersect1d(columns, group, assume_unique=True, return_indices=True)
@@ -188,7 +188,7 @@ def chi2_without(
     held: Floats,
     parts: Sequence[Sequence[int]],
 ) -> list[float]:
-    """Return the chi-square without each part's blocks, with priors."""
+    """Return, for each part, the chi-square of priors and blocks outside it."""
     towards = known.scale[~known.random][:, None] * complement(held).T
     found = []
     for root, target, floor in triangles_without(blocks, known, noise, parts):
@@ -206,7 +206,7 @@ def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> Fl
 
 
 def unseen_combinations(blocks: Sequence[Block], known: Columns, noise: float, held: Floats) -> Floats:
-    """Return combinations that blocks do not determine, with sizes by scale, shape (h, k)."""
+    """Return combinations that blocks do not determine, in units of the scales, shape (h, k)."""
     # Directions lost at the first linearisation change until the solution, so other columns are adjusted by least
     # squares. Combinations are orthonormal in scaled columns, with zero random effects.
     combinations = np.zeros((len(held), len(known.prior)))
@@ -229,7 +229,7 @@ def directions_of(seen: Floats) -> Directions:
 
 
 def complement(rows: Floats) -> Floats:
-    """Return the orthonormal complement."""
+    """Return orthonormal rows orthogonal to these."""
     if len(rows) == 0:
         return np.eye(rows.shape[1])
     _, _, vt = np.linalg.svd(rows, full_matrices=True)
@@ -237,7 +237,7 @@ def complement(rows: Floats) -> Floats:
 
 
 def free_directions(base: Columns, fitted: Integers, held: Floats) -> Floats:
-    """Return fitted columns along free directions of scaled columns, shape (f, free)."""
+    """Return free directions of scaled columns, times their scales, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])
     return base.scale[fitted][:, None] * complement(held).T

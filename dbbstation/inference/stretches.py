@@ -80,10 +80,10 @@ def refined(
     clock: Clock | None = None,
     direction: Floats | None = None,
 ) -> Pattern:
-    """Return a pattern of its first stretches with optimised ends.
+    """Return the pattern's first stretches, with optimised ends, as a pattern.
 
     Args:
-        lefts: function from a stretch's number and all columns, shape (n, count), to the residual without it.
+        lefts: function from a stretch's number and all columns, shape (n, count), to the residual without this stretch.
     """
     clock = Clock.plain(len(kept)) if clock is None else clock
     factor = np.ones(len(kept)) if direction is None else direction

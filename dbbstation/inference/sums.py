@@ -41,7 +41,7 @@ class Sums:
     base: Floats
 
     def explained(self, curves: Floats) -> Floats:
-        """Return squares explained by curves, shape (b, m, p), given the base, shape (m,)."""
+        """Return the squares, shape (m,), that curves, shape (b, m, p), explain given the base."""
         pieces, many, count = curves.shape
         flat = curves.reshape(pieces, many * count).T
         rest = (flat @ self.rest).reshape(many, count, -1)
@@ -72,12 +72,12 @@ class Sums:
         return solved(sides(transformed(self.rest, 1)), of_base, squares(self.gains.sum(axis=0), twice))
 
     def best(self, forms: Sequence[Form], most: int) -> list[tuple[float, Form]]:
-        """Return the local maxima of a list with explained squares, best first."""
+        """Return the locally best forms of a list with explained squares, best first."""
         explained = self.of_forms(forms)
         return [(float(explained[k]), forms[k]) for k in peaks(explained, most)]
 
     def finer(self, frequencies: Iterable[float], extent: float) -> list[tuple[float, Wave]]:
-        """Optimise waves' frequencies near given ones; return them with explained squares, best first.
+        """Optimise waves near given frequencies; return waves with explained squares, best first.
 
         Args:
             extent: of the variable.

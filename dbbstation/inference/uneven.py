@@ -47,7 +47,7 @@ QUIET = 1e-4
 
 
 def most_probable_tails(new: Floats) -> tuple[Floats, float]:
-    """Return root weights, shape (m,), and the best degrees of freedom of innovations."""
+    """Return square roots of innovations' weights, shape (m,), and the best degrees of freedom of Student's t."""
     squares = np.square(new)
     best, found = -np.inf, (np.ones(len(new)), np.inf)
     for tails in TAILS:
@@ -68,7 +68,7 @@ def student_likelihood(new: Floats, tails: float) -> float:
 
 
 def widening_of(tails: float) -> float:
-    """Return the variance of an estimate over its value at fixed weights, (t + 3) / (t + 1) [Lange, Little and Taylor 1989, sec. 3]."""
+    """Return the ratio of an estimate's variance to its variance at fixed weights, (t + 3) / (t + 1) [Lange, Little and Taylor 1989, sec. 3]."""
     return 1.0 + 2.0 / (tails + 1.0)
 
 

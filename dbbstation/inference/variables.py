@@ -51,7 +51,7 @@ class Variable:
     Attributes:
         period: one turn of an angle, in its unit; else None.
         driven: True if it results from the simulation, so the difference may cause it.
-        range: of the rows to which effects were fitted, if different.
+        range: range of the fitted rows, if different.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Variable:
 
     @property
     def distinct(self) -> int:
-        """Return the number of different values; for rows that were not fitted it has no meaning."""
+        """Return the number of different values; meaningless for rows that were not fitted."""
         return len(np.unique(self.values)) if self.range is None else len(self.values) + MANY
 
     @property
@@ -108,8 +108,8 @@ class Variable:
     def directions(self, blocks: Sequence[slice]) -> Floats:
         """Return each row's direction: 1 up, -1 down, shape (n,).
 
-        Speed gives the direction along a path, the previous pose gives it between poses. Stationary rows keep the last
-        direction, or have the next one before a block's first motion.
+        Along a path, speed gives the direction; between poses, the previous pose. Stationary rows keep the last
+        direction; before a block's first motion they have the next direction.
         """
         return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
 

@@ -58,7 +58,8 @@ class Gains:
     """An effect's gain in each held-out part, with selection repeated.
 
     Attributes:
-        parts: squared errors without the effect, others refitted, less squared errors with it; zero if not selected.
+        parts: squared errors without the effect, other effects refitted, minus squared errors with it; zero if not
+            selected.
     """
 
     parts: tuple[float, ...]
@@ -73,7 +74,7 @@ class Gains:
     @computed_field  # type: ignore[prop-decorator]
     @property
     def total(self) -> float:
-        """Return the sum over all parts."""
+        """Return the total gain."""
         return sum(self.parts)
 
     @property
@@ -89,7 +90,7 @@ class Gains:
 
     @property
     def without_best(self) -> float:
-        """Return the total gain without the best part."""
+        """Return the gain summed over all parts but the best."""
         return self.total - max(self.parts, default=0.0)
 
     @computed_field  # type: ignore[prop-decorator]
@@ -103,13 +104,13 @@ class Gains:
 class DensityGains(Gains):
     """An effect's gain in log predictive density.
 
-    Parts that hardly show the effect contribute little, and the sum is evidence [Good, J. R. Stat. Soc. B 14 (1952)
-    107], so gaining parts are not counted.
+    Parts that hardly show the effect contribute little, and the sum is evidence [Good 1952; see `chosen_anew`], so
+    gaining parts are not counted.
     """
 
     @property
     def predicts(self) -> bool:
-        """Return whether the held-out parts without the best surely favour the effect."""
+        """Return whether the held-out parts but the best, together, surely favour the effect."""
         return self.without_best >= math.log(SURE / ABSENT)
 
 

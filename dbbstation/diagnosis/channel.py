@@ -133,7 +133,7 @@ class CircleChannel:
         return any(source.happens_once for own, source in self.sources.items() if own[0] == name)
 
     def to_whole(self, variant: Variant) -> Floats:
-        """Return the matrix from a form's to the cause's amplitudes, shape (p, q)."""
+        """Return the matrix from a form's amplitudes to the cause's, shape (p, q)."""
         if not len(variant.whole):
             return np.eye(len(variant.columns))
         same = (variant.whole[:, None] == variant.columns).astype(np.float64)
@@ -148,13 +148,13 @@ class CircleChannel:
     ) -> BesideBase:
         """Return causes with the base projected out; balls scatter `scatter` times as much as stated.
 
-        Held-out rows, shape (n,), need zero targets. `only` are the needed columns, None for all.
+        Targets must be zero in held-out rows `but_for`, shape (n,). `only` are the needed columns, None for all.
         """
         columns = self.columns if but_for is None else self.columns.but_for(but_for, only)
         return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> Floats:
-        """Return the target for base and causes, linearised about a fit, (n,)."""
+        """Return the target for base and causes, linearised about a fit, shape (n,)."""
         base = len(self.base.prior)
         known = fit.x[:base] - fit.layout.nominal[:base]
         # The part explained by fitted columns is projected out anyway; omitting it reduces rounding.

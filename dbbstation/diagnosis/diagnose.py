@@ -196,7 +196,7 @@ def rough_formulas(settled: SettledCircles) -> list[str]:
 def usable_sources(
     machine: Machine, observations: Sequence[Observation], sources: Sequence[ErrorSource]
 ) -> tuple[list[ErrorSource], dict[str, str]]:
-    """Return the usable forms of sources, and the reasons against others, by name."""
+    """Return the usable forms of sources, and reasons against unusable ones, by name."""
     usable: list[ErrorSource] = []
     lacking = {}
     motions = [observation.motion() for observation in observations]

@@ -1,7 +1,7 @@
 """Inaccuracy of causes' formulas, as effects modulated along a variable.
 
 Effects may vary with strut length or direction, and growth may follow another law. Smooth modulations represent these
-departures [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+departures [Kennedy and O'Hagan 2001, sec. 4].
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
-    """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula."""
+    """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula's inaccuracy."""
     changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
     return np.vstack(changes) / source.form_uncertainty
 
@@ -105,7 +105,7 @@ def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]
 def _strut_contributions(
     source: ErrorSource, motion: Motion, machine: Machine, values: Floats, reading: BarReading
 ) -> Floats | None:
-    """Return a source's effect on the reading through each strut, shape (n, 6) [mm]; None if it also acts elsewhere."""
+    """Return a source's effect on the reading through each strut, shape (n, 6) [mm]; None if the source also acts elsewhere."""
     model = MachineModel(machine, (Fitted(source, values, source.shared_by(motion)),))
     effect = model.effect(motion, reading.actual)
     others = (
@@ -149,7 +149,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> Floats:
 
 
 def _followed(source: ErrorSource, known: Mapping[str, Floats], motion: Motion) -> Floats:
-    """Return variables for another source's slack, shape (n, q)."""
+    """Return variables for a non-strut source's slack, shape (n, q)."""
     name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:
         return known[name][:, None]

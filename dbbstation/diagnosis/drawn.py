@@ -36,7 +36,7 @@ class GainOfTest:
 
     @property
     def gain_um(self) -> float:
-        """Return the reduction [µm]."""
+        """Return the residual's reduction [µm]."""
         return self.residual_um[0] - self.residual_um[1]
 
 

@@ -191,7 +191,7 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _of_formulas(group: Sequence[Fitted], variance: Floats) -> Floats:
-    """Return parameter changes by formula errors, a column per source, shape (p, sources)."""
+    """Return parameter changes due to formula errors, a column per source, shape (p, sources)."""
     sources = list(dict.fromkeys(f.source.name for f in group))
     owner = np.concatenate([np.full(len(f.values), sources.index(f.source.name)) for f in group])
     share = np.sqrt(variance) * np.sign(np.concatenate([f.values for f in group]))
@@ -250,7 +250,7 @@ def _u_of_mean(
     spread: Sequence[Floats | None],
     changed_um: Callable[[CuredCircle, list[Floats]], Floats],
 ) -> float | None:
-    """Return the standard uncertainty of a figure's mean over all runs, from its changes by lengths; None if unknown."""
+    """Return the standard uncertainty of a figure's mean over all runs, from its changes with length; None if unknown."""
     found = []
     for circle, answers in zip(circles, spread, strict=True):
         if answers is None:

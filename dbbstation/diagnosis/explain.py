@@ -208,13 +208,13 @@ def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
 
 
 def _by_other_laws(settled: SettledCircles, member: Member) -> list[Member]:
-    """Return a member with each other law of its cause, because a law on its grid cannot compete with a refined one."""
+    """Return a member once with each other law of its cause, because a law on its grid cannot compete with a refined one."""
     scan = settled.comparison.scan(_lawful(settled.best, member.cause.name), other_laws(member))
     return [replace(one, cause=member.cause) for one in scan.best]
 
 
 def _lawful(best: Hypothesis, *but_for: str) -> tuple[Member, ...]:
-    """Return the members of a joint fit, without unnamed effects: these would fit a law's error at its start and preserve it."""
+    """Return the members of a joint fit, without unnamed effects, because these would fit a law's initial error and preserve it."""
     return tuple(one for one in best.without(*but_for) if one.cause.named or one.cause.setup)
 
 

@@ -1,4 +1,4 @@
-"""Results of a diagnosis: verdicts, places, values with uncertainty."""
+"""Results of a diagnosis."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Curve:
     Attributes:
         strut: 1 to 6; None for all struts or none.
         period: of a wave, in the variable's unit; else None.
-        direction: of the strongest motion, 3 to 6 numbers by `convention`; empty for a scalar.
+        direction: of the strongest motion, 3 to 6 components as in `convention`; empty for a scalar.
         convention: removed part that fitted parameters can explain.
         unconcealed_um: part that fitted machine parameters do not absorb.
         points: ascending; linear or a wave in between.
@@ -189,7 +189,7 @@ class NextTest:
 
     Attributes:
         source: cause to reveal or distinguish.
-        sigma_before: standard uncertainty of its amplitude, or most improved combination, with earlier tests.
+        sigma_before: standard uncertainty by earlier tests: of its amplitude, or of the most improved combination.
     """
 
     text: str

@@ -54,7 +54,7 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
 
 
 def predicted_without(explained: Explained, left_out: Sequence[Collection[str]]) -> list[float]:
-    """Return rms errors of held-out tests with base and causes, once without each set [mm]; a displaced ball stays in its test."""
+    """Return the rms error of held-out tests [mm] after omitting each set of causes; a displaced ball stays in its test."""
     channel, settled = explained.channel, explained.settled
     members = [m for m in settled.best.members if not m.cause.setup]
     variants = [member.variant for member in members]

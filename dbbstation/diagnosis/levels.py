@@ -127,7 +127,7 @@ def circle_levels(explained: Explained, outcome: Settled, gains: KnownGains | No
 
 
 def _happened(outlier: Outlier) -> Followed:
-    """Return the class for a ball, bar or run excluded from the fit [µm]."""
+    """Return a ball, bar or run excluded from the fit as a class, in µm."""
     variable = {OutlierKind.RUN: RUN, OutlierKind.BAR: BAR}.get(outlier.kind, BALL)
     return Followed(
         ((variable,),), (), FollowsAnswer.HAPPENED, 1.0, {}, outlier.size_um, (), where=outlier.runs or outlier.test

@@ -38,7 +38,7 @@ class Part:
 
 
 def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
-    """Return forms with log weights: equal for kinds, and for forms within a kind."""
+    """Return forms with log weights; kinds weigh equally, as do a kind's forms."""
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets
     kinds = [[("", every)]]

@@ -160,7 +160,7 @@ class TemplateScan:
         ends = np.concatenate([[0], np.cumsum(number)])
 
         def added(samples: NDArray[np.floating], times: Floats | None = None) -> Floats:
-            """Return samples times factors, summed over bins."""
+            """Return sums over bins of samples times factors."""
             weights = np.ones(many) if times is None else times[rows]
             return np.asarray(csr_array((weights, rows, ends), shape=(len(number), many)) @ samples, dtype=np.float64)
 
@@ -214,7 +214,7 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
 
 
 def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
-    """Return one strut's waves and ringing for all struts, because two struts' forms may be indistinguishable."""
+    """Return waves and ringing of one strut also for all struts, because two struts' forms may be indistinguishable."""
     kept: list[Shape] = []
     for shape in sorted(found, key=lambda one: -one.explained):
         if shape.strut is None or shape.kind not in {"wave", "ringing"}:

@@ -156,7 +156,7 @@ def _samples(
 
 
 def _warmer_k(calibration: Calibration, name: str, motion: Motion) -> Floats:
-    """Return a source's thermometers' rise, shape (n, 1) or (n, 6) [K]."""
+    """Return temperature rises at a source's thermometers, shape (n, 1) or (n, 6) [K]."""
     own = (t.source for t in calibration.layout.terms if t.source.name == name)
     return next(source.warmer_k(motion) for source in own if isinstance(source, FollowsTemperature))
 

@@ -27,7 +27,7 @@ def sectors_for(runs: int) -> int:
 
 
 def thinned(observation: Observation, most: int = BOUNDS.samples_per_turn) -> Observation:
-    """Return the run averaged over sectors, with its commands; short runs are returned unchanged."""
+    """Return the run averaged over sectors, with its commands; short runs are unchanged."""
     raw = observation.raw
     if len(raw) <= most:
         return observation

@@ -140,7 +140,7 @@ class _Piece:
     """An effect along its strongest direction.
 
     Attributes:
-        amplitudes: without the conventional part, shape (p,).
+        amplitudes: without the part removed by convention, shape (p,).
         to_points: matrix from amplitudes to points, shape (n, p).
     """
 

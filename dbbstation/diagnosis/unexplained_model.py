@@ -120,7 +120,7 @@ def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
 
 
 def _to_all(each: int, strut: int | None) -> Floats:
-    """Return the matrix from one strut's or shared parameters to all struts' parameters, shape (6 each, each)."""
+    """Return the matrix from one strut's parameters, or shared ones, to all struts' parameters, shape (6 each, each)."""
     chosen = np.ones(STRUTS) if strut is None else np.eye(STRUTS)[strut - 1]
     return np.kron(chosen[:, None], np.eye(each))
 

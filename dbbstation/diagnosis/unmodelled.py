@@ -52,7 +52,7 @@ class Unmodelled:
     def look(self, fit: Calibration, best: Sequence[Member], noise_mm: float) -> None:
         """Search the residual of base and named causes for waves, bumps, steps and pulses, and add them.
 
-        Effects of earlier searches outside the best set are dropped; the new search finds them again unless a named cause explains them.
+        Effects of earlier searches outside the best set are dropped first.
         """
         members = [member for member in best if member.cause.named]
         channel = self.channel

@@ -144,7 +144,7 @@ class _CircleJudge(CauseJudge):
         return sorted(found)
 
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
-        """Return values of the joint fit; for an absent cause, amplitudes whose uncertainty bounds an undetected effect."""
+        """Return the finding's `parameters`."""
         if member.cause.name in self._members:
             return self._fitted(member.cause.name)
         source = self._circles.source_of(member.cause.name, member.variant)

@@ -1,4 +1,4 @@
-"""Error over the workspace by missing effects: difference between two models' tool positions."""
+"""Error over the workspace due to missing effects."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class WorkspaceError:
     """Difference of tool position between the earlier calibration and the joint model, over the workspace.
 
     Attributes:
-        error_greatest_um: greatest length about the common shift.
+        error_greatest_um: greatest difference after subtracting the common shift.
         at_pose: pose of the greatest error, X, Y, Z, A, B, C [mm, deg].
         uncertainty_rms_um: rms standard uncertainty of the joint model without the common shift; None if unknown.
         common_shift_um: mean error along X, Y and Z, which a program's zero on the part removes.

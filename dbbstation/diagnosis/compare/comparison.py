@@ -1,4 +1,4 @@
-"""Compare two sessions: whether they differ, where, how and why."""
+"""Compare two sessions and explain their difference."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Comparison:
 
     @property
     def directions(self) -> DirectionHalves | None:
-        """Return the findings' parts equal and opposite in both directions, or None."""
+        """Return the findings' parts as in `DirectionHalves`, or None."""
         both = np.array(
             [[self.runs[k].found_mm for k in runs] for runs in both_directions([run.pair for run in self.runs])]
         )
@@ -229,7 +229,7 @@ def _run(pair: Pair, settled: Settled, rows: slice, order: Integers, found: Floa
 
 
 def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> Floats:
-    """Return the variances of a run's constant, first cosine and first sine by stated balls, bars and starts [mm²]."""
+    """Return the variances of a run's constant, first cosine and first sine due to stated balls, bars and starts [mm²]."""
     base = settled.channel.base
     by_angle = np.empty((len(columns), len(base.prior)))
     by_angle[order] = base.samples[rows] * base.prior
@@ -237,7 +237,7 @@ def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> 
 
 
 def _by_angle_um(theta_deg: Floats, smooth_mm: Floats) -> tuple[float, ...]:
-    """Return 36 means over ten degrees from +X [µm]."""
+    """Return 36 means over ten degrees each, from +X [µm]."""
     sector = (theta_deg * (BOUNDS.arcs_told / 360.0)).astype(np.int64)
     count = np.bincount(sector, minlength=BOUNDS.arcs_told)
     return tuple((1e3 * np.bincount(sector, smooth_mm, minlength=BOUNDS.arcs_told) / np.maximum(count, 1)).tolist())

@@ -51,7 +51,7 @@ class RunDifference:
 
 @dataclass(frozen=True)
 class DirectionHalves:
-    """Parts of the difference equal and opposite in both directions.
+    """Parts of the difference with equal and with opposite sign in both directions.
 
     Attributes:
         opposite_um: rms of the part with changing sign.
@@ -66,7 +66,7 @@ class LargestEffect:
     """The run and angle of a cause's largest effect.
 
     Attributes:
-        theta_deg: arc of at least half its peak, from and to.
+        theta_deg: start and end of the arc with at least half the peak.
     """
 
     test: str

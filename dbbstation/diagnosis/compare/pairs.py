@@ -36,7 +36,7 @@ class Pair:
 
     Attributes:
         number: of the run in its test and direction, from 1.
-        a_mm: raw less commanded length of A at sector middles from +X, shape (s,).
+        a_mm: raw minus commanded length in A at sector middles from +X, shape (s,).
     """
 
     a: tuple[Observation, ...]
@@ -72,7 +72,7 @@ class Pair:
 
     @property
     def difference_mm(self) -> Floats:
-        """Return B less A, interpolated over empty sectors, shape (s,) [mm]."""
+        """Return B minus A, interpolated over empty sectors, shape (s,) [mm]."""
         difference = self.b_mm - self.a_mm
         there = np.isfinite(difference)
         return np.interp(self.theta_deg, self.theta_deg[there], difference[there], period=FULL_TURN_DEG)
@@ -145,7 +145,7 @@ class Sectors:
     """Averages samples of a turn at sector middles.
 
     Samples are shifted along the run's smooth curve before averaging, because 0.1 mm off centre changes 0.4 µm per
-    quarter degree. Noise is unchanged.
+    quarter degree.
 
     Attributes:
         there: filled sectors, shape (q,).
@@ -178,7 +178,7 @@ class Sectors:
 
 
 def at_common_angles(raw: RawCircle, sectors: int) -> Floats:
-    """Return raw less commanded length at sector middles, shape (sectors,) [mm]; NaN for empty sectors."""
+    """Return raw minus commanded length at sector middles, shape (sectors,) [mm]; NaN for empty sectors."""
     poses = raw.circle.poses(raw.theta_deg)
     deviation = raw.length_mm - np.linalg.norm(poses[:, :3] - np.array(raw.circle.ball_mm), axis=1)
     return Sectors.of(raw.theta_deg, sectors).at_middles(deviation)

@@ -1,4 +1,4 @@
-"""Set-up errors of two sessions, of stated size and beyond."""
+"""Set-up errors of two sessions, within and beyond their stated size."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _per_degree(pair: Pair) -> Floats:
 
 
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, Floats, Floats]]:
-    """Yield tests that share a source's values, its columns, shape (n, p), and stated sizes, shape (p,) [mm]."""
+    """Return tests that share a source's values, with its columns, shape (n, p), and stated sizes, shape (p,) [mm]."""
     # If runs share the error in both sessions, the variances add.
     shared = [[source.shared_by(motion) for motion in motions] for motions in sides.motions]
     together = list(zip(*shared, strict=True))
@@ -104,7 +104,7 @@ def _sd(source: ErrorSource, motion: Motion) -> Floats:
 
 
 def set_up_laws(sides: Sides) -> list[Law]:
-    """Return laws for balls and bars with errors beyond their stated size, single or all."""
+    """Return laws for balls and bars with errors beyond their stated size, of one or of all."""
     found: list[Law] = []
     named: set[tuple[str, ...]] = set()
     for source in sources_named(SET_UP):
@@ -172,7 +172,7 @@ def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
 
 
 def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
-    """Return whether a class without strut or direction is one common curve over the angle in several tests."""
+    """Return whether a class without strut or direction is the same curve over the angle in several tests."""
     several = len({pair.test for pair in sides.pairs}) > 1
     if not several or not OF_THE_READING.issuperset(name for names in one.variables for name in names):
         return False

@@ -30,7 +30,7 @@ class Sides:
     """Rows are ordered by pair, then B's travel; motions keep their own samples.
 
     Attributes:
-        runs: of A and B per pair; the first one of averaged repeats.
+        runs: A's and B's run per pair; the first run of averaged repeats.
     """
 
     machine: Machine
@@ -104,7 +104,7 @@ class Sides:
         return found
 
     def groups(self, source: ErrorSource) -> Integers:
-        """Return groups in which each pair's runs share values, in both sessions, shape (r,)."""
+        """Return each pair's group of shared values in both sessions, shape (r,)."""
         names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
         order = list(dict.fromkeys(names))
         return np.array([order.index(name) for name in names], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Unmodelled differences between sessions: of reading, struts, balls, table, or single tests."""
+"""Unmodelled differences between sessions."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _times(sides: Sides) -> list[Variable]:
 
 
 def of_readings(variables: Sequence[Variable], sides: Sides, time: Floats) -> list[Pattern]:
-    """Return effects on the reading; speed matters only by its direction."""
+    """Return effects on the reading; of speed only the direction matters."""
     every = patterns(variables, sides.blocks, time, None)
     return [pattern for pattern in every if pattern.family is not Family.SPEED]
 

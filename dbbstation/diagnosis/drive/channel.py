@@ -63,7 +63,7 @@ class DriveChannel:
     """A channel and the sources of its laws.
 
     Attributes:
-        scale: sizes, with waves of a first search.
+        scale: sizes, and waves of a first search.
         shortest_wave_mm: shortest searched wave; infinite without a search.
     """
 

@@ -86,7 +86,7 @@ class DriveSource(ABC):
 
     @abstractmethod
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
-        """Return forms; empty if these recordings cannot show it."""
+        """Return forms; empty if these recordings cannot show the cause."""
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         """Return whether values are possible for this cause."""

@@ -183,7 +183,7 @@ class HeldOutForce:
     Attributes:
         reference: rms error with mass, viscous and Coulomb friction.
         corrected: rms error with all findings except events in time.
-        worse: whether this exceeds `reference`.
+        worse: whether `corrected` exceeds `reference`.
         gains: by source [N²].
     """
 

@@ -72,7 +72,7 @@ class DriveFit:
         return next(law for law in self.drive.channel.laws if law.name == name)
 
     def parameters(self, name: str) -> dict[str, Value]:
-        """Return a law's amplitudes and nonlinear parameters; without tangent, a parameter's uncertainty is the length of its grid."""
+        """Return a law's amplitudes and nonlinear parameters; without tangent, a parameter's uncertainty is its grid's last value."""
         member, law, start = self.member(name), self._law(name), self.columns_of(name).start
         own = slice(start, start + len(member.columns))
         found = values_of_law(law, member, self.values[own], self.covariance[own, own], METHOD_U_SHARE)
@@ -176,7 +176,7 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
 
 
 def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise: float) -> DriveFit:
-    """Return the fit with uncertainties widened by results without stretches and with half the bandwidth."""
+    """Widen the fit's uncertainties to include results without each stretch and with half the bandwidth."""
     # Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
     # 1.5].
     stretch = np.arange(len(rows)) * FOLDS // len(rows)

@@ -1,4 +1,4 @@
-"""Find what recordings cannot determine, by their accelerations, speeds and reversals."""
+"""Find which parameters recordings cannot determine."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ equation also holds for low-passed weighted columns,
 h * (w F) = sum of theta_k h * (w phi_k),
 
 for any force at w = 0. Divided by h * w, each term is a local mean over moving samples. [Normalized convolution:
-Knutsson and Westin, Normalized and differential convolution, CVPR 1993, 515, eq. 4]
+Knutsson and Westin, CVPR 1993, 515, eq. 4]
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ EDGE_PERIODS = 3.0
 
 
 def low_passed(columns: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
-    """Return low-passed columns, shape (n,) or (n, p), without phase shift, constant beyond ends."""
+    """Low-pass columns, shape (n,) or (n, p), without phase shift; beyond the ends they are constant."""
     bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
     sos = np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
     beyond = min(_reach(rate_hz, cutoff_hz), len(columns) - 1)
@@ -61,7 +61,7 @@ def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -
 
 
 def within(marked: Flags, by: int) -> Flags:
-    """Return samples within `by` of marked ones, shape (n,)."""
+    """Mark samples within `by` samples of marked ones, shape (n,)."""
     count = np.concatenate([[0], np.cumsum(marked)])
     at = np.arange(len(marked))
     return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
@@ -76,7 +76,7 @@ def weights(unknown: Flags, rise: int) -> Floats:
 
 
 def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
-    """Return the length of this rise that limits edge noise in the acceleration."""
+    """Return the shortest rise of weights [samples] that limits edge noise in the acceleration."""
     response = impulse_response(rate_hz, cutoff_hz)
     at = np.arange(len(response)) - len(response) // 2
     own, unit = _of_second_difference(response), noise_m * rate_hz**2

@@ -32,8 +32,8 @@ class Edges:
     """Edges of stretches.
 
     Attributes:
-        at_turns: number at starts, stops or reversals.
-        share: part of time at these, strictly between 0 and 1.
+        at_turns: number of edges at starts, stops or reversals.
+        share: share of time at these, strictly between 0 and 1.
     """
 
     count: int
@@ -42,7 +42,7 @@ class Edges:
 
     @property
     def pushed(self) -> float:
-        """Return the probability that edges are independent of motion, instead of errors of a law at turns.
+        """Return the probability that edges are independent of motion, and not errors of a law at turns.
 
         Binomial likelihood, uniform prior; prior odds of a wrong law are one in twenty.
         """
@@ -80,7 +80,7 @@ def distinct_pushes(parts: Sequence[CausePart]) -> int:
 
 
 def equal_pushes(parts: Sequence[CausePart]) -> list[CausePart]:
-    """Return the largest group of one size, in order."""
+    """Return the largest group of equal pushes, in order."""
     return [parts[k] for k in most_of_one_size(_sizes_of(parts))]
 
 
@@ -153,7 +153,7 @@ def _peak(
     values: Floats,
     differ: Callable[[Floats, Floats], bool],
 ) -> tuple[float, float, Floats] | None:
-    """Return the shortest significant level and its height over the merged surroundings; or None."""
+    """Merge the surroundings of the shortest significant level; return its times and its height over them, or None."""
     found: list[tuple[float, int]] = []
     for k in range(1, len(levels) - 1):
         before, own, behind = (level for *_, level in levels[k - 1 : k + 2])

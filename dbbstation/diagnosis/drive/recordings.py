@@ -67,7 +67,7 @@ class Recordings:
 
     @cached_property
     def lost_share(self) -> float:
-        """Return the acceleration's relative loss by differences over one and two samples, (w h)²/12 and (2 w h)²/12."""
+        """Return the acceleration's relative loss by differences over one sample, (w h)²/12; over two it is (2 w h)²/12."""
         over_one = self.motion[:, 0]
         over_two = self.compared(lambda s: acceleration_over_two(s.measured_m, s.rate_hz))
         return max(float(over_one @ (over_one - over_two)) / 3.0 / max(float(over_one @ over_one), 1e-300), 0.0)

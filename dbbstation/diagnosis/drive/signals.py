@@ -83,7 +83,7 @@ class Signals:
     Attributes:
         position_m: smoothed by local parabolas.
         acceleration_m_s2: of the low-passed position.
-        cutoff_hz: of the band.
+        cutoff_hz: cut-off of the band.
         standing_m_s: limit of standstill.
         way: direction of travel between turning points, +1 or -1, shape (n,).
         weight: zero for unknown forces, shape (n,).
@@ -145,7 +145,7 @@ class Signals:
 
     @cached_property
     def turns(self) -> Flags:
-        """Mark starts, stops and reversals, with half a cut-off period on each side, shape (n,)."""
+        """Mark samples within half a cut-off period of starts, stops and reversals, shape (n,)."""
         acceleration = np.abs(self.acceleration_m_s2)
         changing = (self.direction == 0.0) | (acceleration > ACCELERATING_SHARE * acceleration.max())
         stretch, _ = label(changing)

@@ -146,7 +146,7 @@ class Verdicts(CauseJudge):
         return Verdict.AMBIGUOUS, (), why
 
     def _pushes(self) -> dict[str, Sequence[Value]]:
-        """Return sizes of pushes; stretches of all members are combined to levels between edges, counted for the first member."""
+        """Return sizes of pushes by member; stretches of all members are combined and counted for the first member."""
         patterns = self._settled.bank.patterns
         found = {name: own for name, own in super()._pushes().items() if patterns[name].family is Family.PULSES}
         if not self._pulses:

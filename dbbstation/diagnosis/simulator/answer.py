@@ -1,4 +1,4 @@
-"""Findings on a simulator: port, form, size, prediction."""
+"""Findings on a simulator."""
 
 from __future__ import annotations
 
@@ -304,7 +304,7 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[RefittedOfSimulator, 
 
 
 def _uncertainties(rows: Floats, known: Floats) -> Floats:
-    """Return standard uncertainties of unit white rows, shape (m,)."""
+    """Return parameters' standard uncertainties for unit white noise, shape (m,)."""
     normal = rows.T @ rows + np.diag(known)
     norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-14, hermitian=True)

@@ -34,7 +34,7 @@ class Simulator(ABC):
 
         Args:
             inputs: `t` [s] and the inputs by name, shape (n,).
-            parameters: and initial states, by name.
+            parameters: parameters and initial states, by name.
         """
 
 

@@ -23,7 +23,7 @@ def log_density(
     residual: Floats,
     columns: Floats,
 ) -> float:
-    """Return the log density of rows for a refit to others [Good, J. R. Stat. Soc. B 14 (1952) 107]; Student's t for long tails.
+    """Return the log density of rows for a refit to other rows [Good 1952]; Student's t for long tails.
 
     Args:
         rows: predicted rows, shape (n,).

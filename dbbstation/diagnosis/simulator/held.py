@@ -37,7 +37,7 @@ class PredictedPart(Fold):
 
     Attributes:
         where: its rows, shape (n,).
-        of_classes: by followed signals, gain of log density, and rms error without the class; the empty set for all
+        of_classes: gain of log density, and rms error without the class, by its signals; the empty set is for all
             terms.
     """
 

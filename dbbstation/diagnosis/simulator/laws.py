@@ -37,7 +37,7 @@ def laws(
     size: float,
     curved_most: float,
 ) -> tuple[list[Law], dict[str, str]]:
-    """Return candidates as laws linearised about a state, and the reasons against others.
+    """Return candidates as laws linearised about a state, and reasons against other candidates.
 
     Args:
         curved_most: relative difference of responses that excludes a candidate.
@@ -161,7 +161,7 @@ def _law(one: Candidate, columns: Floats, size: float, off: Departures) -> Law:
 
 
 def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: float) -> Law | None:
-    """Return the law for replacing a signal by share and size; None without effect."""
+    """Return the law of a replaced signal, with share and size as parameters; None without effect."""
     before = work.residuals([state])[0]
     states = [PerturbedParameter((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
     answers = [before - after for after in work.residuals(states, strict=False)]

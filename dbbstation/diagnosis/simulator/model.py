@@ -35,7 +35,7 @@ class SimulatorParameter:
 
     @property
     def size(self) -> float:
-        """Return its scale: uncertainty or value."""
+        """Return the parameter's scale: uncertainty, else value."""
         return self.uncertainty or abs(self.value) or 1.0
 
 

@@ -77,7 +77,7 @@ class Node:
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Return laws of candidates that are not inserted, and the reasons against others."""
+        """Return laws of candidates that are not inserted, and reasons against the remaining ones."""
         return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
 
     @cached_property
@@ -298,7 +298,7 @@ class Nodes:
     def _fitted(
         self, node: Node, state: FittedState, inside: tuple[Candidate, ...], most: float = np.inf
     ) -> Node | None:
-        """Refit unweighted, then repeatedly with its own noise until stable."""
+        """Refit unweighted, then repeatedly with the refit's noise until stable."""
         # A residual above `most`, a wrong minimum, returns None.
         fitted, before = fit(self.work, state), None
         if _rms(fitted.residual) > most:

@@ -188,7 +188,7 @@ DEGREE = 3
 
 
 def bends(knots: Sequence[float]) -> Floats:
-    """Return spline coefficients without straight lines, orthonormal, shape (k, k - 2) [Greville abscissae; de Boor, A Practical Guide to Splines, ch. IX]."""
+    """Return spline coefficients without straight lines, orthonormal, shape (k, k - 2) [Greville abscissae; de Boor, ch. IX]."""
     count = len(knots) - DEGREE - 1
     means = np.array([np.mean(knots[k + 1 : k + 1 + DEGREE]) for k in range(count)])
     return np.asarray(null_space(np.vstack([np.ones(count), means - means.mean()])))

@@ -72,7 +72,7 @@ def trial_inputs(model: Model) -> list[TrialInput]:
 
 
 def apart(work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Sequence[Term], noise: Floats) -> float:
-    """Return the standardised difference of two terms for an input."""
+    """Return how much of one term's effect, over noise, parameters and the other term cannot fit."""
     model = work.model
     own = [k for k, p in enumerate(model.parameters) if p.run in {None, trial.run}]
     parameters = tuple(replace(p, run=None if p.run is None else 0) for p in (model.parameters[k] for k in own))

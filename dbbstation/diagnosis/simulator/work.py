@@ -216,7 +216,7 @@ class PerturbedParameter:
 
     Attributes:
         dose: initial dose; its sign gives the side.
-        term: not in the state, or None.
+        term: a term outside the state, or None.
     """
 
     key: tuple[str, ...]

@@ -38,7 +38,7 @@ class AppliedCorrection:
 
     Attributes:
         values: shape (n,).
-        uncertainty: standard, of the correction without a row's noise, shape (n,).
+        uncertainty: standard uncertainty of the correction, without a row's noise, shape (n,).
         left_out: effects that do not apply to other rows, such as a drift.
         beyond: rows outside the fitted range by variable.
     """

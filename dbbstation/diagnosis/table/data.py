@@ -36,8 +36,8 @@ class Table:
         simulated: shape (n,).
         derivatives: of the simulated value by parameter name, shape (n,).
         columns: numeric, by name, shape (n,).
-        known: prior standard uncertainty by name.
-        like: the table to which effects were fitted, if another.
+        known: prior standard uncertainty by parameter name.
+        like: the table to which effects were fitted, if different.
     """
 
     measured: Floats

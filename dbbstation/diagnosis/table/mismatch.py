@@ -141,12 +141,12 @@ class Mismatch:
 
     @property
     def explained(self) -> Floats:
-        """Return findings with base parameters over all rows, shape (n,)."""
+        """Return the sum of findings and base parameters, all rows, shape (n,)."""
         return self.settled.predicted()
 
     @property
     def correction(self) -> Floats:
-        """Return effects over variables, with base parameters, over all rows, shape (n,)."""
+        """Return the sum of base parameters and effects over variables, all rows, shape (n,)."""
         return self.settled.channel.residual - left_with(self.settled, self.levels.corrects)
 
     @property

@@ -98,7 +98,7 @@ RATE_WORDS = 2
 
 
 def meaning_of(name: str) -> Meaning:
-    """Return the unit or kind that a column's name states, such as `travel_mm`, `t_s`, `oil_temp_c`, `angle_deg`; else `PLAIN`."""
+    """Return the unit or kind that a column's name states, such as `travel_mm` or `angle_deg`; else `PLAIN`."""
     words = [word for word in _WORDS.split(name.lower()) if word]
     if (found := _unit_at_end(words)) is not None:
         return found

@@ -25,7 +25,8 @@ RISES = (0.25, 1.0, 2.0)
 class LostMotion(DriveSource):
     """After a reversal the load is missing until the play is crossed: F = -F_l sign(v) r(d).
 
-    r is 1 over the travel g and falls to 0 over w. If F_l equals the Coulomb friction, all friction is behind the play.
+    r is 1 within the travel g, then falls to 0 over w. If F_l equals the Coulomb friction, all friction is behind the
+    play.
     """
 
     name = "lost-motion"

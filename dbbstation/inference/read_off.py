@@ -64,7 +64,7 @@ class CauseFinding:
         ambiguous_with: if this cause is absent, one of these is present.
         gains: held-out gains; None if not tested.
         persists: whether held-out parts confirm a single event.
-        recurs: whether every selection that omits a part finds a wave over time.
+        recurs: whether a wave over time predicts parts omitted from its selection.
     """
 
     name: str

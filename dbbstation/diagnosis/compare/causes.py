@@ -54,7 +54,7 @@ class Change:
 
     def _name(self) -> str:
         usual = self.source.law == self.source.varies_with != "temperature"
-        return self.source.name if usual else f"{self.source.name} by {self.source.law.removeprefix('by ')}"
+        return self.source.name if usual else f"{self.source.name} by {self.source.law}"
 
     def law(self, log_odds: float) -> Law:
         """Return the source as a law, with forms by part and combination."""

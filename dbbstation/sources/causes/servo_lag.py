@@ -118,7 +118,7 @@ class _ByDirection(ServoLag):
 
     @property
     def law(self) -> str:
-        return "by direction"
+        return "direction"
 
     def other_laws(self) -> tuple[ErrorSource, ...]:
         return ()

@@ -115,6 +115,7 @@ def difference(path: Toolpath, they: list[Event]) -> str:
     if [kind for kind, _ in groups] != ["FEED" if event.kind == "ARC" else event.kind for event in they]:
         return f"{[kind for kind, _ in groups]} and {[event.kind for event in they]}"
     before: np.ndarray | None = None
+    feed, only_turns = path.feed, path.only_turns
     for (_, rows), event in zip(groups, they, strict=True):
         # In inches the printed offsets are rounded as much as the pose.
         rounding = np.array([(0.51e-4 if event.unit_mm == 1.0 else 1.6e-4) * event.unit_mm] * 3 + [0.51e-4] * 3)
@@ -128,8 +129,8 @@ def difference(path: Toolpath, they: list[Event]) -> str:
                     return f"line {line}: {off_mm} mm off the arc"
             before = poses[-1]
         if event.kind in {"FEED", "ARC"}:
-            mine, unit_mm = path.feed[rows[0]], 1.0 if path.only_turns[rows[0]] else event.unit_mm
-            if not np.isclose(mine, event.feed[int(path.only_turns[rows[0]])], rtol=1e-9, atol=0.51e-4 * unit_mm):
+            mine, unit_mm = feed[rows[0]], 1.0 if only_turns[rows[0]] else event.unit_mm
+            if not np.isclose(mine, event.feed[int(only_turns[rows[0]])], rtol=1e-9, atol=0.51e-4 * unit_mm):
                 return f"line {line}: feeds {mine} and {event.feed}"
         if event.kind == "DWELL" and abs(path.dwell_s[rows[0]] - event.dwell_s) > 0.51e-4:
             return f"line {line}: dwells {path.dwell_s[rows[0]]} and {event.dwell_s}"
@@ -153,14 +154,16 @@ def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
     still = (path.kind == RowKind.RAPID) & (np.abs(path.poses - path.before).max(axis=1) < NOWHERE)
     told = [row for place, row in enumerate(told) if place == 0 or not still[row]]
     groups: list[list[int]] = []
+    arc, cuts = path.arc, path.kind == RowKind.FEED
     for row in told:
-        arc = path.arc[row]
+        last = groups[-1][-1] if groups else row
         same = (
             groups
-            and path.kind[row] == RowKind.FEED == path.kind[groups[-1][-1]]
-            and path.line[row] == path.line[groups[-1][-1]]
-            and arc[2] != 0.0
-            and np.array_equal(arc, path.arc[groups[-1][-1]])
+            and cuts[row]
+            and cuts[last]
+            and path.line[row] == path.line[last]
+            and arc[row, 2] != 0.0
+            and np.array_equal(arc[row], arc[last])
         )
         if same:
             groups[-1].append(row)
@@ -171,12 +174,12 @@ def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
 
 def divided(path: Toolpath, groups: list[tuple[str, np.ndarray]], they: list[Event]) -> list[tuple[str, np.ndarray]]:
     """Groups of chords with no more turns than LinuxCNC's arcs: a loop may run one line's arc again."""
-    found, left = [], list(groups)
+    found, left, turn = [], list(groups), path.arc[:, 2]
     if left and they and left[0][0] == "RAPID" != they[0].kind and path.start is not None:
         left.pop(0)  # where a program stands that begins with a cut
     while left:
         kind, rows = left.pop(0)
-        turned = abs(path.arc[rows[0], 2])
+        turned = abs(turn[rows[0]])
         if len(found) < len(they) and they[len(found)].kind == "ARC" and turned:
             most = round(math.tau * abs(they[len(found)].turns) / turned)
             left[:0] = [(kind, rows[most:])] if len(rows) > most else []

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from typing import TYPE_CHECKING
 
 import pytest
@@ -76,9 +74,9 @@ def test_every_command_on_a_virtual_session_marks_what_it_makes(tmp_path: Path) 
         *(("circles", session, "--figure", here / f"circles.{ending}") for ending in ("svg", "png", "pdf")),
     )
     for words in commands:
-        done = python("-m", "dbbstation", *map(str, words))
-        assert done.returncode == 0, (words, done.stderr)
-        assert "VIRTUAL MACHINE" in done.stderr, words
+        done = call(*words)
+        assert done.code == 0, (words, done.err)
+        assert "VIRTUAL MACHINE" in done.err, words
     assert "sim" in yaml.safe_load(model.read_text("utf-8"))["provenance"]["virtual"]
     for path in (*(here / "programs").iterdir(), here / "report.html", here / "circles.svg"):
         assert "VIRTUAL MACHINE" in path.read_text("utf-8"), path
@@ -92,11 +90,6 @@ def test_every_command_on_a_virtual_session_marks_what_it_makes(tmp_path: Path) 
     assert len(names) == len(set(names))
     assert any(name.startswith("virtual ") for name in names)
     assert not all(name.startswith("virtual ") for name in names)
-
-
-def python(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run the command as a user does: the mark is printed when it ends."""
-    return subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
 
 
 def test_a_virtual_session_beside_a_real_one_does_not_mark_it(tmp_path: Path) -> None:

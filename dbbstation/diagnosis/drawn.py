@@ -5,24 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.calibration.reporting.on_the_plate import CircleBeforeAfter
+
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Direction
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
-    """One run's deviations in ascending order of angle, shape (s,) each.
+class Trace(CircleBeforeAfter):
+    """One run's deviations as measured, with the kinematic calibration, and with the joint model."""
 
-    Attributes:
-        theta_deg: from +X towards +Y.
-    """
-
-    direction: Direction
-    theta_deg: Floats
     measured_um: Floats
-    before_um: Floats
-    after_um: Floats
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pydantic import Field, computed_field
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.facts.serialise import Absent, Kept, OrNull
 from dbbstation.facts.value import Value
-from dbbstation.inference.verdict import Acts, Gains, Verdict
+from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
@@ -39,11 +39,10 @@ __all__ = [
 
 
 @dataclass(frozen=True, kw_only=True)
-class SourceFinding:
+class SourceFinding(CatalogueFinding):
     """Finding on one source.
 
     Attributes:
-        verdict: see docs/verdicts.md.
         concealed: share of squares absorbed by machine parameters.
         stability: selection frequency in draws of seven tenths of tests; None if not computed.
         probability: given the catalogue; for its class if it has one.
@@ -55,9 +54,6 @@ class SourceFinding:
         parameters: fitted values; for an absent cause the best amplitudes, whose uncertainty bounds an undetected effect.
     """
 
-    name: str
-    verdict: Verdict
-    ambiguous_with: tuple[str, ...] = ()
     concealed: float | None = None
     signature_rms_um: Annotated[float | None, Absent] = None
     unconcealed_rms_um: Annotated[float | None, Absent] = None
@@ -74,20 +70,29 @@ class SourceFinding:
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class Location:
-    """A place of large misfit.
+@dataclass(frozen=True)
+class ArcOfRun:
+    """An arc of one run.
 
     Attributes:
         theta_deg: first and last angle, from +X towards +Y.
-        strut: 1 to 6; None if no strut is significant.
-        variable: None in JSON if it is empty.
-        peak_um: greatest smoothed deviation.
     """
 
     test: str
     direction: str
     theta_deg: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Location(ArcOfRun):
+    """A place of large misfit.
+
+    Attributes:
+        strut: 1 to 6; None if no strut is significant.
+        variable: None in JSON if it is empty.
+        peak_um: greatest smoothed deviation.
+    """
+
     strut: int | None
     variable: OrNull
     share: float

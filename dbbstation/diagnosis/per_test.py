@@ -49,5 +49,5 @@ def _trace(diagnosis: Diagnosis, k: int) -> Trace:
     raw = diagnosis.before.observations[k].raw
     measured = 1e3 * (raw.length_mm - raw.circle.bar_mm)
     predicted = [measured - 1e3 * fit.residual_mm[k] for fit in (diagnosis.before, diagnosis.after)]
-    theta, curves = by_angle(raw, [measured, *predicted], BOUNDS.trace_points)
+    theta, curves = by_angle(raw, [*predicted, measured], BOUNDS.trace_points)
     return Trace(raw.circle.direction, theta, *curves)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Generic, TypeVar
 
 import numpy as np
+from pydantic import computed_field
 
+from dbbstation.facts.serialise import Kept
 from dbbstation.history.standardised import BASELINE, ScatterRatio, standardised
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Floats
@@ -31,9 +35,15 @@ class TrendVerdict(StrEnum):
     """No value could be compared: one session, or no stated uncertainty."""
 
 
+DECIDED_BY = {True: "stated-uncertainty", False: "control-chart"}
+"""Basis of a verdict: the stated uncertainties alone, or a control chart with the scatter of the sessions."""
+
+_Session = TypeVar("_Session")
+
+
 @dataclass(frozen=True)
-class TrendEvent:
-    """A change or outlier beyond scatter and uncertainty.
+class TrendEvent(Generic[_Session]):
+    """A change or outlier beyond scatter and uncertainty; a session is its index, or its name in JSON.
 
     Attributes:
         verdict: `STANDS_OUT` or `CHANGED`.
@@ -42,11 +52,23 @@ class TrendEvent:
     """
 
     verdict: TrendVerdict
-    since: int
-    found: int
+    since: _Session
+    found: _Session
     difference: float
     u_difference: float
-    by_stated: bool = False
+    by_stated: Annotated[bool, Kept] = False
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def decided_by(self) -> str:
+        """Return the basis of the verdict."""
+        return DECIDED_BY[self.by_stated]
+
+    def named(self: TrendEvent[int], names: Sequence[str]) -> TrendEvent[str]:
+        """Return the event with names of sessions."""
+        return TrendEvent(
+            self.verdict, names[self.since], names[self.found], self.difference, self.u_difference, self.by_stated
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +85,7 @@ class Watched:
         by_stated: whether the last comparison uses stated uncertainties alone.
     """
 
-    events: tuple[TrendEvent, ...]
+    events: tuple[TrendEvent[int], ...]
     z: Floats
     high: Floats
     low: Floats
@@ -129,7 +151,7 @@ def _look(
     count = len(values)
     z, high, low, level, u_level = (np.full(count, np.nan) for _ in range(5))
     by_stated = np.zeros(count, dtype=bool)
-    events: list[TrendEvent] = []
+    events: list[TrendEvent[int]] = []
     start, out, pooled = 0, list[int](), ScatterRatio()
     while True:
         at = np.array([k for k in range(start, count) if k not in out], dtype=np.intp)
@@ -175,13 +197,13 @@ def _look(
     return Watched(tuple(events), z, high, low, level, u_level, scatter, max(1 - len(at), 0), stated), pooled
 
 
-def _settled(event: TrendEvent, level: Floats, u_level: Floats, start: int) -> TrendEvent:
+def _settled(event: TrendEvent[int], level: Floats, u_level: Floats, start: int) -> TrendEvent[int]:
     before = event.since - 1
     difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
     return replace(event, difference=difference, u_difference=u)
 
 
-def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[TrendEvent]:
+def _leads_to(found: TrendEvent[int], events: list[TrendEvent[int]], start: int) -> list[TrendEvent[int]]:
     """Return outliers that become part of the following event on the same side."""
     # If this event is an outlier itself, only an adjacent one counts.
     first = found.since - 1
@@ -194,7 +216,7 @@ def _leads_to(found: TrendEvent, events: list[TrendEvent], start: int) -> list[T
     ]
 
 
-def _change(since: int, found: int, at: NDArray[np.intp], values: Floats, u: Floats) -> TrendEvent:
+def _change(since: int, found: int, at: NDArray[np.intp], values: Floats, u: Floats) -> TrendEvent[int]:
     before, these = at[at < since], slice(since, found + 1)
     level, u_level = _mean(values[before], u[before])
     after, u_after = _mean(values[these], u[these])
@@ -229,7 +251,7 @@ class _Stretch:
         out[np.isfinite(self.of.z)] = steps - np.minimum(np.minimum.accumulate(steps), 0.0)
         return out
 
-    def first_event(self) -> TrendEvent | None:
+    def first_event(self) -> TrendEvent[int] | None:
         """Return the first event beyond a limit whose difference exceeds k times the stated uncertainty."""
         sums = self.sums
         high, low = (np.nan_to_num(one) for one in sums)
@@ -260,13 +282,13 @@ class _Stretch:
         scatter = _scatter(self.values[:count], self.u[:count])
         return level, u_level * max(1.0, float(np.nan_to_num(scatter)))
 
-    def _event(self, verdict: TrendVerdict, since: int, k: int) -> TrendEvent:
+    def _event(self, verdict: TrendVerdict, since: int, k: int) -> TrendEvent[int]:
         after, u_after = _mean(self.values[since : k + 1], self.u[since : k + 1])
         u_both = self._spread(since) * float(np.hypot(u_after, self.of.u_level[since]))
         difference = after - float(self.of.level[since])
         return TrendEvent(verdict, int(self.at[since]), int(self.at[k]), difference, u_both, bool(self.of.by_stated[k]))
 
-    def _stated(self, event: TrendEvent) -> float:
+    def _stated(self, event: TrendEvent[int]) -> float:
         since = int(np.searchsorted(self.at, event.since))
         return event.u_difference / self._spread(since)
 

@@ -46,6 +46,19 @@ class Verdict(StrEnum):
         return tuple(Verdict).index(self)
 
 
+@dataclass(frozen=True, kw_only=True)
+class CatalogueFinding:
+    """Finding on a cause that users ask for by name.
+
+    Attributes:
+        verdict: see docs/verdicts.md.
+    """
+
+    name: str
+    verdict: Verdict
+    ambiguous_with: tuple[str, ...]
+
+
 class Acts(StrEnum):
     """Whether other rows or tests can show a cause again."""
 

@@ -230,7 +230,7 @@ def _ranking(reported: Reported) -> ShownCauses | None:
     if ranked is None:
         return None
     rows = cause_rows(ranked, reported.coverage_factor)
-    return ShownCauses(ranked.session, ranked.why_not, rows, cured_polars(ranked), ranked.said, ranked.picture)
+    return ShownCauses(**vars(ranked), rows=rows, polars=cured_polars(ranked))
 
 
 def _notes_before(reported: Reported) -> list[str]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.results.ranked import Ranked
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import date
@@ -28,16 +30,12 @@ class ShownSession:
     known: bool
 
 
-@dataclass(frozen=True, eq=False)
-class ShownCauses:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ShownCauses(Ranked):
     """Texts of the causes for the page."""
 
-    session: str
-    why_not: str
     rows: Sequence[CauseRow]
     polars: Sequence[TitledPolar]
-    said: Sequence[str] = ()
-    picture: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

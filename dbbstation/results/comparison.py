@@ -13,6 +13,7 @@ from dbbstation.diagnosis.compare.pairs import NotComparable
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
+from dbbstation.inference.read_off import Span
 from dbbstation.inference.verdict import Gains
 from dbbstation.results.diagnosis import BeforeAfter
 from dbbstation.results.frame import Framed, picked
@@ -20,13 +21,11 @@ from dbbstation.results.levels_text import level_sentences
 
 
 @dataclass(frozen=True)
-class VariableSpan:
+class VariableSpan(Span):
     """Range of a variable in which a cause is large."""
 
-    variable: str
     low: Annotated[float, Field(serialization_alias="from")]
     high: Annotated[float, Field(serialization_alias="to")]
-    unit: str
 
 
 @dataclass(frozen=True, kw_only=True)

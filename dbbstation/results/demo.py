@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dbbstation.calibration.reporting.evaluation import CircleDeviations
 
-@dataclass(frozen=True)
-class MeasuredBeforeAfter:
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredBeforeAfter(CircleDeviations):
     """Measured figures of one circle [µm]. The last one excludes the bar's noise."""
 
-    centre_deviation_um: float
-    mean_radial_error_um: float
-    circularity_um: float
     circularity_30_upr_um: float
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dbbstation.facts.serialise import Kept
+from dbbstation.history.watch import TrendEvent
 from dbbstation.results.frame import Framed, picked
 
 
@@ -53,23 +54,6 @@ class HistoryChange:
     found: HistorySession
     beside: tuple[str, ...]
     quantities: tuple[ChangedQuantity, ...]
-
-
-@dataclass(frozen=True)
-class HistoryEvent:
-    """A change of one quantity beyond scatter and uncertainty.
-
-    Attributes:
-        verdict: `changed` or `stands out`.
-        decided_by: `stated-uncertainty` or `control-chart`.
-    """
-
-    verdict: str
-    since: str
-    found: str
-    difference: float
-    u_difference: float
-    decided_by: str
 
 
 @dataclass(frozen=True)
@@ -122,7 +106,7 @@ class QuantityHistory:
     sessions_lacking: int | None
     decided_by: str | None
     watched_sessions: int
-    events: tuple[HistoryEvent, ...]
+    events: tuple[TrendEvent[str], ...]
     values: tuple[HistoryValue, ...]
 
 

@@ -88,7 +88,7 @@ def _cause(found: Comparison, finding: CauseFinding) -> ComparedCause:
         log_evidence=finding.log_bayes_factor,
         ambiguous_with=tuple(finding.ambiguous_with),
         equivalent=tuple(finding.equivalent),
-        spans=tuple(VariableSpan(one.variable, one.low, one.high, one.unit) for one in finding.spans),
+        spans=tuple(VariableSpan(**vars(one)) for one in finding.spans),
         parameters=finding.values,
         text=finding.text,
         **({} if effect is None else vars(effect)),

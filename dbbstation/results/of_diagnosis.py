@@ -45,7 +45,10 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
             (
                 *_mountings(diagnosis),
                 *diagnosis.sources,
-                *(SourceFinding(name=name, verdict=Verdict.NOT_TESTABLE, text=why) for name, why in lacking.items()),
+                *(
+                    SourceFinding(name=name, verdict=Verdict.NOT_TESTABLE, ambiguous_with=(), text=why)
+                    for name, why in lacking.items()
+                ),
             )
         ),
         cancelling=diagnosis.cancelling,

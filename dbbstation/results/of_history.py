@@ -9,11 +9,11 @@ import numpy as np
 
 from dbbstation.facts.value import finite
 from dbbstation.history.standardised import BASELINE
+from dbbstation.history.watch import DECIDED_BY
 from dbbstation.quality.conformity import Size, conformity
 from dbbstation.results.history import (
     ChangedQuantity,
     HistoryChange,
-    HistoryEvent,
     HistoryResult,
     HistorySession,
     HistoryValue,
@@ -38,10 +38,6 @@ FIGURES = {
     "C": "distance of the centre from the commanded one",
 }
 """Meaning of the figures of circles."""
-
-
-DECIDED_BY = {True: "stated-uncertainty", False: "control-chart"}
-"""Basis of a verdict: the stated uncertainties alone, or a control chart with the scatter of the sessions."""
 
 
 def history_result(
@@ -87,7 +83,7 @@ def _session(session: SessionFigures) -> HistorySession:
 
 
 def _changes(one: MachineHistory, sessions: Sequence[HistorySession]) -> Iterator[HistoryChange]:
-    found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent]]] = {}
+    found: dict[tuple[int, int, TrendVerdict], list[tuple[Trend, TrendEvent[int]]]] = {}
     for trend in one.trends:
         for event in () if trend.watched is None else trend.watched.events:
             key = (int(trend.at[event.found]), int(trend.at[event.since]), event.verdict)
@@ -142,19 +138,10 @@ def _quantity(trend: Trend, sessions: Sequence[HistorySession], coverage_factor:
         sessions_lacking=None if watched is None else watched.lacking,
         decided_by=None if watched is None or not watched.watched else DECIDED_BY[watched.by_stated],
         watched_sessions=0 if watched is None else watched.watched,
-        events=() if watched is None else tuple(_event(event, trend, sessions) for event in watched.events),
+        events=()
+        if watched is None
+        else tuple(event.named([sessions[at].name for at in trend.at]) for event in watched.events),
         values=tuple(_values(trend, sessions)),
-    )
-
-
-def _event(event: TrendEvent, trend: Trend, sessions: Sequence[HistorySession]) -> HistoryEvent:
-    return HistoryEvent(
-        verdict=str(event.verdict),
-        since=sessions[trend.at[event.since]].name,
-        found=sessions[trend.at[event.found]].name,
-        difference=event.difference,
-        u_difference=event.u_difference,
-        decided_by=DECIDED_BY[event.by_stated],
     )
 
 

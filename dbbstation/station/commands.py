@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from dbbstation.facts.run import OfRun
+
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
 
@@ -80,12 +82,10 @@ class GoTo:
 
 
 @dataclass(frozen=True)
-class Judge:
+class Judge(OfRun):
     """Change the verdict on a recorded run at any time."""
 
-    test: str
     direction: Direction
-    repeat: int
     accepted: bool
     reason: str = "rejected by the operator"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from dbbstation.facts.run import OfRun
 from dbbstation.quality.answer import answer
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class RunId:
+class RunId(OfRun):
     """Identity of a run in its session.
 
     Attributes:
@@ -31,9 +32,7 @@ class RunId:
         mounting: number of the ball's set-up in the session, from 1.
     """
 
-    test: str
     direction: Direction
-    repeat: int
     mounting: int
 
     @property

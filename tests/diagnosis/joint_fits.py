@@ -67,7 +67,15 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         workspace=None,
         locations=(),
         sources=tuple(
-            SourceFinding(name=s.name, verdict=Verdict.IDENTIFIED, gain=9.0, concealed=0.5, probability=1.0, text="")
+            SourceFinding(
+                name=s.name,
+                verdict=Verdict.IDENTIFIED,
+                ambiguous_with=(),
+                gain=9.0,
+                concealed=0.5,
+                probability=1.0,
+                text="",
+            )
             for s in sources
         )
         if after is not before

@@ -266,7 +266,14 @@ def test_a_command_exists_with_its_options(command):
 
 def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys):
     source = SourceFinding(
-        name="gravity", verdict=Verdict.IDENTIFIED, probability=1.0, concealed=0.9, gain=9.0, stability=1.0, text=""
+        name="gravity",
+        verdict=Verdict.IDENTIFIED,
+        ambiguous_with=(),
+        probability=1.0,
+        concealed=0.9,
+        gain=9.0,
+        stability=1.0,
+        text="",
     )
     both = BeforeAfter(2.0, 1.0)
     print_diagnosis(

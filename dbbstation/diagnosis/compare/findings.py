@@ -7,6 +7,7 @@ from typing import Annotated
 
 from dbbstation.computing.arrays import Floats
 from dbbstation.diagnosis.compare.pairs import Pair
+from dbbstation.diagnosis.findings import ArcOfRun
 from dbbstation.facts.serialise import AsItIs, Kept
 
 
@@ -62,16 +63,9 @@ class DirectionHalves:
 
 
 @dataclass(frozen=True)
-class LargestEffect:
-    """The run and angle of a cause's largest effect.
+class LargestEffect(ArcOfRun):
+    """The arc of a cause's largest effect, with at least half the peak."""
 
-    Attributes:
-        theta_deg: start and end of the arc with at least half the peak.
-    """
-
-    test: str
-    direction: str
-    theta_deg: tuple[float, float]
     peak_um: float
     text: str
 

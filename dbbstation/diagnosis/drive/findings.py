@@ -13,7 +13,7 @@ from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
-from dbbstation.inference.verdict import Acts, Gains, Verdict
+from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Complement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveFinding:
+class DriveFinding(CatalogueFinding):
     """Finding on one cause.
 
     Attributes:
@@ -63,9 +63,6 @@ class DriveFinding:
         gains: held-out [N²]; None if not tested.
     """
 
-    name: str
-    verdict: Verdict
-    ambiguous_with: tuple[str, ...]
     concealed: float
     signature_rms_n: float
     unconcealed_rms_n: float

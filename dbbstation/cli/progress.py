@@ -178,7 +178,7 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
 @contextmanager
 def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
     """Show bars for reading sessions and a task's stages."""
-    from dbbstation.tasks.load import READING
+    from dbbstation.tasks.telling import READING
 
     with count_bar(READING) as reading, stage_bar(label, stages) as rest:
 

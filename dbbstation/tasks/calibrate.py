@@ -93,7 +93,8 @@ def calibrate(
     from dbbstation.model.uncertainty import greatest_u_um
     from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.registry import sources_named
-    from dbbstation.tasks.load import loaded, paths_of
+    from dbbstation.tasks.declare import paths_of
+    from dbbstation.tasks.load import loaded
 
     telling = Telling(progress, stop, say)
     way = Method(method)

@@ -90,7 +90,7 @@ def program(
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result
     from dbbstation.tasks.chosen import chosen_of
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
 
     telling = Telling(progress, stop, say)

@@ -76,7 +76,7 @@ def circles(
     from dbbstation.circles.path import Filter
     from dbbstation.results.circles import circles_result
     from dbbstation.tasks.circle_runs import load_circles
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)

@@ -158,7 +158,7 @@ def compensate(
     from dbbstation.nc.registry import dialect_of_file
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.programs import (
         NOT_CORRECTED,
         ProgramText,

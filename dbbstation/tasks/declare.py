@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 else:
     Names, File, Files = tuple[str, ...], Path, tuple[Path, ...]
 
+
+def paths_of(files: Files) -> list[Path]:
+    """Return one file or folder, or several, as paths."""
+    return [Path(files)] if isinstance(files, str | PathLike) else [Path(one) for one in files]
+
+
 _OF_ALL = {"progress": "called with each stage.", "stop": "asked at each stage.", "say": "called with notes."}
 """Parameters of every task for Python only."""
 

@@ -89,8 +89,8 @@ def diagnose(
     from dbbstation.diagnosis.effects import effects_of
     from dbbstation.files.own_sources import every_source
     from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.diagnosed import diagnosed_of
-    from dbbstation.tasks.load import paths_of
 
     telling = Telling(progress, stop, say)
     every = every_source(paths_of(source_files)) if known is None else known

@@ -80,10 +80,10 @@ def identify(
     from dbbstation.diagnosis.drive.own import own_force
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
     from dbbstation.files.recordings.drive_csv import given_drive, read_drive
+    from dbbstation.files.table_sources import load_sources
     from dbbstation.laws.contract import MOVING
     from dbbstation.results.drive import drive_result
-    from dbbstation.tasks.load import paths_of
-    from dbbstation.tasks.tables import load_sources
+    from dbbstation.tasks.declare import paths_of
 
     telling = Telling(progress, stop, say)
     named = drive_sources_named(known_drive_sources() if sources is None else tuple(sources))

@@ -69,7 +69,8 @@ def evaluate(
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.model_warnings import model_warnings
-    from dbbstation.tasks.load import loaded, paths_of
+    from dbbstation.tasks.declare import paths_of
+    from dbbstation.tasks.load import loaded
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)

@@ -69,8 +69,8 @@ def export(
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.export import ExportResult
     from dbbstation.tasks.chosen import chosen_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.exporting import exporting, write_csv, write_parquet
-    from dbbstation.tasks.load import paths_of
 
     path = Path(out)
     if path.suffix.lower() not in FORMATS:

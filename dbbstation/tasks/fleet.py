@@ -23,11 +23,11 @@ from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.report.fleet_page import fleet_html
 from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, StoredFiles
 from dbbstation.sisters.unlike import FALSE_ALARMS
+from dbbstation.tasks.declare import paths_of
 from dbbstation.tasks.executors import Ended, WorkPool
 from dbbstation.tasks.fleet_compare import Sister, compared
 from dbbstation.tasks.fleet_table import write_fleet_table
 from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked, worked
-from dbbstation.tasks.load import paths_of
 from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.text.counting import natural
 

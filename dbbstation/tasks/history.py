@@ -63,8 +63,8 @@ def history(
     from pathlib import Path
 
     from dbbstation.history.trend import TrendOptions
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.histories import histories_in
-    from dbbstation.tasks.load import paths_of
 
     asked = TrendOptions(coverage_factor, tolerances, false_alarms, tuple(tests), tuple(exclude))
     found = histories_in(Path(folder), asked, paths_of(source_files), rebuild=anew, progress=progress, stop=stop)

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,12 +21,14 @@ from dbbstation.model.observation import Observation
 from dbbstation.nc.commanded import commanded_poses
 from dbbstation.sources.contract import Thermometer
 from dbbstation.sources.registry import known_sources
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.declare import paths_of
+from dbbstation.tasks.telling import READING, Telling, never, silent
 from dbbstation.trace.cut import cut
 from dbbstation.trace.thermometers import logged_curve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.tasks.telling import Progress
@@ -51,9 +52,6 @@ class Recorded:
 
 Sessions = str | PathLike[str] | Iterable[str | PathLike[str]]
 """One session or several: folders or session files."""
-
-READING = "reading runs"
-"""Stage of a task that reads sessions."""
 
 
 def load(
@@ -103,11 +101,6 @@ def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequenc
         what = f"no session has a test {', '.join(unknown)}" if unknown else "no accepted run is left"
         raise InputError.of(", ".join(sessions.sessions), what, "name others")
     return replace(sessions, observations=tuple(left))
-
-
-def paths_of(sessions: Sessions) -> list[Path]:
-    """Return sessions as paths."""
-    return [Path(sessions)] if isinstance(sessions, str | PathLike) else [Path(one) for one in sessions]
 
 
 def load_sessions(

@@ -184,12 +184,12 @@ def mismatch(
     from dbbstation.diagnosis.table.applied import applied
     from dbbstation.diagnosis.table.mismatch import find_mismatch
     from dbbstation.files.formats.number_language import number_language
+    from dbbstation.files.table_sources import load_sources
     from dbbstation.results.of_mismatch import mismatch_result
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.tables import (
         TableOptions,
         load_rows,
-        load_sources,
         load_tables,
         stated_uncertainties,
         stated_variables,

@@ -87,7 +87,7 @@ def predict(
     from dbbstation.model.uncertainty import predicted_poses
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.prediction import prediction_result
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)

@@ -102,7 +102,7 @@ def report(
     from dbbstation.report.pdf import chromium, printed
     from dbbstation.results.tolerances import TOLERATED
     from dbbstation.tasks.circle_runs import load_circles
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
     from dbbstation.tasks.reporting import logo_of, modelled_runs, ranked_causes, read_runs
 

@@ -15,8 +15,8 @@ from dbbstation.report.content import Modelled
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.ranked import Ranked
 from dbbstation.tasks.evaluate import evaluate
-from dbbstation.tasks.load import READING, load_sessions
-from dbbstation.tasks.telling import StoppedError
+from dbbstation.tasks.load import load_sessions
+from dbbstation.tasks.telling import READING, StoppedError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

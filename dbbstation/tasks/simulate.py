@@ -72,7 +72,7 @@ def simulate(
     from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.results.sessions import SimulatedSession
     from dbbstation.tasks.chosen import chosen_of
-    from dbbstation.tasks.load import paths_of
+    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
     from dbbstation.virtual.under_spindle import SetUp, put_up
 

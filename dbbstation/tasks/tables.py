@@ -15,13 +15,11 @@ from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
 from dbbstation.errors import ArgumentError, InputError, Problem
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, given_table, read_table
-from dbbstation.files.table_sources import own_table_sources
 from dbbstation.inference.triangle import left_by
 from dbbstation.inference.variables import Kind, Variable
-from dbbstation.laws.contract import TableSource
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.number_language import NumberLanguage
@@ -243,25 +241,6 @@ def _faults_of_scale(files: Sequence[TableFile], asked: TableOptions) -> list[Pr
 def _greatest(files: Sequence[TableFile], name: str) -> float:
     columns = [file.values[name] for file in files if name in file.values]
     return max((float(np.abs(column[np.isfinite(column)]).max(initial=0.0)) for column in columns), default=0.0)
-
-
-def load_sources(
-    files: Sequence[Path], columns: Container[str], where: str = "the table"
-) -> tuple[list[TableSource], dict[str, str]]:
-    """Return user physics whose columns exist, and the missing columns of other user physics by name.
-
-    Raises:
-        InputError: faults of the files.
-    """
-    usable: list[TableSource] = []
-    lacking = {}
-    for source in own_table_sources(files, TableSource):  # type: ignore[type-abstract]
-        missing = [name for name in source.needs if name not in columns]
-        if missing:
-            lacking[source.name] = f"{where} has no column {', '.join(missing)}"
-        else:
-            usable.append(source)
-    return usable, lacking
 
 
 class _Reader:

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
+READING = "reading runs"
+"""Stage of a task that reads sessions."""
+
+
 class StoppedError(StationError):
     """The caller stopped the work; nothing was written."""
 

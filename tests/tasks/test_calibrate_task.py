@@ -12,8 +12,8 @@ from dbbstation.errors import InputError, ModelError, OutputError
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.tasks.calibrate import STAGES, calibrate
 from dbbstation.tasks.evaluate import evaluate
-from dbbstation.tasks.load import READING, load
-from dbbstation.tasks.telling import StoppedError
+from dbbstation.tasks.load import load
+from dbbstation.tasks.telling import READING, StoppedError
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 

@@ -44,7 +44,7 @@ from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
-from dbbstation.tui.shown import Shown
+from dbbstation.tui.board_screen import Shown
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
 

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from dbbstation.laws.contract import Texts
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.text.texts import Texts
 
 DESCRIBED = {
     *("own", "results", "errors", "tasks", "machine", "plan", "trace"),

@@ -13,18 +13,17 @@ from dbbstation.circles.path import CirclePath, Filter, both, path_of
 from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.trace.analysis import figures
+from dbbstation.trace.analysis import figures, passes_of
 from dbbstation.trace.cut import edges_of, overlap_feed_under
 from dbbstation.trace.loss import lost_samples
-from dbbstation.trace.passes import passes_of
 
 if TYPE_CHECKING:
     from dbbstation.circles.noise import CircleNoise
     from dbbstation.circles.reversals import Harmonic, ReversalStep
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
+    from dbbstation.trace.analysis import Passes
     from dbbstation.trace.circle import RawCircle
-    from dbbstation.trace.passes import Passes
     from dbbstation.trace.recording import Recording
 
 EDITION = "ISO 230-4:2005"

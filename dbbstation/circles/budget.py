@@ -11,14 +11,16 @@ import numpy as np
 
 from dbbstation.circles.estimates import estimate_of, pair_estimate, slow_noise_um
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
-from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
+from dbbstation.circles.quantity import ABSOLUTE, FIRST, BudgetQuantity
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.serialise import Kept, OrNull
+from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, coefficients
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
+    from dbbstation.computing.arrays import Floats, Integers
 
 
 class BudgetTerm(StrEnum):
@@ -284,3 +286,36 @@ def _slope_um_per_deg(pair: PairAnalysis) -> float:
         for one in (pair.one, pair.other)
     ]
     return float(np.radians(np.sqrt(np.mean(squares) / 2.0)))
+
+
+HIGHEST = 60
+"""Highest undulations per revolution with an amplitude, twice as many as usual in a machine's form."""
+
+
+@dataclass(frozen=True, eq=False)
+class FormSpectrum:
+    """Unfiltered amplitudes about the least-squares circle.
+
+    Attributes:
+        amplitude_um: half of peak to valley, shape (h,).
+        noise_um: rms amplitude of noise; NaN if unknown.
+    """
+
+    undulations: Integers
+    amplitude_um: Floats
+    noise_um: float
+
+
+def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
+    """Return a circle's undulations.
+
+    White noise s per sample has the rms amplitude 2 s / sqrt(n), from two coefficients.
+    """
+    count = len(one.raw)
+    highest = min(HIGHEST, count // SAMPLES_PER_HARMONIC)
+    if highest < FIRST:
+        return FormSpectrum(np.arange(0), np.zeros(0), float("nan"))
+    found = coefficients(one.residual_um, np.radians(one.raw.theta_deg), highest)
+    amplitude = np.sqrt(2.0 / count) * np.hypot(found[1 : highest + 1], found[highest + 1 :])
+    noise_um = 2.0 * one.noise.slow_um / float(np.sqrt(count))
+    return FormSpectrum(np.arange(FIRST, highest + 1), amplitude[FIRST - 1 :], noise_um)

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation import __version__
-from dbbstation.cli.lazy import LazyGroup
+from dbbstation.cli.lazy import RENAMED, RENAMED_FLAGS, LazyGroup
+from dbbstation.cli.log import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
-from dbbstation.cli.renamed import RENAMED, RENAMED_FLAGS
-from dbbstation.cli.streams import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.computing.compiling import tell_of_compiling
 from dbbstation.errors import StationError
 from dbbstation.files.inputs import input_book, virtual_so_far
@@ -58,7 +57,9 @@ COMMANDS = {
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
     "sources": "The known causes of error, and how to confirm them.",
 }
-"""Name and one line of help of every command; each is a module of this folder with a command of its name."""
+"""Name and one line of help of every command. Its module has its name, apart from those in `_MODULES`."""
+
+_MODULES = {"compensate": "programs.compensate", "program": "programs.program"}
 
 
 @click.group(
@@ -66,6 +67,7 @@ COMMANDS = {
     cls=LazyGroup,
     table=COMMANDS,
     package="dbbstation.cli",
+    modules=_MODULES,
     renamed=RENAMED,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )

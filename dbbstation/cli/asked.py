@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.system.virtual_ports import is_virtual
+from dbbstation.system.ports import is_virtual
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,7 +12,6 @@ from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.instrument_options import LineOptions
 from dbbstation.cli.output import echo
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
-from dbbstation.service.patience import driver_patience
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -129,6 +128,7 @@ def bar(
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
     from dbbstation.instrument.driver import Instrument
     from dbbstation.service.bar_reading import read_on_calibrator
+    from dbbstation.service.held_line import driver_patience
 
     with Instrument(protocol, port, baud=baud, **driver_patience(1.0)) as source:
         try:

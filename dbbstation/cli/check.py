@@ -248,7 +248,7 @@ def _dry_run(
 
 def _print_schema(name: str) -> None:
     from dbbstation.cli.output import print_plain_json
-    from dbbstation.files.formats.every_format import SCHEMAS, json_schema
+    from dbbstation.files.checking import SCHEMAS, json_schema
     from dbbstation.instrument.profiles import ProtocolFile
     from dbbstation.results.schemas import RESULTS, result_schema
 

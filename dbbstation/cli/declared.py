@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import click
 
-from dbbstation.cli.figure_option import format_of, known_format
+from dbbstation.cli.figures import format_of, known_format
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
 from dbbstation.tasks import options as o

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import BAUD, PROGRAMS, ProtocolOptions, RateHz
 from dbbstation.cli.output import echo, json_text, say
+from dbbstation.system.ports import marked_virtual
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
-from dbbstation.system.virtual_ports import marked_virtual
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 

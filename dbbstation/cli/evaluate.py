@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 def show(result: EvaluationResult) -> None:
     """Print the residual of the model, and the tolerances."""
-    from dbbstation.cli.figures import print_runs
-    from dbbstation.cli.tolerances import print_tolerances
+    from dbbstation.cli.figures import print_runs, print_tolerances
 
     print_runs(result.runs, low_passed=True)
     echo()

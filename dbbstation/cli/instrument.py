@@ -16,7 +16,7 @@ instrument = LazyGroup(
     name="instrument",
     table=TABLE,
     package="dbbstation.cli",
-    modules={"list": "instruments"},
+    modules={"list": "instruments.instruments", "ports": "instruments.ports"},
     help="""List instruments and ports, read an instrument, decode its recorded bytes, or emulate one.
 
 \b

@@ -1,4 +1,4 @@
-"""`dbbstation instrument list`: known instruments and their line settings."""
+"""`dbbstation instrument list` and `ports`: known instruments with their line settings, and connected serial ports."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.instrument_options import PROFILE
+from dbbstation.cli.output import echo
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
@@ -84,3 +85,25 @@ def _details(protocol: Protocol, profiles: list[str]) -> list[str]:
     lines += ["", "What it can report:", *said] if said else []
     sources = [f"  - {'' if one.verified else 'NOT VERIFIED: '}{one.says}: {one.where}" for one in protocol.references]
     return lines + (["", "From:", *sources] if sources else [])
+
+
+@made()
+def ports() -> Answer:
+    r"""List the serial ports of this computer.
+
+    \b
+    Example:
+      dbbstation instrument ports
+    """
+    from dbbstation.instrument.link import connected_ports
+
+    found = connected_ports()
+    keys = ("port", "description", "hardware")
+
+    def words() -> None:
+        if not found:
+            echo("No serial port is connected: plug in the adapter of the instrument.", err=True)
+        for port, description, hardware in found:
+            echo(f"{port:16} {description}" + (f"  ({hardware})" if hardware not in {"", "n/a"} else ""))
+
+    return Answer({"ports": [dict(zip(keys, port, strict=True)) for port in found]}, words)

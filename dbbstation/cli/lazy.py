@@ -17,6 +17,48 @@ if TYPE_CHECKING:
 
     from click import Context, Parameter
 
+RENAMED = {
+    "drive": "`identify`",
+    "emulate": "`instrument emulate`",
+    "instruments": "`instrument list`",
+    "monitor": "`instrument monitor`",
+    "plot": "`circles --figure`",
+    "ports": "`instrument ports`",
+    "replay": "`instrument replay`",
+    "station": "`measure`",
+    "study": "`python -m studies` in a checkout",
+}
+
+RENAMED_FLAGS = {
+    "bar --calibrator": "--calibrator-serial",
+    "bar --certificate": "--calibrator-certificate",
+    "bar --serial-number": "--bar-serial-number",
+    "circles --csv": "--table",
+    "compensate --angles": "--angles-deg",
+    "compensate --from": "--written-in",
+    "compensate --offset": "--offsets",
+    "compensate --tool-length": "--tool-lengths-mm",
+    "diagnose --keep-unexplained": "--out, which keeps it",
+    "export --state": "--states",
+    "fleet --do": "--task",
+    "history --csv": "--table",
+    "history --html": "--page",
+    "history --rebuild": "--anew",
+    "holders --column": "--columns",
+    "holders --before": "--jig",
+    "identify --out": "--table",
+    "mismatch --corrected": "--table",
+    "predict --out": "--table",
+    "predict --poses": "POSES without a flag",
+    "report --out": "--page",
+    "sheet --column": "--columns",
+    "sheet --before": "--jig",
+    "sheet --k": "--coverage",
+    "sheet --name": "--names",
+    "simulate --plan": "PLAN without a flag",
+}
+"""New names by command and flag; names that only gained an `s` are suggested anyway."""
+
 
 class Utf8(StringParamType):
     """A text in UTF-8; file names may hold any bytes."""
@@ -77,10 +119,10 @@ class LazyGroup(click.Group):
         """Import the command's module."""
         if cmd_name not in self._table:
             return None
-        name = self._modules.get(cmd_name, cmd_name).replace("-", "_")
+        name = cmd_name.replace("-", "_")
         name += "_" if keyword.iskeyword(name) else ""
-        module = importlib.import_module(f"{self._package}.{name}")
-        return made_ready(getattr(module, name))
+        place, _, name = self._modules.get(cmd_name, f"{name}.{name}").partition(".")
+        return made_ready(getattr(importlib.import_module(f"{self._package}.{place}"), name))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

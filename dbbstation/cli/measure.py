@@ -18,7 +18,6 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.files.formats.virtual_port import SLOWEST
-from dbbstation.service.patience import RECONNECT_S, driver_patience
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -93,6 +92,7 @@ def measure(
 def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.stamps import MachineTime
+    from dbbstation.service.held_line import RECONNECT_S, driver_patience
     from dbbstation.station.assembly import assemble
     from dbbstation.station.detector import Patience
     from dbbstation.virtual.wire_clock import ScaledClock
@@ -194,7 +194,7 @@ class VirtualHands:
     """
 
     def __init__(self, url: str) -> None:
-        from dbbstation.virtual.control_client import ControlClient
+        from dbbstation.virtual.control import ControlClient
 
         self._client = ControlClient(url)
 

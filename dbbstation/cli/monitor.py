@@ -10,7 +10,6 @@ from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import LineOptions, Spy, spying
 from dbbstation.cli.output import echo, json_text
 from dbbstation.cli.provenance import provenance
-from dbbstation.service.patience import RECONNECT_S
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -43,6 +42,7 @@ def monitor(
       dbbstation instrument monitor --instrument tesa-tt80 --profile tt80 --zero-mm 150.0003 --port /dev/ttyUSB1
     """
     from dbbstation.instrument.driver import Instrument
+    from dbbstation.service.held_line import RECONNECT_S
 
     protocol = line.protocol()
     with ExitStack() as stack:

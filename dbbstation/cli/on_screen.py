@@ -96,7 +96,7 @@ def _measured(asked: Asked, *, virtual: bool) -> int:
     from dbbstation.cli.measure_talk import Log
     from dbbstation.files.recordings.session import SESSION_FILE, read_session
     from dbbstation.service.held_line import HeldLine
-    from dbbstation.service.opening import opener
+    from dbbstation.service.runner import opener
     from dbbstation.station.opening import check_not_mixed
 
     job, protocol = asked.job()
@@ -133,7 +133,7 @@ def _measured(asked: Asked, *, virtual: bool) -> int:
 def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
     from dbbstation.service.runner import Runner
     from dbbstation.tui.app import StationApp
-    from dbbstation.tui.shown import Shown
+    from dbbstation.tui.board_screen import Shown
 
     runner = Runner(open_station, line)
     shown = Shown(job.plan.plan.name, job.plan.jig.bores, tests=job.plan.to_domain().tests)

@@ -1,13 +1,17 @@
-"""Common parts of `program` and `compensate`."""
+"""`dbbstation program`: NC programs of a plan's circles; `dbbstation compensate`: any NC program through a model's inverse."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.cli.declared import command
 from dbbstation.cli.output import print_table, say
+from dbbstation.tasks.circle_programs import program as program_task
+from dbbstation.tasks.compensate import compensate as compensate_task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from dbbstation.results.programs import ProgramsResult, WrittenProgram
 
@@ -66,3 +70,13 @@ def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:
     if uncertain_um > asked_um:
         asked += ": moves are split finer than the model knows them"
     say(f"{knows}, {asked}")
+
+
+def show(result: ProgramsResult, out: Path) -> None:
+    """Print the written programs."""
+    print_programs(result)
+    say(f"{len(result.programs)} programs written to {out}, all within the machine's travel")
+
+
+program = command(program_task, show)
+compensate = command(compensate_task, print_programs)

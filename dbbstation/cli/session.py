@@ -258,7 +258,7 @@ def rebuild(folder: _Folder) -> Answer:
     Examples:
       dbbstation session rebuild 2026-11-20-hexapod-7
     """
-    from dbbstation.files.recordings.rebuilding import rebuild as written
+    from dbbstation.files.recordings.amending import rebuild as written
 
     former, events = written(folder)
     kept = f"; as it was: {former}" if former else ""

@@ -138,8 +138,8 @@ def _result(found: Settings) -> SettingsResult:
 
 
 def _print(found: Settings) -> None:
+    from dbbstation.cli.figures import which_circles
     from dbbstation.cli.output import print_table
-    from dbbstation.cli.tolerances import which_circles
 
     result = _result(found)
     rows = []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import (

@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, TravelError, few
-from dbbstation.files.formats.bar import parse_bar
-from dbbstation.files.formats.every_format import SCHEMAS
-from dbbstation.files.formats.jig import parse_jig
-from dbbstation.files.formats.job import parse_job
-from dbbstation.files.formats.machine import parse_machine
-from dbbstation.files.formats.mapping import parse_mapping
+from dbbstation.facts.serialise import adapter
+from dbbstation.files.formats.bar import BarFile, parse_bar
+from dbbstation.files.formats.jig import JigFile, parse_jig
+from dbbstation.files.formats.job import JobFile, parse_job
+from dbbstation.files.formats.machine import MachineFile, parse_machine
+from dbbstation.files.formats.mapping import MappingFile, parse_mapping
 from dbbstation.files.formats.model import parse_model
-from dbbstation.files.formats.plan import parse_plan
-from dbbstation.files.formats.session import PART, RunState
+from dbbstation.files.formats.model_schema import ModelFile
+from dbbstation.files.formats.plan import PlanFile, parse_plan
+from dbbstation.files.formats.session import PART, RunState, SessionFile
 from dbbstation.files.formats.settings import read_settings
-from dbbstation.files.formats.simulator import parse_simulator
+from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.formats.simulator import SimulatorFile, parse_simulator
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
@@ -27,6 +29,7 @@ from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.seal import copy_faults
 from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
+from dbbstation.files.yaml.schema import format_of
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.plan.bar import BAR_LENGTH
 from dbbstation.quality.finding import Name
@@ -36,10 +39,34 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.facts.record import Record
     from dbbstation.files.formats.session import RunEntry
+    from dbbstation.files.yaml.schema import Schema
     from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.trace.recording import Recording
+
+_SCHEMAS = (
+    BarFile,
+    JigFile,
+    JobFile,
+    MachineFile,
+    MappingFile,
+    ModelFile,
+    PlanFile,
+    SessionFile,
+    SettingsFile,
+    SimulatorFile,
+)
+
+SCHEMAS: dict[str, type[Schema | Record]] = {format_of(schema): schema for schema in _SCHEMAS}
+"""Schema of each format, by name with version."""
+
+
+def json_schema(name: str, schema: type[Schema | Record]) -> dict[str, object]:
+    """Return the JSON Schema of a format such as `dbb-plan/1`, with units and plausible ranges."""
+    described = adapter(schema).json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described, "title": name}
 
 
 FEWEST_SAMPLES = 8

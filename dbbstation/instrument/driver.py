@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError, StationError
 from dbbstation.instrument import symptoms
-from dbbstation.instrument.adapters import adapter_of, port_of
 from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage
 from dbbstation.instrument.doubt import Doubts, Piece
-from dbbstation.instrument.link import LineClosedError, open_link
+from dbbstation.instrument.link import LineClosedError, adapter_of, open_link, port_of
 from dbbstation.instrument.polling import Poller
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.instrument.reception import INCOMPLETE, Reception, Tally
@@ -25,9 +24,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Self
 
-    from dbbstation.instrument.adapters import Adapter
     from dbbstation.instrument.bytelog import ByteLog
-    from dbbstation.instrument.link import Link, Port
+    from dbbstation.instrument.link import Adapter, Link, Port
     from dbbstation.instrument.protocol import LineCommand, Protocol
     from dbbstation.instrument.reading import Reading
 

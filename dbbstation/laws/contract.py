@@ -9,12 +9,23 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the interface
-
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dbbstation.computing.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Texts:
+    """Texts of a cause."""
+
+    what: str
+    shows: str
+    confirm: str
+    cure: str
+    equation: str
+    origin: str
+
 
 BEYOND_PLAUSIBLE = 100.0
 """Largest value in usual sizes: 20 mm on a strut's reference length, 5 mm on a joint, 0.3 mm of play. A kinematic fit

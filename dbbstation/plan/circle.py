@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from dbbstation.computing.arrays import Floats
 
 FULL_TURN_DEG = 360.0
@@ -95,3 +97,17 @@ class Circle:
         ends = self.theta_deg(np.array([-self.overshoot_deg, FULL_TURN_DEG + self.overshoot_deg]))
         outside = self.poses(ends, self.feed_in_mm)
         return np.vstack([outside[:1], arc, outside[1:]])
+
+
+_S_PER_MIN = 60.0
+
+
+def circle_s(circle: Circle) -> float:
+    """Return the time of feed-in, turn, overshoots and feed-out, without dwells and ramps [s]."""
+    feeding_mm = 2.0 * circle.feed_in_mm
+    return circle.swept_deg / circle.turning_deg_s + feeding_mm / (circle.feed_mm_min / _S_PER_MIN)
+
+
+def circles_s(circles: Iterable[Circle]) -> float:
+    """Return the time of several circles, without set-ups [s]."""
+    return sum(circle_s(circle) for circle in circles)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Circle as Ring
 
-from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.on_the_plate import ball_shifts, circle_tests
 from dbbstation.calibration.reporting.residual_map import residual_map

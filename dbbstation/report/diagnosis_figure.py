@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.diagnosis.shapes import EVERY, PULL, SIGNED, TOWARDS

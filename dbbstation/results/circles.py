@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.circles.analysis import EDITION
-from dbbstation.circles.budget import budget_of, budgets, pair_budgets
+from dbbstation.circles.budget import budget_of, budgets, pair_budgets, spectrum_of
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
-from dbbstation.circles.spectrum import spectrum_of
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
@@ -29,9 +28,8 @@ from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
-    from dbbstation.circles.budget import Budget, SetUpKnowledge
+    from dbbstation.circles.budget import Budget, FormSpectrum, SetUpKnowledge
     from dbbstation.circles.path import Filter
-    from dbbstation.circles.spectrum import FormSpectrum
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.quality.finding import Finding

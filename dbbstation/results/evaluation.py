@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from dbbstation.calibration.reporting.evaluation import EvaluatedRun
-from dbbstation.calibration.reporting.tolerances import EvaluatedTolerance
+from dbbstation.calibration.reporting.evaluation import EvaluatedRun, EvaluatedTolerance
 from dbbstation.facts.serialise import Absent
 from dbbstation.results.frame import Framed
 

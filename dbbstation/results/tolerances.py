@@ -9,9 +9,9 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse_pair, refiltered
 from dbbstation.circles.budget import budgets, pair_budgets
+from dbbstation.circles.extremes import without_noise
 from dbbstation.circles.path import Filter
 from dbbstation.circles.quantity import BudgetQuantity
-from dbbstation.circles.rice import without_noise
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure

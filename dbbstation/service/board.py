@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.plan.circle import Direction
+from dbbstation.service.held_line import ReadingRate
 from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.service.messages import Message, Weight, message_of
-from dbbstation.service.reading_rate import ReadingRate
 from dbbstation.station import events
 from dbbstation.station.states import RECORDING, State
 

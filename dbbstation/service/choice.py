@@ -13,7 +13,7 @@ from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy, SessionDetails
 from dbbstation.files.recordings.session import SESSION_FILE, read_session
 from dbbstation.instrument.library import load_instrument, with_zero
-from dbbstation.plan.duration import circles_s
+from dbbstation.plan.circle import circles_s
 from dbbstation.plan.order import LARGEST_LEAK, height_and_drift, mountings
 from dbbstation.service.memory import Line
 from dbbstation.service.order import Gate, Order, ordered
@@ -22,7 +22,7 @@ from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.opening import check_not_mixed
 from dbbstation.station.programs import load_programs
 from dbbstation.station.schedule import Schedule
-from dbbstation.system.virtual_ports import is_virtual
+from dbbstation.system.ports import is_virtual
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -22,9 +22,8 @@ from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepa
 from dbbstation.service.held_line import HeldLine, HeldOpen
 from dbbstation.service.job import Call
 from dbbstation.service.memory import VIRTUAL, Line, Memory
-from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import ProbeOutcome, ports, probe
-from dbbstation.service.runner import Runner
+from dbbstation.service.runner import Runner, opener
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.virtual_place import virtual_place
 from dbbstation.service.work import BackgroundWork, WorkProgress

@@ -1,4 +1,4 @@
-"""An instrument that stays open for the checklist, the bar and the circles."""
+"""An instrument that stays open for the checklist, the bar and the circles; its rate and its waiting limits."""
 
 from __future__ import annotations
 
@@ -6,20 +6,88 @@ import threading
 import time
 from collections import deque
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from dbbstation.errors import StationError
 from dbbstation.instrument.driver import Instrument
-from dbbstation.service.patience import RECONNECT_S, driver_patience
-from dbbstation.service.reading_rate import ReadingRate
 from dbbstation.station.run_record import unrecorded
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.station.events import Sample
+
+RECONNECT_S = 30.0
+"""Time that a measurement waits for an unplugged adapter, so that a person can notice and reconnect it [s]."""
+
+_MEMORY_S = 2.0
+"""Time for which the driver remembers the fastest arrival of samples [s]; in a longer time the instrument's clock
+drifts."""
+
+_SCALED_MEMORY_S, _SCALED_TIMEOUT_S = 60.0, 5.0
+"""Memory of the fastest arrival and patience with a silent line on scaled time [s of real time]. On scaled time a short
+pause of the computer is a long time."""
+
+
+_WAITING_TIMEOUT_S = 600.0
+"""Patience with a machine that waits [s]: it is silent while runs are judged. If its program ends, the line closes at
+once."""
+
+
+class DriverPatience(TypedDict):
+    """Arguments of `Instrument`."""
+
+    memory_s: float
+    timeout_s: float | None
+
+
+def driver_patience(time_scale: float, *, waits: bool = False) -> DriverPatience:
+    """Return arguments of `Instrument` on a clock `time_scale` times as fast as real time."""
+    if waits:
+        return {"memory_s": _MEMORY_S, "timeout_s": _WAITING_TIMEOUT_S}
+    if time_scale == 1.0:
+        return {"memory_s": _MEMORY_S, "timeout_s": None}
+    return {"memory_s": _SCALED_MEMORY_S * time_scale, "timeout_s": _SCALED_TIMEOUT_S}
+
+
+_WINDOW_S = 2.0
+"""Time over which readings are counted [s]: enough for a few readings per second, and short enough to follow a
+change."""
+
+_FEWEST = 3
+
+
+class ReadingRate:
+    """Counts samples over the last seconds of their own time."""
+
+    def __init__(self) -> None:
+        self._batches: deque[tuple[float, int]] = deque()
+        self.total = 0
+
+    def add(self, samples: Sequence[Sample]) -> None:
+        """Count samples in time order; a changed clock resets the count."""
+        last_s = samples[-1].t_s
+        if self._batches and not 0.0 <= samples[0].t_s - self._batches[-1][0] <= _WINDOW_S:
+            self._batches.clear()
+        self._batches.append((last_s, len(samples)))
+        self.total += len(samples)
+        while len(self._batches) > _FEWEST and self._batches[0][0] < last_s - _WINDOW_S:
+            self._batches.popleft()
+
+    def forget(self) -> None:
+        """Reset for another line."""
+        self._batches.clear()
+
+    @property
+    def per_s(self) -> float | None:
+        """Return readings per second; None for too few."""
+        if len(self._batches) < _FEWEST:
+            return None
+        span_s = self._batches[-1][0] - self._batches[0][0]
+        return (sum(count for _, count in self._batches) - self._batches[0][1]) / span_s if span_s > 0.0 else None
+
 
 _TICK_S = 0.05
 """Interval of readings while no other part reads the instrument [s]: as often as a person can read a display."""

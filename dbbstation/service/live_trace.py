@@ -8,15 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import TraceError
+from dbbstation.errors import StationError, TraceError
+from dbbstation.files.formats.session import RunState
+from dbbstation.files.recordings.former import former_sessions
+from dbbstation.files.recordings.session import read_session
+from dbbstation.station.events import RunId
 from dbbstation.trace.analysis import best_circle
+from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
-    from dbbstation.station.events import RunId, Sample
+    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.station.events import Sample
     from dbbstation.trace.circle import RawCircle
 
 _FIRST_ROOM = 4096
@@ -175,3 +181,25 @@ def difference(ccw: Derived, cw: Derived) -> Derived | None:
     left_um = ccw.deviation_um - less_um
     known = np.isfinite(left_um)
     return Derived(View.DIFFERENCE, ccw.measured, left_um, float(np.abs(left_um[known]).max())) if known.any() else None
+
+
+def last_traces(folder: Path, test: str) -> dict[Direction, LiveTrace]:
+    """Return a test's last accepted circles in the former session, by direction; may be empty.
+
+    Raises:
+        InputError: the present session cannot be read.
+    """
+    formers = former_sessions(read_session(folder), folder.absolute().parent, {test})
+    if not formers:
+        return {}
+    _, session = formers[0]
+    traces = {}
+    for run in session.in_state(RunState.ACCEPTED):
+        if run.test != test:
+            continue
+        try:
+            circle = cut(session.load(run).recording, session.circle(run))
+        except StationError:
+            continue
+        traces[run.direction] = LiveTrace.of(RunId(test, run.direction, run.repeat, run.mounting or 1), circle)
+    return traces

@@ -27,7 +27,7 @@ from dbbstation.service.choice import Choice
 from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
-from dbbstation.service.shop_temperature import add_note
+from dbbstation.service.session_notes import add_note
 from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.station.opening import SHIFT_S
 

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import queue
 import threading
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dbbstation.errors import StationError
 from dbbstation.service.board import SequenceOpened
+from dbbstation.station.assembly import assemble
 from dbbstation.station.commands import Quit
 from dbbstation.station.events import Event, Fault, ReadingsSeen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
     from contextlib import AbstractContextManager
 
     from dbbstation.service.held_line import HeldLine
+    from dbbstation.station.assembly import Job
     from dbbstation.station.commands import Command
     from dbbstation.station.engine import Station
+    from dbbstation.station.events import Observer
     from dbbstation.station.judging import JudgedRun
     from dbbstation.station.schedule import Schedule
 
@@ -132,3 +135,22 @@ class Runner:
     def _observe(self, event: Event) -> None:
         self._told = self._told or isinstance(event, Fault)
         self._mail.put(event)
+
+
+def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> Opener:
+    """Return a function that borrows the instrument and opens the session again."""
+
+    @contextmanager
+    def opened() -> Iterator[OpenStation]:
+        with line.lent() as source:
+            workplace = assemble(job, source, source.unreadable, asked=line.protocol.ask.asked)
+            for observer in observers:
+                workplace.station.subscribe(observer)
+            try:
+                virtual = workplace.writer.session.virtual is True
+                known = workplace.judge.known()
+                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), known, virtual)
+            finally:
+                workplace.close()
+
+    return opened

@@ -10,7 +10,7 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.former import dated_folders
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.duration import circles_s
+from dbbstation.plan.circle import circles_s
 from dbbstation.station.schedule import Schedule
 
 if TYPE_CHECKING:

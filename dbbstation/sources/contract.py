@@ -18,10 +18,10 @@ import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.laws.contract import Parameter as Parameter  # noqa: PLC0414 - part of the contract: sources take it from here
+from dbbstation.laws.contract import Texts as Texts  # noqa: PLC0414 - part of the interface: sources import it from here
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import Struts, inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the interface: sources import it from here
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:

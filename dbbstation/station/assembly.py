@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.session import RunState, SessionDetails
-from dbbstation.files.recordings.bar_reach import unlike_bar
 from dbbstation.files.recordings.former import former_sessions
+from dbbstation.files.recordings.session_checks import unlike_bar
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.machine.difference import check_model_is_of
-from dbbstation.plan.duration import circles_s
+from dbbstation.plan.circle import circles_s
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.events import RunCompleted, RunId, Sample

@@ -111,3 +111,25 @@ def live_phi_deg(circle: Circle, since_feed_in_s: float) -> float:
     feed_in_rest_s = circle.feed_in_mm / 2.0 / (circle.feed_mm_min / 60.0)
     on_arc_s = max(since_feed_in_s - feed_in_rest_s - CORNER_DWELL_S, 0.0)
     return min(on_arc_s * circle.turning_deg_s, circle.swept_deg) - circle.overshoot_deg
+
+
+@dataclass(frozen=True)
+class BarAtFeedIn:
+    """The bar's position at the feed-in point.
+
+    Attributes:
+        long_mm: reading less the length at the feed-in point.
+        seated: whether the sequence accepts it: nearer than half the feed-in, less the detector's margin.
+        backwards: on the opposite side, as with an inverted gauge.
+    """
+
+    long_mm: float
+    seated: bool
+    backwards: bool = False
+
+
+def seat(length_mm: float, circle: Circle) -> BarAtFeedIn:
+    """Return the bar's position relative to the feed-in point of the next circle."""
+    long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)
+    margin_mm = (0.5 - HYSTERESIS) * circle.feed_in_mm
+    return BarAtFeedIn(long_mm, abs(long_mm) < margin_mm, abs(long_mm + 2.0 * circle.feed_in_mm) < margin_mm)

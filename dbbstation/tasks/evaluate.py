@@ -62,9 +62,13 @@ def evaluate(
         StoppedError: `stop` returned True.
     """
     from dbbstation.calibration.reporting import evaluation
-    from dbbstation.calibration.reporting.evaluation import LowPassedCircularity, plane_figures, plane_uncertainty_um
+    from dbbstation.calibration.reporting.evaluation import (
+        LowPassedCircularity,
+        evaluated_tolerances,
+        plane_figures,
+        plane_uncertainty_um,
+    )
     from dbbstation.calibration.reporting.prediction import predicted_circles
-    from dbbstation.calibration.reporting.tolerances import evaluated_tolerances
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.results.evaluation import EvaluationResult

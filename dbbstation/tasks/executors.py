@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from dbbstation.computing.background import Background
 from dbbstation.computing.processes import processes
+from dbbstation.computing.threads import Background
 from dbbstation.errors import StationError
-from dbbstation.files.program_identity import differences_of, program_identity
+from dbbstation.files.keys import differences_of, program_identity
 from dbbstation.system.signals import starting
 
 if TYPE_CHECKING:

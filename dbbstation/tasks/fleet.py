@@ -13,9 +13,8 @@ from dbbstation.files.atomic import write_bytes
 from dbbstation.files.fleet_folder import FleetFolder
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book, note_known
-from dbbstation.files.keys import files_of_session, key_of
+from dbbstation.files.keys import files_of_session, key_of, program_identity
 from dbbstation.files.places import real_path, text_of_name
-from dbbstation.files.program_identity import program_identity
 from dbbstation.files.provenance import from_python
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import read_session

@@ -50,3 +50,21 @@ class Recording(WithLogged):
             theta_deg=None if self.theta_deg is None else self.theta_deg[rows],
             logged=each(self.logged, lambda values: values[rows]),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRecording:
+    """Samples of one drive, in time order.
+
+    Attributes:
+        position_mm: along the axis, shape (n,).
+        force_n: driving, positive towards greater positions, shape (n,).
+    """
+
+    name: str
+    t_s: Floats
+    position_mm: Floats
+    force_n: Floats
+
+    def __len__(self) -> int:
+        return len(self.t_s)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.content import Content
 
-from dbbstation.computing.background import Background
+from dbbstation.computing.threads import Background
 from dbbstation.errors import StationError
 from dbbstation.facts.serialise import as_objects
 from dbbstation.service.former_sessions import before_and_now
@@ -14,10 +14,10 @@ from dbbstation.service.job import SessionTask
 from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import HEADING, in_force_line, test_line, way_back_lines, worst_lines
-from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import ChooseQuestion
 from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable

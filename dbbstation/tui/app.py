@@ -11,34 +11,30 @@ from textual.binding import Binding
 from textual.events import InputEvent, Paste
 from textual.screen import ModalScreen
 
-from dbbstation.computing.background import Background
+from dbbstation.computing.threads import Background
 from dbbstation.errors import StationError
 from dbbstation.service.after import After
 from dbbstation.service.board import Board
-from dbbstation.service.last_session import last_traces
+from dbbstation.service.live_trace import last_traces
 from dbbstation.service.messages import Message, Weight
 from dbbstation.service.operated import JobAnswer
-from dbbstation.service.shop_temperature import add_note, shop_degc
-from dbbstation.service.verdicts import give_verdict
+from dbbstation.service.session_notes import add_note, give_verdict, shop_degc
 from dbbstation.station.commands import AddNote, Command, Judge, Quit
 from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
 from dbbstation.tui import texts
-from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
-from dbbstation.tui.controls import show_controls
-from dbbstation.tui.explained import ExplainedScreen
-from dbbstation.tui.help_screen import HelpScreen
-from dbbstation.tui.help_texts import HELP
+from dbbstation.tui.board_screen import BoardScreen, Shown, ask_to_give_up
+from dbbstation.tui.help_screen import HELP, HelpScreen
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
-from dbbstation.tui.plain_terminal import plain_driver
+from dbbstation.tui.plain_terminal import plain_driver, show_controls
 from dbbstation.tui.questions import GiveUpQuestion, TemperatureQuestion, TypeQuestion
+from dbbstation.tui.reception import ExplainedScreen
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.row_screen import RowScreen
-from dbbstation.tui.shown import Shown
 from dbbstation.tui.start_screen import StartScreen
 
 if TYPE_CHECKING:

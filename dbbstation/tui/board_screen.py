@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from dbbstation.quality.answer import Advice
 from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import RECORDING, VERDICT
-from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion
+from dbbstation.tui.reception import ExplainedScreen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from textual.binding import BindingType
 
+    from dbbstation.plan.plan import PlannedTest
     from dbbstation.service.board import Board
-    from dbbstation.tui.shown import Shown
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Plan and plate, and the shop's text for an operator in trouble."""
+
+    plan: str
+    bores: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    cell_aspect: float = 2.0
+    tests: Mapping[str, PlannedTest] = field(default_factory=dict)
+    trouble: str = ""
+
 
 COMMANDS: dict[str, Command] = {
     "start": Start(),

@@ -13,16 +13,12 @@ from dbbstation.service.board import RunDecision
 from dbbstation.service.live_trace import View
 from dbbstation.station.states import VERDICT, State
 from dbbstation.tui.board_screen import RunScreen
-from dbbstation.tui.findings_panel import FindingsPanel
-from dbbstation.tui.jig_map import JigMap
 from dbbstation.tui.messages_screen import MessageLines
-from dbbstation.tui.now_line import NowLine
+from dbbstation.tui.now_line import NowLine, ProgressLine, TitleLine
 from dbbstation.tui.panel import Panel, lines
-from dbbstation.tui.progress_line import ProgressLine
 from dbbstation.tui.reading_panel import ReadingPanel
-from dbbstation.tui.run_list import RunList
-from dbbstation.tui.set_up_panel import SetUpPanel, StepsPanel
-from dbbstation.tui.title_line import TitleLine
+from dbbstation.tui.run_list import FindingsPanel, RunList
+from dbbstation.tui.set_up_panel import JigMap, SetUpPanel, StepsPanel
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
@@ -33,8 +29,7 @@ if TYPE_CHECKING:
 
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunCompleted
-    from dbbstation.tui.board_screen import Desk
-    from dbbstation.tui.shown import Shown
+    from dbbstation.tui.board_screen import Desk, Shown
 
 
 _NAME = 12

@@ -10,7 +10,7 @@ from textual.content import Content
 
 from dbbstation.service.choice import SetUpPart
 from dbbstation.service.order import Gate, Order
-from dbbstation.service.shop_temperature import shop_degc
+from dbbstation.service.session_notes import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.bar_screen import BarScreen
 from dbbstation.tui.prepare_screen import PrepareScreen

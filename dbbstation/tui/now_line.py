@@ -1,4 +1,4 @@
-"""The line that states the next action."""
+"""Lines over the whole width: plan and state, the next action, the progress."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from dbbstation.quality.answer import Advice
 from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.sentences import now, now_for_operator
+from dbbstation.tui.texts import VIRTUAL_BANNER
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,3 +50,80 @@ class OperatorNowLine(NowLine):
     def __init__(self, trouble: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._say = partial(now_for_operator, trouble=trouble)
+
+
+_FIXED = 60
+"""Number of characters beside the two bars."""
+
+_SHORTEST = 6
+
+
+class ProgressLine(Panel):
+    """Two bars with numbers in one line."""
+
+    def text(self, board: Board) -> Content:
+        length = max((self.size.width - _FIXED) // 2, _SHORTEST)
+        count = len(board.tasks)
+        done = board.accepted / count if count else 0.0
+        return Content.assemble(
+            _circle(board, length), "   plan ", *_bar(done, length), f" {board.accepted} of {count} accepted"
+        )
+
+
+def _circle(board: Board, length: int) -> Content:
+    announced = board.announced
+    if announced is None or board.state not in RECORDING:
+        return Content.assemble("circle ", *_bar(0.0, length), f" {'not running':22}")
+    circle = announced.circle
+    swept = circle.swept_deg if board.state is State.LEAVING else board.swept_deg
+    left_s = max(circle.swept_deg - swept, 0.0) / circle.turning_deg_s
+    text = f" {swept:3.0f}° of {circle.swept_deg:3.0f}°, {left_s:3.0f} s left"
+    return Content.assemble("circle ", *_bar(swept / circle.swept_deg, length), f"{text:23}")
+
+
+def _bar(share: float, length: int) -> tuple[Content, Content]:
+    full = round(min(max(share, 0.0), 1.0) * length)
+    return Content.styled("━" * full, "bold $text-primary"), Content.styled("─" * (length - full), "dim")
+
+
+def banner(*, virtual: bool) -> Content:
+    """Return the mark of a virtual machine for the top line."""
+    return Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning") if virtual else Content("")
+
+
+class TitleLine(Panel):
+    """One line over the whole width."""
+
+    def __init__(self, plan: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._plan = plan
+
+    def text(self, board: Board) -> Content:
+        sign = banner(virtual=board.virtual)
+        run: list[Content] = []
+        if board.announced is not None and board.finished is None:
+            run = [
+                Content(f"run {board.announced.number} of {board.announced.count}"),
+                Content.styled(board.announced.run.label, "bold"),
+            ]
+        state = Content(str(board.state) if board.state else "opening")
+        # What stands at the end is the most important; where there is no room the plan's name is shortened first.
+        room = (self.content_size.width or _NARROWEST) - len(sign) - 1
+        rest = Content(" · ").join([*run, state])
+        plan = _shortened(self._plan, room - len(rest) - len(" · "))
+        if not plan and len(rest) > room:
+            rest = Content(" · ").join([*run[1:], state])
+        return sign + (Content.styled(f" {plan}", "bold") + Content(" · ") if plan else Content(" ")) + rest
+
+
+_NARROWEST = 80
+"""Assumed columns before the line has a size: those of the smallest terminal."""
+
+_SHORTEST_NAME = 4
+"""Least number of shown characters of a name."""
+
+
+def _shortened(name: str, room: int) -> str:
+    if len(name) <= room:
+        return name
+    return f"{name[: room - 1].rstrip()}…" if room >= _SHORTEST_NAME else ""

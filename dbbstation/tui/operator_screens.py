@@ -10,22 +10,18 @@ from textual.content import Content
 from textual.widgets import Footer, Static
 
 from dbbstation.quality.conformity import Conformity
-from dbbstation.service.shop_temperature import shop_degc
+from dbbstation.service.session_notes import shop_degc
 from dbbstation.station.states import State
 from dbbstation.tui import texts
-from dbbstation.tui.block_letters import block_rows, largest
 from dbbstation.tui.board_screen import RunScreen
-from dbbstation.tui.explained import ExplainedScreen
-from dbbstation.tui.jig_map import JigMap
-from dbbstation.tui.large_screen import LargeFigures
-from dbbstation.tui.now_line import OperatorNowLine
+from dbbstation.tui.large_screen import LargeFigures, block_rows, largest
+from dbbstation.tui.now_line import OperatorNowLine, ProgressLine, TitleLine, banner
 from dbbstation.tui.panel import lines
-from dbbstation.tui.progress_line import ProgressLine
 from dbbstation.tui.questions import TypeQuestion, YesQuestion
 from dbbstation.tui.reading_panel import ReadingPanel
+from dbbstation.tui.reception import ExplainedScreen
 from dbbstation.tui.row_screen import RowScreen
-from dbbstation.tui.set_up_panel import SetUpPanel, StepsPanel
-from dbbstation.tui.title_line import TitleLine, banner
+from dbbstation.tui.set_up_panel import JigMap, SetUpPanel, StepsPanel
 
 if TYPE_CHECKING:
     from collections.abc import Callable

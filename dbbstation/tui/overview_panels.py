@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.plan.circle import Direction
-from dbbstation.plan.duration import circles_s
+from dbbstation.plan.circle import Direction, circles_s
 from dbbstation.quality.finding import against_limit
 from dbbstation.service.board import Mark, RunDecision
 from dbbstation.service.messages import problem_alone
 from dbbstation.station.commands import GoTo
 from dbbstation.station.states import State
 from dbbstation.tui import texts
-from dbbstation.tui.findings_panel import STYLES as FINDING_STYLES
 from dbbstation.tui.panel import Panel, cut, lines, window
 from dbbstation.tui.run_list import SIGNS
+from dbbstation.tui.run_list import STYLES as FINDING_STYLES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunCompleted
     from dbbstation.station.schedule import Task
-    from dbbstation.tui.shown import Shown
+    from dbbstation.tui.board_screen import Shown
 
 _CELL = 12
 """Least number of columns of a bore on the map, or of a test with its signs."""

@@ -13,9 +13,9 @@ from dbbstation.service.board import RunDecision
 from dbbstation.station.commands import GoTo, Judge
 from dbbstation.station.states import State
 from dbbstation.tui.board_screen import BoardScreen
+from dbbstation.tui.now_line import TitleLine
 from dbbstation.tui.overview_panels import ChosenRun, ChosenTest, LeftLine, PlateMap, TestList
 from dbbstation.tui.questions import ReasonQuestion
-from dbbstation.tui.title_line import TitleLine
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult
@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Direction
     from dbbstation.station.events import RunCompleted
-    from dbbstation.tui.board_screen import Desk
-    from dbbstation.tui.shown import Shown
+    from dbbstation.tui.board_screen import Desk, Shown
 
 _VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecision.REJECTED}
 """Verdict that each key takes back."""

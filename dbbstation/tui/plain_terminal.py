@@ -1,4 +1,4 @@
-"""Characters for limited terminals: without UTF-8, or a Linux console without braille."""
+"""Characters for limited terminals: without UTF-8, or a Linux console without braille; control characters are shown."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import os
 import re
 import sys
 import unicodedata
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from rich import control
+from textual import content
+
+from dbbstation.text.printable import TEXT
 from dbbstation.tui.braille import BLANK
 
 if TYPE_CHECKING:
@@ -63,3 +67,9 @@ def _alike(found: re.Match[str]) -> str:
         return "#"
     first = unicodedata.normalize("NFKD", character)[0]
     return first if first.isascii() else "?"
+
+
+def show_controls() -> None:
+    """Let Textual and Rich show control characters."""
+    for table in (content._CONTROL_STRIP_TRANSLATE, control._CONTROL_STRIP_TRANSLATE):  # noqa: SLF001 (no other way in)
+        cast("dict[int, str]", table).update(TEXT)

@@ -9,14 +9,14 @@ from textual.content import Content
 
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.service.held_line import AGAIN_S
-from dbbstation.service.seated import seat
-from dbbstation.service.shop_temperature import shop_degc
+from dbbstation.service.session_notes import shop_degc
+from dbbstation.station.detector import seat
 from dbbstation.tui import texts
-from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import ChooseQuestion, TemperatureQuestion
 from dbbstation.tui.reading_panel import seat_words
 from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

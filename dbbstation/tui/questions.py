@@ -10,9 +10,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from dbbstation.service.shop_temperature import shop_degc
+from dbbstation.service.session_notes import shop_degc
 from dbbstation.tui import texts
-from dbbstation.tui.cursor import mark_chosen
+from dbbstation.tui.row_screen import mark_chosen
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.service.seated import seat
+from dbbstation.station.detector import seat
 from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
 from dbbstation.tui.texts import NOT_SEATED_LONG, NOT_SEATED_SHORT, SEATED, SEATED_BACKWARDS
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Circle
     from dbbstation.service.board import Board
-    from dbbstation.service.seated import BarAtFeedIn
+    from dbbstation.station.detector import BarAtFeedIn
     from dbbstation.station.events import Sample
 
 _STALE_S = 1.5

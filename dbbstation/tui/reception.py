@@ -1,8 +1,10 @@
-"""Services of the app for screens before and after a sequence."""
+"""What the screens need of the app, and the app of the screens."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+
+from textual.screen import Screen
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,3 +31,13 @@ class StationDesk(Protocol):
 
     def show_results(self, folder: Path) -> None:
         """Show the possible tasks on a measured session."""
+
+
+class ExplainedScreen(Screen[None]):
+    """A screen that F1 explains."""
+
+    help_name: ClassVar[str] = ""
+    """Name of its text in the help."""
+
+    def look(self) -> None:
+        """Show changes from other parts of the program."""

@@ -26,10 +26,10 @@ from dbbstation.service.work import WorkProgress
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_lines import worst_lines
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
-from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import YesQuestion
 from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -9,15 +9,24 @@ from textual.content import Content
 from textual.widgets import Footer, OptionList, Static
 from textual.widgets.option_list import Option
 
-from dbbstation.tui.cursor import mark_chosen
-from dbbstation.tui.explained import ExplainedScreen
-from dbbstation.tui.help_texts import HELP
-from dbbstation.tui.title_line import banner
+from dbbstation.tui.help_screen import HELP
+from dbbstation.tui.now_line import banner
+from dbbstation.tui.reception import ExplainedScreen
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from textual.app import ComposeResult
+
+CURSOR = "▸ "
+"""Text before the chosen row."""
+
+
+def mark_chosen(options: OptionList, rows: Sequence[Content]) -> None:
+    """Show rows with the mark before the chosen row."""
+    for place, row in enumerate(rows[: options.option_count]):
+        mark = CURSOR if place == options.highlighted else " " * len(CURSOR)
+        options.replace_option_prompt_at_index(place, Content(mark) + row)
 
 
 class RowScreen(ExplainedScreen):

@@ -1,4 +1,4 @@
-"""Planned runs by test, each with sign and word."""
+"""Planned runs by test, each with sign and word, and the findings of a circle that awaits its verdict."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.quality.answer import Advice, rank
+from dbbstation.quality.finding import FindingVerdict, against_limit
 from dbbstation.service.board import Mark
-from dbbstation.tui.panel import Panel, cut, window
+from dbbstation.tui.panel import Panel, cut, lines, window
 
 if TYPE_CHECKING:
+    from dbbstation.quality.finding import Finding
     from dbbstation.service.board import Board
+    from dbbstation.station.events import RunCompleted
 
 SIGNS = {
     Mark.OPEN: ("·", "dim"),
@@ -51,3 +55,52 @@ class RunList(Panel):
 def _cell(direction: str, mark: Mark, *, doubted: bool = False) -> Content:
     (sign, style), word = (("!", "bold $text-error"), "doubted") if doubted else (SIGNS[mark], mark.value)
     return Content.assemble(f"{direction:3} ", (f"{sign} {word}".ljust(_CELL - 4), style))
+
+
+_ROW = 37
+"""Columns of a row before the panel has a size, as on the right side of the smallest terminal."""
+
+STYLES = {
+    FindingVerdict.GOOD: "$text-success",
+    FindingVerdict.CANNOT_TELL: "$text-warning",
+    FindingVerdict.WRONG: "bold $text-error",
+}
+"""Green, amber, red."""
+
+_ORDER = list(reversed(STYLES))
+"""Order of the findings: faults are first, so that a small screen shows them."""
+
+WORD_STYLES = {
+    Advice.GOOD: "bold reverse $text-success",
+    Advice.CANNOT_TELL: "bold reverse $text-warning",
+    Advice.REPEAT: "bold reverse $text-error",
+}
+"""Styles of a run's verdict, visible without colours too."""
+
+
+class FindingsPanel(Panel):
+    """The run's verdict, then as many findings as fit."""
+
+    can_grow = True
+
+    def text(self, board: Board) -> Content:
+        if board.completed is None:
+            return Content("")
+        ordered = sorted(board.completed.findings, key=lambda one: (_ORDER.index(one.verdict), rank(one)))
+        return lines(word_of(board.completed), *(_row(finding, self.content_size.width or _ROW) for finding in ordered))
+
+
+def word_of(completed: RunCompleted) -> Content:
+    """Return the highlighted verdict on a run."""
+    word = completed.answer.word
+    return Content.styled(f" {word} ", WORD_STYLES[word])
+
+
+def _row(finding: Finding, width: int) -> Content:
+    name, word, numbers = finding.name.value, finding.verdict.value, against_limit(finding)
+    room = max(width - len(name) - len(word) - 1, 0)
+    if (
+        len(numbers) >= room
+    ):  # at least one column apart: the limit is what there is no room for, it stands in the sentence above
+        numbers = "" if finding.value is None else f"{finding.value:.1f} {finding.unit}".rstrip()
+    return Content.assemble(f"{name}{numbers:>{room}} ", (word, STYLES[finding.verdict]))

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 
 from dbbstation.tui import texts
-from dbbstation.tui.durations import duration
 from dbbstation.tui.new_screen import NewScreen
 from dbbstation.tui.panel import cut
 from dbbstation.tui.prepare_screen import PrepareScreen
 from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
     from textual.binding import BindingType

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from dbbstation.circles.rice import without_noise
+from dbbstation.circles.extremes import without_noise
 
 DRAWS = 2_000
 

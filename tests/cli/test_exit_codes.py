@@ -216,7 +216,7 @@ def test_started_without_a_stream(tmp_path, closed, words, code):
 
 def test_no_file_takes_the_place_of_a_stream():
     """What a library complains of on standard error must not go into a recording."""
-    script = "from dbbstation.cli.streams import open_missing as o; o(); print(open('/dev/null').fileno())"
+    script = "from dbbstation.cli.log import open_missing as o; o(); print(open('/dev/null').fileno())"
     done = subprocess.run(
         ["/bin/sh", "-c", f"exec {shlex.quote(sys.executable)} -c {shlex.quote(script)} <&- 2>&-"],
         capture_output=True,

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.formats.every_format import SCHEMAS
+from dbbstation.files.checking import SCHEMAS
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from tests.files.formats.test_schemas import EXAMPLES

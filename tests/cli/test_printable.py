@@ -40,7 +40,7 @@ TABLES = {
     "files/recordings/run_lines.py": "names the program's own columns in a message",
     "files/recordings/drive_csv.py": "writes numbers under the program's own names",
     "nc/dialects/poses.py": "writes numbers under the program's own names; its comments go through `plain`",
-    "files/recordings/unread.py": "parts a line that it reads, and writes none",
+    "files/recordings/foreign_csv.py": "parts a line that it reads, and writes none",
     "simulators/program.py": "writes numbers for a program, which reads them as they are",
     "tasks/fleet_work.py": "joins names of causes for an option",
 }

@@ -28,13 +28,12 @@ ROUND_IT = {
     "system/handles.py": "opens files for those who ask the gateway, and those that are changed in place",
     "system/replacing.py": "opens folders to write them to disk",
     "files/recordings/journal.py": "creates the file that it writes",
-    "system/port_holders.py": "asks the system in /proc who holds a port",
+    "system/ports.py": "asks the system in /proc who holds a port, and reads the mark that it wrote beside one",
     "system/mounts.py": "asks the system in /proc what is mounted",
     "cli/settings.py": "reads a file of the package",
     "report/html.py": "reads a file of the package",
     "report/pdf.py": "reads what the browser has just printed",
     "files/shipped.py": "reads a file of the package",
-    "system/virtual_ports.py": "reads the mark that it wrote beside a port",
     "simulators/program.py": "creates the file that it writes",
 }
 """Files that open files themselves, each with its reason."""

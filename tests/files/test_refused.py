@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 
-from dbbstation.files.recordings.unread import kind_of
+from dbbstation.files.recordings.foreign_csv import kind_of
 from dbbstation.files.refused import LONGEST_ON_WINDOWS, refusal
 
 

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 from click.testing import CliRunner
 
-from dbbstation.cli.instruments import instruments
+from dbbstation.cli.instruments import instruments, ports
 from dbbstation.cli.monitor import monitor
-from dbbstation.cli.ports import ports
 from dbbstation.cli.replay import replay
 from dbbstation.errors import InstrumentError, OutputError
 from dbbstation.instrument import link
@@ -47,7 +46,7 @@ def test_help_has_an_example(command: click.Command) -> None:
 
 def test_help_loads_no_serial_library() -> None:
     code = (
-        "import sys; from dbbstation.cli import instruments, monitor, ports, replay; "
+        "import sys; from dbbstation.cli import instruments, monitor, replay; "
         "sys.exit(', '.join({'serial', 'pydantic', 'ruamel'} & set(sys.modules)) or None)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -18,13 +18,13 @@ import serial
 from serial import rfc2217
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument import adapters
+from dbbstation.instrument import link
 from dbbstation.instrument.codec import Decoder, encode
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.instrument.link import connected_ports, open_link
 from dbbstation.instrument.symptoms import looks_like, parity_in
-from dbbstation.system.port_holders import holders
+from dbbstation.system.ports import holders
 from dbbstation.virtual.control import ControlServer
 from dbbstation.virtual.wire_clock import ScaledClock
 from dbbstation.virtual.wire_ends import SocketEnd
@@ -82,7 +82,7 @@ class _Plugged:
 @pytest.mark.parametrize("protocol", [ND, STREAM, BINARY], ids=lambda one: one.label)
 def test_the_same_adapter_under_another_name_goes_on(monkeypatch: pytest.MonkeyPatch, protocol) -> None:
     plugged: list[_Plugged] = []
-    monkeypatch.setattr(adapters.list_ports, "comports", lambda: list(plugged))
+    monkeypatch.setattr(link.list_ports, "comports", lambda: list(plugged))
     clock = ScaledClock(5 if protocol is ND else 1)
     with contextlib.ExitStack() as stack:
         first = stack.enter_context(VirtualInstrument(protocol, steady, clock=clock))
@@ -107,7 +107,7 @@ def test_the_same_adapter_under_another_name_goes_on(monkeypatch: pytest.MonkeyP
 def test_an_adapter_that_does_not_come_back_is_an_error_after_the_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     with VirtualInstrument(STREAM, steady) as virtual:
         plugged = [_Plugged(virtual.port, None)]
-        monkeypatch.setattr(adapters.list_ports, "comports", lambda: list(plugged))
+        monkeypatch.setattr(link.list_ports, "comports", lambda: list(plugged))
         with Instrument(STREAM, virtual.port, reconnect_s=0.6) as instrument:
             list(instrument.readings(3))
             plugged.clear()
@@ -121,15 +121,15 @@ def test_an_adapter_that_does_not_come_back_is_an_error_after_the_wait(monkeypat
 
 def test_adapters_without_serial_number_are_told_apart_by_their_socket(monkeypatch: pytest.MonkeyPatch) -> None:
     plugged = [_Plugged("/dev/ttyUSB0", None, "1-1"), _Plugged("/dev/ttyUSB1", None, "1-2")]
-    monkeypatch.setattr(adapters.list_ports, "comports", lambda: plugged)
-    second = adapters.adapter_of("/dev/ttyUSB1")
+    monkeypatch.setattr(link.list_ports, "comports", lambda: plugged)
+    second = link.adapter_of("/dev/ttyUSB1")
     assert second is not None
     assert second.text == "0403:6001 in USB socket 1-2"
     plugged[:] = [_Plugged("/dev/ttyUSB7", None, "1-2")]
-    assert adapters.port_of(second) == "/dev/ttyUSB7"
+    assert link.port_of(second) == "/dev/ttyUSB7"
     plugged[:] = [_Plugged("/dev/ttyUSB1", None, "1-1")]
-    assert adapters.port_of(second) is None
-    assert adapters.adapter_of("/dev/ttyS0") is None
+    assert link.port_of(second) is None
+    assert link.adapter_of("/dev/ttyS0") is None
 
 
 # The wrong instrument, the wrong settings.

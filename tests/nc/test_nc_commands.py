@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from dbbstation.cli.compensate import compensate
-from dbbstation.cli.program import program
+from dbbstation.cli.programs import compensate, program
 from dbbstation.errors import InputError, ModelError, OutputError, StationError, TravelError
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.shipped import shipped_folder

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
+from dbbstation.circles.budget import spectrum_of
 from dbbstation.circles.path import Filter
-from dbbstation.circles.spectrum import spectrum_of
 from dbbstation.report.circles_figure import PlotKind, Plotted, draw_circles
 from dbbstation.report.drawing import in_style
 from dbbstation.report.label_places import Box, place_labels

@@ -16,8 +16,8 @@ from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.protocol import Protocol
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.held_line import HeldLine
-from dbbstation.service.seated import seat
 from dbbstation.station import events
+from dbbstation.station.detector import seat
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.virtual.wire import VirtualInstrument
 from tests.tui.happenings import Happening, make_plan

@@ -17,7 +17,7 @@ from dbbstation.plan.circle import Direction
 from dbbstation.service.after import USUAL, After
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, keep_models
 from dbbstation.service.job import Call, SessionTask
-from dbbstation.service.last_session import last_traces
+from dbbstation.service.live_trace import last_traces
 from dbbstation.service.work import WorkProgress
 from tests.plant.mechanisms.balls import CmmScatter
 from tests.plant.plan import subset, table_ii_plan

@@ -22,7 +22,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
-from dbbstation.plan.duration import circle_s
+from dbbstation.plan.circle import circle_s
 from dbbstation.service.after import After, Result
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, SetUpPart
@@ -32,7 +32,7 @@ from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
-from dbbstation.service.shop_temperature import add_note, shop_degc
+from dbbstation.service.session_notes import add_note, shop_degc
 from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.tasks.declare import options_of
 from dbbstation.virtual.wire import VirtualInstrument

@@ -15,7 +15,7 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import After
 from dbbstation.service.job import Call, SessionTask
-from dbbstation.service.verdicts import give_verdict
+from dbbstation.service.session_notes import give_verdict
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Judge
 

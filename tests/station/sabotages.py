@@ -34,7 +34,7 @@ from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.answer import Advice, rank
 from dbbstation.quality.finding import Name
-from dbbstation.service.patience import driver_patience
+from dbbstation.service.held_line import driver_patience
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.station import events

@@ -17,7 +17,7 @@ from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.virtual.control_client import ControlClient
+from dbbstation.virtual.control import ControlClient
 from dbbstation.virtual.truth import random_kinematics
 from tests.station.bench import MACHINE_FILE, POLLED, STREAM
 

@@ -12,10 +12,9 @@ from dbbstation.plan.circle import Direction
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import Patience
-from dbbstation.station.instructions import instructions
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
-from dbbstation.station.sequencer import Sequencer, Waiting
+from dbbstation.station.sequencer import Sequencer, Waiting, instructions
 from dbbstation.station.states import State
 from tests.station.readings import kinds, run_readings, still
 

@@ -24,7 +24,7 @@ from dbbstation.service.session_list import list_sessions
 from dbbstation.station.assembly import Job, Workplace, assemble
 from dbbstation.station.commands import Accept, Quit, Start
 from dbbstation.station.storage import time_of_day
-from dbbstation.system.virtual_ports import _mark, is_virtual, marked_virtual
+from dbbstation.system.ports import _mark, is_virtual, marked_virtual
 from tests.cli.conftest import call
 from tests.station.bench import MACHINE_FILE
 from tests.station.readings import run_readings

@@ -15,7 +15,7 @@ from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
-from dbbstation.tui.shown import Shown
+from dbbstation.tui.board_screen import Shown
 
 BORES = {1: (0.0, 100.0), 2: (-100.0, 100.0), 3: (-100.0, 0.0), 9: (0.0, 0.0), 7: (100.0, 0.0), 5: (0.0, -100.0)}
 RATE_HZ = 20.0

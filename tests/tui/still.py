@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.service.board import SequenceOpened
     from dbbstation.station.commands import Command
     from dbbstation.station.events import Event
-    from dbbstation.tui.shown import Shown
+    from dbbstation.tui.board_screen import Shown
 
 
 _ROUNDS = 4

@@ -24,8 +24,7 @@ from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
-from dbbstation.tui.findings_panel import FindingsPanel
-from dbbstation.tui.help_texts import HELP
+from dbbstation.tui.help_screen import HELP
 from dbbstation.tui.large_screen import LargeFigures, LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.messages_screen import MessagesScreen
@@ -33,6 +32,7 @@ from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion, TemperatureQuestion, TypeQuestion, YesQuestion
 from dbbstation.tui.results_screen import ResultsScreen
+from dbbstation.tui.run_list import FindingsPanel
 from dbbstation.tui.trace_view import _LAST, TraceView
 from tests.tui.happenings import Happening, make_plan
 

@@ -9,7 +9,7 @@ from textual.app import App
 from textual.content import Content
 from textual.widgets import DataTable, Label, Static
 
-from dbbstation.tui.controls import show_controls
+from dbbstation.tui.plain_terminal import show_controls
 
 TITLE = "name\x1b]0;owned\x07\x9b31m\u202e"
 

@@ -23,8 +23,8 @@ from dbbstation.station import events
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.states import VERDICT, State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.board_screen import Shown
 from dbbstation.tui.operator_screens import OperateScreen
-from dbbstation.tui.shown import Shown
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
 from tests.station.bench import MACHINE_FILE

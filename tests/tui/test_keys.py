@@ -8,7 +8,7 @@ from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.bar_screen import BarScreen
 from dbbstation.tui.board_screen import RunScreen
-from dbbstation.tui.help_texts import HELP
+from dbbstation.tui.help_screen import HELP
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.messages_screen import MessagesScreen

@@ -6,10 +6,10 @@ import pytest
 
 from dbbstation.station.states import FINAL, State
 from dbbstation.tui.app import _NOT_OPERATED
-from dbbstation.tui.help_texts import HELP
+from dbbstation.tui.help_screen import HELP
+from dbbstation.tui.now_line import TitleLine
 from dbbstation.tui.overview_panels import LeftLine
 from dbbstation.tui.texts import VIRTUAL_BANNER
-from dbbstation.tui.title_line import TitleLine
 from tests.tui.happenings import Happening
 
 

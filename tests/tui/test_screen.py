@@ -21,18 +21,17 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
 from dbbstation.service.held_line import HeldLine
-from dbbstation.service.opening import opener
-from dbbstation.service.runner import Runner
+from dbbstation.service.runner import Runner, opener
 from dbbstation.service.virtual_place import VirtualPlace, virtual_place
 from dbbstation.station.assembly import Job
 from dbbstation.station.events import Event, FeedInSeen, Observer
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.board_screen import Shown
 from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion, TemperatureQuestion
-from dbbstation.tui.shown import Shown
 from dbbstation.tui.trace_view import TraceView
 from tests.virtual.faulty import FaultyInstrument
 

@@ -14,8 +14,7 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.virtual.cell import VirtualCell
-from dbbstation.virtual.control import CellCommands, ControlServer
-from dbbstation.virtual.control_client import ControlClient
+from dbbstation.virtual.control import CellCommands, ControlClient, ControlServer
 from dbbstation.virtual.machine import Sizes, VirtualMachine
 from dbbstation.virtual.wire_clock import STAND_S, ScaledClock
 from tests.instrument.leaks import nothing_left_open

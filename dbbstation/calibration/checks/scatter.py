@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
+from dbbstation.inference.harmonics import LOW, smooth
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -135,3 +137,13 @@ def _checked(stated_um: float, group: Sequence[MountingOffset]) -> ScatterCheck:
     finding = ScatterVerdict.MORE if low > stated_um else within
     found_um = stated_um * float(np.sqrt(square / freedom))
     return ScatterCheck(stated_um, found_um, (low, high), len(group), finding is not ScatterVerdict.MORE, finding)
+
+
+def fine_noise_mm(calibration: Calibration) -> float:
+    """Return a reading's noise, estimated above the harmonics of smooth misfit [mm]."""
+    square, count = 0.0, 0.0
+    for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
+        rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))
+        square += float(rough @ rough)
+        count += max(len(rough) - (2 * LOW + 1), 1)
+    return float(np.sqrt(square / count))

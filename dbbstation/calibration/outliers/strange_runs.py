@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.noise_level import fine_noise_mm
-from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
-from dbbstation.calibration.outliers.run_remainder import left_of, rms_um, without_shift
+from dbbstation.calibration.checks.scatter import fine_noise_mm
+from dbbstation.calibration.outliers.outlier import (
+    LEAST_UM,
+    STANDS_OUT,
+    Outlier,
+    OutlierKind,
+    left_of,
+    rms_um,
+    without_shift,
+)
 from dbbstation.inference.square_root import chi2_without
 
 if TYPE_CHECKING:

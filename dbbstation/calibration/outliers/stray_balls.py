@@ -9,8 +9,7 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from dbbstation.calibration.checks.scatter import UNKNOWN_MM, MountingOffset, seats_of
-from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
-from dbbstation.calibration.outliers.run_remainder import left_of, shift_of
+from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind, left_of, shift_of
 from dbbstation.errors import CalibrationError
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
 

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from dbbstation.calibration.checks.gaps import gaps
 from dbbstation.calibration.checks.missing_physics import LeftByFit, left_by
-from dbbstation.calibration.checks.noise_level import fine_noise_mm
-from dbbstation.calibration.checks.plan_check import PlanCheck, check_plan
-from dbbstation.calibration.checks.scatter import ScatterCheck, check_scatter, seats_of
+from dbbstation.calibration.checks.plan_check import PlanCheck, check_plan, gaps
+from dbbstation.calibration.checks.scatter import ScatterCheck, check_scatter, fine_noise_mm, seats_of
 from dbbstation.calibration.checks.visibility import Observability, visibility
 from dbbstation.calibration.outliers.outlier import Outlier
 from dbbstation.calibration.reporting.evaluation import EvaluatedRun, rms_um

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from dbbstation.laws.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
-from dbbstation.text.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the interface: sources import it from here
+from dbbstation.laws.contract import Texts as Texts  # noqa: PLC0414, TC001 - part of the interface: sources import it from here
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

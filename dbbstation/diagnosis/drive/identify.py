@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.left_over import LeftOver
-    from dbbstation.trace.drive_recording import DriveRecording
+    from dbbstation.trace.recording import DriveRecording
 
 HELD_BACK = 0.25
 """Final share of the recordings, held out to judge predictions."""

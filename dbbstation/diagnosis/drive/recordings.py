@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
-    from dbbstation.trace.drive_recording import DriveRecording
+    from dbbstation.trace.recording import DriveRecording
 
 DISSIPATES_SIGMA = 5.0
 """Standard deviations below zero at which negative dissipation is significant."""

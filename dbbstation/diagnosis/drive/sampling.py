@@ -12,7 +12,7 @@ from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.trace.drive_recording import DriveRecording
+    from dbbstation.trace.recording import DriveRecording
 
 EVEN = 0.02
 """Negligible deviation of time stamps from even steps, in steps."""

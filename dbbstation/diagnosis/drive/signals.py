@@ -36,7 +36,7 @@ from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.trace.drive_recording import DriveRecording
+    from dbbstation.trace.recording import DriveRecording
 
 PER_CUTOFF = 2.5
 """Samples kept per period of the cut-off."""

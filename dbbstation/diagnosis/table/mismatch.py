@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
-    from dbbstation.laws.contract import TableSource
-    from dbbstation.text.texts import Texts
+    from dbbstation.laws.contract import TableSource, Texts
 
 FAR_STATED = 3.0
 """Distance of a parameter from its stated value, in standard uncertainties, that is reported: one in 400 by chance."""

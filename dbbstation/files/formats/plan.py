@@ -26,7 +26,7 @@ from dbbstation.files.yaml.schema import Partly, Schema, dotted, read_document, 
 from dbbstation.files.yaml.text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, Plate
-from dbbstation.system.names import is_device
+from dbbstation.system.mounts import is_device
 
 NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
 """Plate of a plan with all balls under the spindle: positions are in the machine frame."""

@@ -24,10 +24,9 @@ from dbbstation.files.recordings.seal import (
     sealed_names,
     sealed_over,
 )
-from dbbstation.files.recordings.session import SESSION_FILE, parse_session
-from dbbstation.files.recordings.session_state import Stands, standing
+from dbbstation.files.recordings.session import SESSION_FILE, parse_session, read_session
+from dbbstation.files.recordings.session_state import Stands, session_data, standing
 from dbbstation.files.recordings.session_store import SessionStore
-from dbbstation.files.recordings.session_text import session_data
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -137,3 +136,21 @@ def _kept(folder: Path, name: str, seal: Seal) -> str:
 
 def _last_link(runs: tuple[RunEntry, ...]) -> str:
     return next((run.chain_sha256 for run in reversed(runs) if run.chain_sha256), "")
+
+
+def rebuild(folder: Path) -> tuple[str, int]:
+    """Write the session file from the log; the former one is kept.
+
+    Raises:
+        InputError: there is no log, or it does not fit the session's files.
+        OutputError: another process writes into the session, or the disk refuses.
+    """
+    faults: list[Problem] = []
+    log = read_event_log(folder, faults)
+    if log is None or not log.events:
+        what = f"there is no {EVENTS_FILE} from which the session file could be written"
+        raise InputError(faults or [Problem(str(folder), 0, 0, what, "restore the session file from a backup")])
+    with SessionLock(folder, PATIENCE_S):
+        store = SessionStore(folder, anew=True)
+        read_session(folder)
+    return store.put_aside or "", len(store.log.events)

@@ -15,7 +15,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.number_language import is_number
 from dbbstation.files.recordings.table_csv import given_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
-from dbbstation.trace.drive_recording import DriveRecording
+from dbbstation.trace.recording import DriveRecording
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

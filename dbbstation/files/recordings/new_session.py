@@ -17,8 +17,8 @@ from dbbstation.files.recordings.journal import run_header, run_line, run_name
 from dbbstation.files.recordings.seal import chained, copy_name, is_copy, sealed_over
 from dbbstation.files.recordings.session_checks import check_bar
 from dbbstation.files.recordings.session_name import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE
+from dbbstation.files.recordings.session_state import session_data, text_of
 from dbbstation.files.recordings.session_store import first_log
-from dbbstation.files.recordings.session_text import session_data, text_of
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
 

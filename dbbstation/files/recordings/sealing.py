@@ -24,9 +24,8 @@ from dbbstation.files.recordings.seal import (
     sealed_over,
 )
 from dbbstation.files.recordings.session import SESSION_FILE
-from dbbstation.files.recordings.session_state import SEALED, Stands, mark_of, standing
+from dbbstation.files.recordings.session_state import SEALED, Stands, data_of, mark_of, standing
 from dbbstation.files.recordings.session_store import SessionStore, log_faults
-from dbbstation.files.recordings.session_text import data_of
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import validate

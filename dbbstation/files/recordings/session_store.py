@@ -31,9 +31,9 @@ from dbbstation.files.recordings.session_state import (
     mark_of,
     session_state,
     standing,
+    text_of,
     with_readings,
 )
-from dbbstation.files.recordings.session_text import text_of
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.files.yaml.schema import read_document, validate
 from dbbstation.files.yaml.text import parse_yaml

@@ -18,8 +18,8 @@ from dbbstation.files.recordings.seal import chained, hashes, keep_copies, seale
 from dbbstation.files.recordings.session import no_session, part_entry, read_session
 from dbbstation.files.recordings.session_name import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_set_up import readings_in
+from dbbstation.files.recordings.session_state import session_data
 from dbbstation.files.recordings.session_store import SessionStore, now
-from dbbstation.files.recordings.session_text import session_data
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.calibration.outliers.outlier import Outlier, OutlierKind
 from dbbstation.calibration.outliers.robust import calibrate_robust

@@ -15,7 +15,7 @@ from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.results.drive import drive_result
-from dbbstation.trace.drive_recording import DriveRecording
+from dbbstation.trace.recording import DriveRecording
 
 pytestmark = pytest.mark.slow
 

@@ -17,7 +17,7 @@ from dbbstation.diagnosis.drive.moving import (
     within,
 )
 from dbbstation.diagnosis.drive.signals import LEAST_SHARE, derivatives, signals_of
-from dbbstation.trace.drive_recording import DriveRecording
+from dbbstation.trace.recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 RATE_HZ, CUTOFF_HZ = 1000.0, 40.0

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.facts.value import Value
 from dbbstation.inference.pushes import pooled
 from dbbstation.results.drive import drive_result
-from dbbstation.trace.drive_recording import DriveRecording
+from dbbstation.trace.recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 

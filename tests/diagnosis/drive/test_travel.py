@@ -9,7 +9,7 @@ from dbbstation.diagnosis.drive.recordings import EACH_WAY, recordings_of
 from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.drive.travel import resolution_of, turning_points, ways
-from dbbstation.trace.drive_recording import DriveRecording
+from dbbstation.trace.recording import DriveRecording
 
 RATE_HZ = 100.0
 

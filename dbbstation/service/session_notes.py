@@ -1,4 +1,4 @@
-"""Read the shop's temperature from a typed text and note it in the session."""
+"""Notes, temperatures and verdicts for a session without a running sequence."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter, ValidationError
 
+from dbbstation.errors import OutputError
 from dbbstation.facts.quantities import TemperatureDegc
 from dbbstation.files.formats.session import Note
 from dbbstation.files.recordings.lock import PATIENCE_S
@@ -14,6 +15,8 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from dbbstation.station.commands import Judge
 
 _NOTED: TypeAdapter[float] = TypeAdapter(TemperatureDegc)
 
@@ -38,3 +41,23 @@ def add_note(folder: Path, text: str = "", degc: float | None = None) -> None:
         runs = [run.started for run in writer.runs if run.started is not None]
         notes = [note.made for note in writer.session.notes]
         writer.note(Note(max([datetime.now(UTC), *runs, *notes]), text, degc))
+
+
+RELEASE_S = 5.0
+"""Time within which an ended sequence releases the session [s]."""
+
+
+def give_verdict(folder: Path, command: Judge) -> None:
+    """Note another verdict in the session.
+
+    Raises:
+        InputError: faults of the session.
+        OutputError: no such run, another process writes into the session, or the disk refuses.
+    """
+    with SessionWriter.open(folder, RELEASE_S) as writer:
+        key = (command.test, command.direction, command.repeat)
+        run = next((one for one in writer.runs if (one.test, one.direction, one.repeat) == key), None)
+        if run is None:
+            name = f"{command.test}-{command.direction}-{command.repeat}"
+            raise OutputError(f"the session has no run {name}", where=str(folder), remedy="choose one that it has")
+        writer.judge(run, accepted=command.accepted, reason=command.reason)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.files.provenance import Provenance
-    from dbbstation.results.history import HistoryEvent, HistoryResult, HistoryValue, QuantityHistory
+    from dbbstation.history.watch import TrendEvent
+    from dbbstation.results.history import HistoryResult, HistoryValue, QuantityHistory
 
 WIDTH, HEIGHT = 560, 190
 """Size of a drawing in drawing units."""
@@ -175,7 +176,7 @@ def _heights(low: float, high: float, y: Callable[[float], float]) -> Iterable[T
         tick += step
 
 
-def _event(event: HistoryEvent, at: tuple[float, float], unit: str, coverage_factor: float) -> TrendMark:
+def _event(event: TrendEvent[str], at: tuple[float, float], unit: str, coverage_factor: float) -> TrendMark:
     difference = difference_in_words(event.difference, event.u_difference, unit, coverage_factor)
     words = f"{event.verdict} since {event.since}, seen in {event.found}: {difference}"
     return TrendMark(round(at[0], 1), words, event.verdict.split()[0], round(at[1], 1))

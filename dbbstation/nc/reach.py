@@ -45,18 +45,18 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
     Raises:
         MachineError: names program, line, feed and limit.
     """
-    turning = toolpath.only_turns
-    limit = np.where(turning, machine.turn_limit_deg_min, machine.feed_limit_mm_min)
-    over = (toolpath.kind == RowKind.FEED) & (toolpath.feed > limit)
-    if not over.any():
-        return
-    row = int(np.argmax(over))
-    unit, key = ("deg/min", "greatest_turn_deg_min") if turning[row] else ("mm/min", "greatest_feed_mm_min")
-    raise MachineError(
-        f"the feed is {toolpath.feed[row]:g} {unit}, the machine's greatest {limit[row]:g} {unit}",
-        where=toolpath.where(row),
-        remedy=f"give a smaller F; its file states the limit as `{key}`",
-    )
+    for part in toolpath.parts():
+        turning, feed = part.only_turns, part.feed
+        limit = np.where(turning, machine.turn_limit_deg_min, machine.feed_limit_mm_min)
+        over = (part.kind == RowKind.FEED) & (feed > limit)
+        if over.any():
+            row = int(np.argmax(over))
+            unit, key = ("deg/min", "greatest_turn_deg_min") if turning[row] else ("mm/min", "greatest_feed_mm_min")
+            raise MachineError(
+                f"the feed is {feed[row]:g} {unit}, the machine's greatest {limit[row]:g} {unit}",
+                where=part.where(row),
+                remedy=f"give a smaller F; its file states the limit as `{key}`",
+            )
 
 
 class _Poses:

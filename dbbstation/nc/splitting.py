@@ -60,7 +60,7 @@ COSINE = 0.97
 """Cosine of the greatest angle between short lines of one curve, 14 degrees."""
 
 MOST_CELLS = 1_000_000
-"""Greatest number of cells, equal to `rs274.moves.MOST_ROWS`, because the path is held in memory."""
+"""Greatest number of cells of one part, which are held in memory together."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -345,6 +345,7 @@ class ToolpathBuilder:
         self._rows = np.zeros(64, ROW)
         self._text: dict[int, str] = {}
         self._count = self.fed = self.left = 0
+        self._is_built = False
 
     def count_from(self, offset: Sequence[float]) -> None:
         """Set the offset of following moves' numbers from their poses, shape (6,) [mm, deg]."""
@@ -435,7 +436,10 @@ class ToolpathBuilder:
 
     def built(self) -> Toolpath:
         """Return the toolpath of all rows so far. An axis begins at its first named position; an unknown axis keeps its position."""
-        rows = self._rows[: self._count].copy()
+        rows = self._rows
+        if len(rows) != self._count:
+            rows.resize(self._count, refcheck=False)
+        self._is_built = True
         poses = rows["poses"]
         for axis in np.flatnonzero(np.isnan(poses).any(axis=0)):
             known = np.flatnonzero(~np.isnan(poses[:, axis]))
@@ -472,6 +476,8 @@ class ToolpathBuilder:
         step: int = 0,
     ) -> None:
         behind = self._count + len(poses)
+        if self._is_built:  # a toolpath has these rows
+            self._rows, self._is_built = self._rows.copy(), False
         if behind > len(self._rows):
             self._rows.resize(int(GROWTH * behind), refcheck=False)
         if arc[2] != 0.0:

@@ -94,23 +94,25 @@ class WordDialect(Dialect):
         return (self._written if type(self).write is WordDialect.write else super().write_parts)(parts, head)
 
     def _written(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
-        text, first, state = StringIO(), None, _Modal()
+        # The header, which is known last, comes first.
+        texts, first, state = [""], None, _Modal()
         for part in parts:
             first = part if first is None else first
-            self._put(text, self._body(part, state))
+            texts.append(self._checked(self._body(part, state)))
         if first is None:
             raise ValueError("a program needs a part")
         header, numbers = head()
-        self._put(text, self.end(first))
-        begin = StringIO()
-        self._put(begin, self._head(replace(first, numbers=numbers), header))
-        return begin.getvalue() + text.getvalue()
+        texts[0] = self._checked(self._head(replace(first, numbers=numbers), header))
+        return "".join([*texts, self._checked(self.end(first))])
 
-    def _put(self, text: StringIO, lines: Iterable[str]) -> None:
+    def _checked(self, lines: Iterable[str]) -> str:
+        """Return lines as one text, each with a line feed."""
+        text = StringIO()
         for line in lines:
             if len(line) > self.longest_block and max(map(len, line.split("\n"))) > self.longest_block:
                 raise self.cannot_say(f"a line of more than {self.longest_block} characters")
             text.write(f"{line}\n")
+        return text.getvalue()
 
     def _head(self, toolpath: Toolpath, header: Sequence[str]) -> Iterator[str]:
         yield from self.before_header(toolpath)

@@ -262,7 +262,7 @@ def test_a_stray_percent_sign_is_refused(text):
 BOMBS = {
     "turns": (FIRST + "G3 I10 P1000000000 F100\nM2\n", "beyond 100000"),
     "turns that a word may have": (FIRST + "G3 I10 P99999 F100\nM2\n", f"more than {MOST_ROWS} moves"),
-    "many turns": (FIRST + "G3 I10 P900 F100\n" * 5 + "M2\n", f"more than {MOST_ROWS} moves"),
+    "many turns": (FIRST + "G3 I10 P2000 F100\nG3 I10 P2100\nM2\n", f"more than {MOST_ROWS} moves"),
     "far": (FIRST + "G1 X1000000000 F100\nM2\n", "beyond 100000"),
     "far in inches": ("G20 G90\nG0 X90000 Y0 Z0 A0 B0 C0\nM2\n", "leads beyond 100000 mm"),
     "far by increments": (FIRST + "G91 G0 X60000\nX60000\nM2\n", "leads beyond 100000 mm"),

@@ -119,7 +119,7 @@ class Flow:
         self.files += ((before, file),)
         behind = len(self._text)
         self._text += f"{text}\n"
-        begins = behind + 1 + np.flatnonzero(letters_of(f"{text}\n") == ord("\n"))
+        begins = behind + 1 + np.flatnonzero(letters_of(self._text[behind:]) == ord("\n"))
         self._begins = np.concatenate([self._begins, begins])
         line, begin = 1 + before, 0
         for match in _O_LINE.finditer(text):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import diags_array
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from dbbstation.inference.blocks import compress
 from dbbstation.inference.bounds import BOUNDS
@@ -206,7 +206,7 @@ class Bank:
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
             free = max(len(target) - used, 1.0)
             # Few remaining rows may give too small a noise by chance; more causes would enter and reduce it further.
-            possible = free if self.channel.surely is None else float(chi2.ppf(1.0 - self.channel.surely, free))
+            possible = free if self.channel.surely is None else float(chdtri(free, self.channel.surely))
             innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / possible))
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
             spread, grows_with = self._spread_of(left[:, 0])

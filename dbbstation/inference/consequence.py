@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from dbbstation.inference.detectable import ENTIRELY
 from dbbstation.inference.left_over import SIGNIFICANT
@@ -44,7 +44,7 @@ def may_result(variable: Variable, channel: Channel) -> bool:
     free = len(values) - simulated.shape[1] - carried.shape[1]
     more = carried.shape[1]
     return (
-        free > 0 and float(f_distribution.sf((left - both) / more / max(both / free, 1e-300), more, free)) < SIGNIFICANT
+        free > 0 and float(fdtrc(more, free, (left - both) / more / max(both / free, 1e-300))) < SIGNIFICANT
     )
 
 

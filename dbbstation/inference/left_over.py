@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2, f, norm
+from scipy.special import chdtrc, fdtrc, ndtr
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,7 +71,7 @@ def left_over(settled: Settled) -> LeftOver:
     square = float(left @ left) / freedom
     beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma
     # The noise was estimated on the same rows with more columns, so it is about as uncertain as the square.
-    looks = [ResidualTest("sum of squares", float(f.sf(square, freedom, freedom)), beyond, "")]
+    looks = [ResidualTest("sum of squares", float(fdtrc(freedom, freedom, square)), beyond, "")]
     if channel.time is not None:
         looks += _in_order(left, channel.stretches, settled.noise.sigma)
     blocks = channel.kept_blocks
@@ -105,7 +105,7 @@ def _in_order(left: Floats, stretches: Sequence[slice], sigma: float) -> list[Re
         expected = 1.0 + 2.0 * up * down / total
         variance = (expected - 1.0) * (expected - 2.0) / (total - 1.0)  # [Wald and Wolfowitz, 1940]
         z = (runs - expected) / float(np.sqrt(max(variance, 1e-12)))
-        found.append(ResidualTest("runs of sign", float(norm.cdf(z)), sigma * float(np.std(left)), ""))
+        found.append(ResidualTest("runs of sign", float(ndtr(z)), sigma * float(np.std(left)), ""))
     return found
 
 
@@ -115,7 +115,7 @@ def _by_block(left: Floats, blocks: Sequence[slice], sigma: float) -> ResidualTe
     terms = counts * means**2
     worst = int(terms.argmax())
     size = sigma * abs(float(means[worst]))
-    return ResidualTest("blocks", float(chi2.sf(terms.sum(), len(blocks))), size, f"most in block {worst + 1}")
+    return ResidualTest("blocks", float(chdtrc(len(blocks), terms.sum())), size, f"most in block {worst + 1}")
 
 
 def _over(left: Floats, variable: Variable, sigma: float) -> ResidualTest:
@@ -128,4 +128,4 @@ def _over(left: Floats, variable: Variable, sigma: float) -> ResidualTest:
     worst = int(terms.argmax())
     ends = edges[[worst, min(worst + 1, len(edges) - 1)]]
     where = f"most from {ends[0]:.4g} to {ends[1]:.4g} {variable.unit}".strip()
-    return ResidualTest(variable.name, float(chi2.sf(terms.sum(), len(terms))), sigma * abs(float(means[worst])), where)
+    return ResidualTest(variable.name, float(chdtrc(len(terms), terms.sum())), sigma * abs(float(means[worst])), where)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.coloured import FEWEST_INDEPENDENT
@@ -126,7 +126,7 @@ def slow_chance(settled: Settled) -> float:
         return 1.0
     # The base is assumed to absorb only the slowest frequencies.
     free = max(SLOW - 0.5 * channel.base.samples.shape[1], 2.0)
-    return float(f_distribution.sf(low.sum() / free / following.mean(), 2.0 * free, 2.0 * len(following)))
+    return float(fdtrc(2.0 * free, 2.0 * len(following), low.sum() / free / following.mean()))
 
 
 def _followed(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,5 +57,5 @@ def louder(residuals: Sequence[Floats], begins: Sequence[Integers], length: int)
     if not (elsewhere > 0.0 and spread > 0.0):
         return None
     each = 2.0 * elsewhere**2 / spread
-    chance = float(f_distribution.sf(there / elsewhere, each * len(inside), each * len(outside)))
+    chance = float(fdtrc(each * len(inside), each * len(outside), there / elsewhere))
     return Louder(chance, float(np.sqrt(there)), float(np.sqrt(elsewhere)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import OUT
@@ -63,7 +63,7 @@ def most_of_one_size(sizes: Sequence[Value]) -> list[int]:
 def _is_one(sizes: Sequence[Value]) -> bool:
     mean = pooled(sizes).value
     squares = sum(((one.value - mean) / one.uncertainty) ** 2 for one in sizes)
-    return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - a single size is a group
+    return len(sizes) < 2 or squares <= float(chdtri(len(sizes) - 1, 1.0 - ONE_SIZE))  # noqa: PLR2004 - a single size is a group
 
 
 def pooled(sizes: Sequence[Value]) -> Value:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, centred_coefficients
@@ -93,7 +93,7 @@ def remainder(
 
 
 def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int, float]:
-    chances = [float(f_distribution.sf(square / count, count, freedom)) for square, count in squares]
+    chances = [float(fdtrc(count, freedom, square / count)) for square, count in squares]
     at = int(np.argmin(chances))
     return at, chances[at]
 

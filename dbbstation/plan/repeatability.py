@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
+from scipy.special import chdtri, fdtrc
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,8 +107,8 @@ def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float 
     tail = (1.0 - level) / 2.0
     variances = (
         squares_um2 / freedom,
-        squares_um2 / float(chi2.ppf(1.0 - tail, freedom)),
-        squares_um2 / float(chi2.ppf(tail, freedom)),
+        squares_um2 / float(chdtri(freedom, tail)),
+        squares_um2 / float(chdtri(freedom, 1.0 - tail)),
     )
     s_um, low_um, high_um = (math.sqrt(max(one - cmm_um**2, 0.0)) for one in variances)
     return HolderScatter(s_um, low_um, high_um, s_um / math.sqrt(2.0 * freedom), freedom)
@@ -119,4 +118,4 @@ def _axes_differ(squares: Floats, freedom: int) -> float:
     if squares.min() <= 0.0:
         return 1.0 if squares.max() <= 0.0 else 0.0
     pairs = len(squares) * (len(squares) - 1) / 2
-    return min(1.0, 2.0 * pairs * float(f_distribution.sf(squares.max() / squares.min(), freedom, freedom)))
+    return min(1.0, 2.0 * pairs * float(fdtrc(freedom, freedom, squares.max() / squares.min())))

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import qmc
 
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter
@@ -197,6 +196,8 @@ def _elsewhere(
     spread = np.array([2.0 * p.uncertainty if p.uncertainty else SPREAD * p.size for p in parameters])
     low = np.maximum(np.array([p.low for p in parameters]), np.array(start.values) - spread)
     high = np.minimum(np.array([p.high for p in parameters]), np.array(start.values) + spread)
+    from scipy.stats import qmc  # noqa: PLC0415 - half a second that no other command needs
+
     draws = qmc.Sobol(len(parameters), scramble=True, rng=1).random(16)[: BOUNDS.starts]
     states = [FittedState(tuple((low + (high - low) * draw).tolist()), start.terms) for draw in draws]
     found = squares(states)

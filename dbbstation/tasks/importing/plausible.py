@@ -182,6 +182,6 @@ def chance_of_centres(centres: Iterable[tuple[Ball, Sequence[Floats]]]) -> float
         logs.append(np.log(max(-np.expm1(-distance2 / (2.0 * variance)), np.finfo(float).tiny)))
     if not logs:
         return None
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
-    return float(chi2.sf(-2.0 * sum(logs), 2 * len(logs)))
+    return float(chdtrc(2 * len(logs), -2.0 * sum(logs)))

@@ -43,9 +43,7 @@ def may_result(variable: Variable, channel: Channel) -> bool:
         return False
     free = len(values) - simulated.shape[1] - carried.shape[1]
     more = carried.shape[1]
-    return (
-        free > 0 and float(fdtrc(more, free, (left - both) / more / max(both / free, 1e-300))) < SIGNIFICANT
-    )
+    return free > 0 and float(fdtrc(more, free, (left - both) / more / max(both / free, 1e-300))) < SIGNIFICANT
 
 
 def _with_derivatives(values: Floats, time: Floats, blocks: Sequence[slice]) -> Floats:

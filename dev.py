@@ -36,9 +36,13 @@ CHECKS = (
     ("lint", ["ruff", "check", "."]),
     ("encodings", ["ruff", "check", "--preview", "--select", "PLW1514", "."]),
     ("types", ["mypy"]),
+    ("tests found", ["pytest", "-q", "--collect-only"]),
     ("walls", ["lint-imports"]),
 )
-"""What `test` runs before the tests, two at a time, the longest first: none of them needs the other, and each has one core."""
+"""What `test` runs before the tests, two at a time, the longest first: none of them needs the other, and each has one core.
+
+Finding the tests compiles them once, beside the types; workers that begin together each compile all of them.
+"""
 
 TESTS = ["pytest", "-q", "-n", "auto", "--dist", "worksteal"]
 
@@ -109,7 +113,8 @@ def test(rest: list[str]) -> int:
     failed = 0
     with ThreadPoolExecutor(2) as pool:
         for (name, _), done in zip(CHECKS, pool.map(check, CHECKS), strict=True):
-            print(f"== {name}\n{done.stdout}", end="", flush=True)
+            said = done.stdout.splitlines(keepends=True)
+            print(f"== {name}\n", *(said if done.returncode else said[-1:]), sep="", end="", flush=True)
             if done.returncode != 0:
                 print(f"{name} failed", file=sys.stderr)
                 failed = failed or done.returncode

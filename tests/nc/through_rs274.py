@@ -152,9 +152,14 @@ class _Walk:
             for pose, name in ((self.middle[end], "middle"), (self.tool[end], "end")):
                 there = way.nearest(pose)
                 self._check_on(there, pose, slack + CHORD_MM, f"{name} of piece {end - place} of move {index}")
-            if way.is_at_end(self.tool[end], 2.0 * slack):
+            if way.is_at_end(self.tool[end], 2.0 * slack) and not self._comes_nearer(end, event):
                 return end + 1
         raise DiffersError(f"move {index} does not reach {event.pose}")
+
+    def _comes_nearer(self, end: int, event: Event) -> bool:
+        """Whether the next piece ends nearer to the end of a move: in inches, the last piece may be as short as what is printed."""
+        off_mm = np.linalg.norm((self.tool[end : end + 2] - event.pose) * SCALE, axis=1)
+        return len(off_mm) > 1 and bool(off_mm[1] < off_mm[0]) and self.done[end + 1].kind == "FEED"
 
     @staticmethod
     def _check_on(there: np.ndarray, pose: np.ndarray, slack_mm: float, what: str) -> None:

@@ -1,12 +1,14 @@
-"""The arc of a block, from its centre or radius."""
+"""The arc of a block, from its centre or radius, and its curve, from control points."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
+from dbbstation.nc.rs274.arcs import CHORD_ERROR_MM, Arc, centre_by_radius
+from dbbstation.nc.rs274.codes import ModalGroup, name
 from dbbstation.nc.toolpath import PLANES
 
 if TYPE_CHECKING:
@@ -66,6 +68,36 @@ def arc_of(
         what = f"start and end of the arc lie {first:.4f} and {last:.4f} mm from its centre"
         raise block.place.fault(column, what, "check end point and centre")
     return arc
+
+
+def curve_of(block: ProgramBlock, state: ControlState, target: Floats) -> Floats:
+    """Return points of a Bézier curve in X and Y whose chords keep `CHORD_ERROR_MM`, shape (k, 6), and remove its words.
+
+    G5.1 is quadratic: I and J lead from the begin to the control point. G5 is cubic: P and Q lead from the end to the
+    second control point [LinuxCNC, G5 Cubic Spline and G5.1 Quadratic Spline].
+
+    Raises:
+        BadLine: no such curve.
+    """
+    code = block.codes[ModalGroup.SMOOTHING]
+    letters = "IJPQ" if code.value == 5.0 else "IJ"  # noqa: PLR2004
+    words = [word.value for letter in letters if (word := block.words.pop(letter, None)) is not None]
+    if len(words) < len(letters):
+        what = f"{name('G', code.value)} needs {', '.join(letters)}"
+        raise block.place.fault(code.column, what, "give the control points")
+    offsets = np.array(words).reshape(-1, 2) * state.unit_mm
+    begin, end = state.pose[:2], target[:2]
+    points = np.array([begin, begin + offsets[0], *(end + offsets[1:]), end])[:, None]
+    degree = len(points) - 1
+    # A chord leaves the curve by at most an eighth of its second derivative.
+    second = degree * (degree - 1) * float(np.linalg.norm(np.diff(points, 2, axis=0), axis=-1).max())
+    count = max(1, math.ceil(math.sqrt(second / 8.0 / CHORD_ERROR_MM)))
+    share = np.arange(1, count + 1)[:, None] / count
+    while len(points) > 1:
+        points = (1.0 - share) * points[:-1] + share * points[1:]
+    poses = np.tile(target, (count, 1))
+    poses[:-1, :2] = points[0, :-1]
+    return poses
 
 
 def _turns(block: ProgramBlock) -> int:

@@ -280,7 +280,7 @@ class Modes:
             self._since_cycle = self._motion is not None
         if ModalGroup.PATH in block.codes:
             self._path_control(block)
-        if ModalGroup.SMOOTHING in block.codes:
+        if ModalGroup.SMOOTHING in block.codes and not self.is_curve(block):
             self._smoothing(block)
 
     def _cutter_radius(self, block: ProgramBlock) -> None:
@@ -336,8 +336,14 @@ class Modes:
             corner = allowed.value * self._state.unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
         self.path.corner_mm = corner
 
+    @staticmethod
+    def is_curve(block: ProgramBlock) -> bool:
+        """Return whether a line is a curve: G5 or G5.1 with axes or I and J."""
+        words = block.words.keys() & {*AXES, *CENTRES, *POLAR}
+        return bool(words) and block.code(ModalGroup.SMOOTHING) in {5.0, 5.1}
+
     def _smoothing(self, block: ProgramBlock) -> None:
-        """Remove high-speed modes of other controls (G5 P, G5.1 Q, G187). With axis words, G5 and G5.1 are curves."""
+        """Remove high-speed modes of other controls (G5 P, G5.1 Q, G187)."""
         word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQR"]
         if block.words.keys() & set(AXES + CENTRES):
             raise block.place.fault(word.column, f"{name('G', word.value)} with axes is not read", CURVES)

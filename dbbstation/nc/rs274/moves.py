@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.rs274.arc_words import CENTRES, arc_of
+from dbbstation.nc.rs274.arc_words import CENTRES, arc_of, curve_of
 from dbbstation.nc.rs274.arcs import Arc
-from dbbstation.nc.rs274.codes import CYCLES, TAPS, ModalGroup, name
+from dbbstation.nc.rs274.codes import CURVES, CYCLES, TAPS, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, NoRoomError, element_of, with_plane
 from dbbstation.nc.rs274.cycles import cycle_steps
 from dbbstation.nc.rs274.state import AXES, unknown_place
@@ -20,6 +20,7 @@ from dbbstation.nc.toolpath import (
     PLANES,
     RowKind,
     bits_of,
+    lengths,
 )
 
 if TYPE_CHECKING:
@@ -89,6 +90,31 @@ class Moves(Modes):
         if len(self.path) + arc.chords > MOST_ROWS:
             raise too_long(block)
         return arc
+
+    def _curve(self, block: ProgramBlock, named: list[str]) -> None:
+        code = block.codes[ModalGroup.SMOOTHING]
+        other = block.words.keys() - set("XYIJPQ") or {*block.codes} & {ModalGroup.MOTION, ModalGroup.ONCE}
+        if (
+            not named
+            or other
+            or self._plane != 0
+            or self._cutter is not None
+            or self._absolute_centres
+            or self._left_contour
+        ):
+            what = f"{name('G', code.value)} is a curve in X and Y, without G41, G42, G90.1 and another motion"
+            raise block.place.fault(code.column, what, CURVES)
+        if np.isnan(self._state.pose).any():
+            raise unknown_place(
+                block, [letter for letter, at in zip(AXES, self._state.pose, strict=True) if np.isnan(at)]
+            )
+        self._begin_motion(code.value)
+        poses = curve_of(block, self._state, self._target(block))
+        length_mm = float(lengths(np.diff(poses[:, :3], axis=0, prepend=self._state.pose[None, :3])).sum())
+        self._cut(block, poses, (length_mm, 0.0))
+        self._motion = None
+        for letter in named:
+            del block.words[letter]
 
     def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: Floats) -> None:
         arc = self._arc(block, target) if self._motion in ARCS else None

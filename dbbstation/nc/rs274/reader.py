@@ -271,6 +271,9 @@ class _Interpreter(Moves):
         if motion is not None:
             self._begin_motion(motion)
         named = named_axes(block)
+        if self.is_curve(block):
+            self._curve(block, named)
+            return
         if self._motion in CYCLES:
             if named or motion is not None:
                 self._run_cycle(block, named)

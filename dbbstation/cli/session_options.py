@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -161,11 +161,10 @@ class RecordingOptions(SessionOptions):
 
         The command line overrides the plan, which overrides the shop's settings.
         """
-        from dbbstation.service.order import Gate, Order, ordered
+        from dbbstation.service.order import Gate, Order, ordered, with_loss
 
-        percent, stated = self.largest_loss_percent, plan.plan.largest_loss_percent is not None
-        if percent is not None and not (stated and from_settings("largest_loss_percent")):
-            plan = replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": percent}))
+        over_plan = not from_settings("largest_loss_percent")
+        plan = with_loss(plan, self.largest_loss_percent, over_plan=over_plan)
         return ordered(plan, Order(self.order), Gate(self.gate))
 
     def judging_model(self) -> IdentifiedModel | None:

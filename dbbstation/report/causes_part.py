@@ -1,4 +1,4 @@
-"""The causes in a report, by contribution, and the circles without the first cause."""
+"""The circles of a report without the first cause."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.calibration.reporting.prediction import smooth_lengths_mm
 from dbbstation.report.polar import Drawn, polar_of
-from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 from dbbstation.trace.analysis import horizontal_radius_mm, path_about_ball
 
 if TYPE_CHECKING:
@@ -19,53 +18,11 @@ MOST_DRAWN = 6
 """Number of tests whose circles are drawn without the first cause: the tests on which it acts most."""
 
 
-class CauseRow(NamedTuple):
-    """A row of texts. Each pair is a contribution and its expanded uncertainty."""
-
-    cause: str
-    verdict: str
-    g: tuple[str, str]
-    centre: tuple[str, str]
-    workspace: tuple[str, str]
-    measured: str
-    cured: str
-    cure: str
-    confirm: str
-
-
 class TitledPolar(NamedTuple):
     """A polar trace with its title."""
 
     title: str
     drawing: Polar
-
-
-def cause_rows(ranked: Ranked, coverage_factor: float) -> list[CauseRow]:
-    """Return the rows of the table of causes."""
-    rows = []
-    for one in ranked.effects:
-        g, centre, space = (
-            ("-", "-") if value is None else with_uncertainty(value, expanded_uncertainty(u, coverage_factor))
-            for value, u in (
-                (one.g_um, one.g_u_um),
-                (one.centre_um, one.centre_u_um),
-                (one.workspace_um, one.workspace_u_um),
-            )
-        )
-        rows.append(
-            CauseRow(
-                cause=one.cause,
-                verdict=one.verdict,
-                g=g,
-                centre=centre,
-                workspace=space,
-                measured=f"{one.measured_g_um:.1f}",
-                cured=f"{one.cured_g_um:.1f}",
-                cure=one.cure,
-                confirm=one.confirm,
-            )
-        )
-    return rows
 
 
 def cured_polars(ranked: Ranked) -> list[TitledPolar]:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 from dbbstation.circles.budget import BudgetTerm
 from dbbstation.facts.serialise import as_objects
 from dbbstation.machine.difference import differences, in_words
-from dbbstation.report.causes_part import TitledPolar, cause_rows, cured_polars
+from dbbstation.report.causes_part import TitledPolar, cured_polars
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
-from dbbstation.report.shown import ReportContent, ShownBudget, ShownCauses, ShownFindings, ShownModel, ShownSession
+from dbbstation.report.shown import ReportContent, ShownBudget, ShownFindings, ShownModel, ShownSession
 from dbbstation.results.circle_figures import RunWithoutCircle
 from dbbstation.results.circles import circles_result
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
@@ -178,7 +178,8 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
         polar_size=SIZE,
         polar_radius=CIRCLE,
         polars=_polars(reported),
-        ranking=_ranking(reported),
+        ranking=reported.ranked,
+        cured=[] if reported.ranked is None else cured_polars(reported.ranked),
         before_name="" if reported.before is None else reported.before.sessions[0].name,
         several=len(found.sessions) > 1,
         findings=_findings(found),
@@ -223,14 +224,6 @@ def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:
                 places=plate_map({name: session.plan.tests[name] for name in tests}, bad),
                 known=all(session.plan.tests[name].ball.place_known for name in tests),
             )
-
-
-def _ranking(reported: Reported) -> ShownCauses | None:
-    ranked = reported.ranked
-    if ranked is None:
-        return None
-    rows = cause_rows(ranked, reported.coverage_factor)
-    return ShownCauses(**vars(ranked), rows=rows, polars=cured_polars(ranked))
 
 
 def _notes_before(reported: Reported) -> list[str]:

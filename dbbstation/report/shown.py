@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.results.ranked import Ranked
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import date
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.quality.finding import Finding
-    from dbbstation.report.causes_part import CauseRow, TitledPolar
+    from dbbstation.report.causes_part import TitledPolar
     from dbbstation.report.plate_map import MapPlace
+    from dbbstation.results.ranked import Ranked
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +27,6 @@ class ShownSession:
     conditions: Sequence[tuple[str, str]]
     places: Sequence[MapPlace]
     known: bool
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ShownCauses(Ranked):
-    """Texts of the causes for the page."""
-
-    rows: Sequence[CauseRow]
-    polars: Sequence[TitledPolar]
 
 
 @dataclass(frozen=True)
@@ -90,7 +81,8 @@ class ReportContent:
     polar_size: float
     polar_radius: float
     polars: Sequence[TitledPolar]
-    ranking: ShownCauses | None
+    ranking: Ranked | None
+    cured: Sequence[TitledPolar]
     before_name: str
     several: bool
     findings: ShownFindings

@@ -15,6 +15,7 @@ from dbbstation.files.gateway import content_of
 from dbbstation.files.keys import digests_of, files_of_session, key_of
 from dbbstation.files.places import real_path, unused_path
 from dbbstation.files.recordings.session import read_session
+from dbbstation.results.tolerances import TOLERATED
 from dbbstation.service.former_sessions import keep_models
 from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.work import BackgroundWork, WorkProgress
@@ -125,9 +126,6 @@ _WRITTEN = {
     SessionTask.HISTORY: "page",
 }
 """Outputs that are no parameters of their tasks."""
-
-TOLERATED_FILTER = "30"
-"""Filter of the figures that tolerances are for."""
 
 _OF_OTHERS = {SessionTask.ACCEPTANCE, SessionTask.HISTORY}
 """Steps whose result depends on other sessions."""
@@ -302,7 +300,7 @@ class After:
             case SessionTask.REPORT | SessionTask.ACCEPTANCE:
                 task, given = "report", sessions | {"page": self._out(step)}
             case SessionTask.FIGURES:
-                task, given = "circles", sessions | {"filter": TOLERATED_FILTER}
+                task, given = "circles", sessions | {"filter": str(TOLERATED.value)}
             case SessionTask.HISTORY:
                 task, given = "history", {"folder": str(self.session.parent)}
         if step is SessionTask.ACCEPTANCE:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -12,11 +12,10 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy, SessionDetails
 from dbbstation.files.recordings.session import SESSION_FILE, read_session
-from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.plan.circle import circles_s
 from dbbstation.plan.order import LARGEST_LEAK, height_and_drift, mountings
 from dbbstation.service.memory import Line
-from dbbstation.service.order import Gate, Order, ordered
+from dbbstation.service.order import Gate, Order, ordered, with_loss
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.opening import check_not_mixed
@@ -150,7 +149,7 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     limits = limits or Limits()
     if choice.missing() or choice.folder is None:
         raise ValueError(f"missing: {', '.join(choice.missing())}")
-    protocol = _protocol(choice)
+    protocol = choice.line.protocol(lambda: None if choice.bar is None else read_bar(choice.bar).length_mm)
     machine, plan, plan_file, programs = _read(choice, limits)
     calibration = None if choice.bar is None else read_bar(choice.bar)
     bar = None if calibration is None else calibration.to_bar(protocol.length.stroke_mm)
@@ -204,15 +203,6 @@ def _recorded(folder: Path, instrument: ReadBy | None) -> tuple[RunEntry, ...]:
     return session.runs
 
 
-def _protocol(choice: Choice) -> Protocol:
-    line = choice.line
-    protocol = load_instrument(line.instrument, line.profile or None)
-    zero_mm = line.zero_mm
-    if zero_mm is None and protocol.length.relative and choice.bar is not None:
-        zero_mm = read_bar(choice.bar).length_mm
-    return with_zero(protocol, zero_mm if protocol.length.relative else None)
-
-
 def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, dict[tuple[str, Direction], RunProgram]]:
     folder = choice.folder
     if folder is not None and choice.goes_on:
@@ -225,8 +215,6 @@ def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, di
         raise ValueError("machine or plan is missing")
     machine = read_machine(choice.machine)
     plan = ordered(read_inline_plan(choice.plan), choice.order, choice.gate)
-    stated = plan.plan.largest_loss_percent is not None
-    if limits.largest_loss_percent is not None and (limits.loss_over_plan or not stated):
-        plan = replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": limits.largest_loss_percent}))
+    plan = with_loss(plan, limits.largest_loss_percent, over_plan=limits.loss_over_plan)
     programs = {} if choice.programs is None else load_programs(choice.programs, plan.to_domain(), machine)
     return machine, plan, choice.plan, programs

@@ -13,7 +13,7 @@ from dbbstation.facts.serialise import as_objects
 from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
-from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
+from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
 from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.bar_stated import fault_of
@@ -152,9 +152,8 @@ class Front:
         if line.virtual:
             return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
-            protocol = load_instrument(line.instrument, line.profile or None)
             # What a relative instrument calls zero does not matter for whether it answers.
-            protocol = with_zero(protocol, (line.zero_mm or 0.0) if protocol.length.relative else None)
+            protocol = line.protocol(lambda: 0.0)
         except StationError as error:
             return ProbeOutcome(line.port, answers=False, text=str(error))
         self.release()  # only one can open a port
@@ -216,11 +215,7 @@ class Front:
             StationError: no such instrument.
             NoNumberError: a relative instrument needs the calibrator's length.
         """
-        protocol = load_instrument(line.instrument, line.profile or None)
-        zero_mm = line.zero_mm
-        if protocol.length.relative and zero_mm is None:
-            zero_mm = _number(values, "calibrator_mm")
-        protocol = with_zero(protocol, zero_mm if protocol.length.relative else None)
+        protocol = line.protocol(lambda: _number(values, "calibrator_mm"))
         return BarCalibration(self._held.line(protocol, line.port, line.baud))
 
     def stated_bar(self, values: Mapping[str, str]) -> Stated:

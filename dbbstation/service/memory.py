@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -12,6 +13,12 @@ from dbbstation.errors import OutputError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.gateway import content_of
+from dbbstation.instrument.library import load_instrument, with_zero
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.instrument.protocol import Protocol
 
 FILE = "station.json"
 """Name of the memory's file in the user's state folder."""
@@ -48,6 +55,20 @@ class Line(BaseModel):
     def time_scale(self) -> float:
         """Return the virtual machine's speed relative to real time."""
         return time_scale_of(self.port) or 1.0
+
+    def protocol(self, at_zero_mm: Callable[[], float | None]) -> Protocol:
+        """Return the instrument's protocol.
+
+        Args:
+            at_zero_mm: length at the zero of a relative instrument, if the line states none.
+
+        Raises:
+            StationError: no such instrument, or nobody states the length at its zero.
+        """
+        found = load_instrument(self.instrument, self.profile or None)
+        if not found.length.relative:
+            return found
+        return with_zero(found, at_zero_mm() if self.zero_mm is None else self.zero_mm)
 
 
 VIRTUAL = (virtual_port(), virtual_port(10.0))

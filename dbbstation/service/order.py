@@ -47,3 +47,10 @@ def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePla
     again = plan.plan.repeat_at_end or gates[gate]
     changed = {"tests": tuple(tests[name] for name in names), "repeat_at_end": again}
     return replace(plan, plan=plan.plan.model_copy(update=changed))
+
+
+def with_loss(plan: InlinePlan, percent: float | None, *, over_plan: bool) -> InlinePlan:
+    """Return the plan with a limit of lost samples, if it states none or `over_plan`."""
+    if percent is None or (plan.plan.largest_loss_percent is not None and not over_plan):
+        return plan
+    return replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": percent}))

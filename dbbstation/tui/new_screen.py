@@ -65,7 +65,7 @@ class NewScreen(RowScreen):
             return
         self.say(texts.NEW_CHECKS)
         choice = self.choice
-        self._reception.do(lambda: self._front.prepare(choice), self._prepared, self._failed)
+        self._reception.do(lambda: self._front.prepare(choice), self._prepared, self.failed)
 
     def action_probe(self) -> None:
         line = self.choice.line
@@ -73,7 +73,7 @@ class NewScreen(RowScreen):
             self._show()
             return
         self.say(texts.NEW_ASKS.format(port=line.port, instrument=line.instrument))
-        self._reception.do(lambda: self._front.probe(line), self._answered, self._failed)
+        self._reception.do(lambda: self._front.probe(line), self._answered, self.failed)
 
     def action_empty(self) -> None:
         part = ROWS[self.at]
@@ -270,9 +270,6 @@ class NewScreen(RowScreen):
     def _answered(self, answer: ProbeOutcome) -> None:
         form = texts.NEW_ANSWERS if answer.answers else texts.NEW_SILENT
         self.say(form.format(port=answer.port, text=answer.text), wrong=not answer.answers)
-
-    def _failed(self, error: Exception) -> None:
-        self.say(str(error), wrong=True)
 
 
 _FIELDS = {

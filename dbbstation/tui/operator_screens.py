@@ -53,7 +53,7 @@ class JobScreen(RowScreen):
 
     def search(self) -> None:
         self.say(texts.START_LOOKS)
-        self._reception.do(self._operated.choice, self._found, self._failed)
+        self._reception.do(self._operated.choice, self._found, self.failed)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         if self._choice is None:
@@ -61,7 +61,7 @@ class JobScreen(RowScreen):
         name = self._rows[self.at]
         if name == _ANEW:
             self.say(texts.START_LOOKS)
-            self._reception.do(lambda: self._operated.choice(anew=True), self._found, self._failed)
+            self._reception.do(lambda: self._operated.choice(anew=True), self._found, self.failed)
             return
         if name == _BEGIN:
             self._begin(self._choice)
@@ -85,7 +85,7 @@ class JobScreen(RowScreen):
             if yes:
                 self.say(texts.NEW_CHECKS)
                 self._reception.do(
-                    lambda: self._checked(choice), lambda prepared: self._prepared(choice, prepared), self._failed
+                    lambda: self._checked(choice), lambda prepared: self._prepared(choice, prepared), self.failed
                 )
 
         if self._operated.left_long_ago(choice):
@@ -166,10 +166,7 @@ class JobScreen(RowScreen):
     def _prepared(self, choice: Choice, prepared: Prepared) -> None:
         if self.is_current:
             self.say(texts.START_OPENS.format(folder="" if choice.folder is None else choice.folder.name))
-            self._reception.open(choice, prepared, self._failed)
-
-    def _failed(self, error: Exception) -> None:
-        self.say(str(error), wrong=True)
+            self._reception.open(choice, prepared, self.failed)
 
 
 _BEGIN, _ANEW = "begin", "anew"

@@ -111,7 +111,7 @@ class PrepareScreen(RowScreen):
             self._show()
             return
         self.say(texts.START_OPENS.format(folder=self._prepared.job.folder.name))
-        self._reception.open(self._choice, self._prepared, self._failed)
+        self._reception.open(self._choice, self._prepared, self.failed)
 
     def action_back(self) -> None:
         self.dismiss()
@@ -211,7 +211,7 @@ class PrepareScreen(RowScreen):
                 # The session has to know what commands its runs: its circles are no longer the plan's.
                 self._take(replace(choice, programs=folder))
 
-        self._reception.do(lambda: self._front.write_programs(choice, model), written, self._failed)
+        self._reception.do(lambda: self._front.write_programs(choice, model), written, self.failed)
 
     def _take(self, choice: Choice) -> None:
         self.say(texts.NEW_CHECKS)
@@ -221,7 +221,4 @@ class PrepareScreen(RowScreen):
             self._changed(choice)
             self._show()
 
-        self._reception.do(lambda: self._front.prepare(choice), prepared, self._failed)
-
-    def _failed(self, error: Exception) -> None:
-        self.say(str(error), wrong=True)
+        self._reception.do(lambda: self._front.prepare(choice), prepared, self.failed)

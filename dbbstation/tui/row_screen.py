@@ -51,6 +51,9 @@ class RowScreen(ExplainedScreen):
         now.update(Content(text))
         now.set_class(wrong, "-wrong")
 
+    def failed(self, error: Exception) -> None:
+        self.say(str(error), wrong=True)
+
     def banner(self, *, virtual: bool) -> None:
         """Show the title, marked if the machine is virtual."""
         if self.stands:

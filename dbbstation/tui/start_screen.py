@@ -48,7 +48,7 @@ class StartScreen(RowScreen):
     def search(self) -> None:
         """List the sessions again; a reported failure stays visible."""
         self.say(texts.START_LOOKS)
-        self._reception.do(self._front.sessions, self._list, self._failed)
+        self._reception.do(self._front.sessions, self._list, self.failed)
 
     @property
     def chosen(self) -> SessionLine | None:
@@ -72,7 +72,7 @@ class StartScreen(RowScreen):
         else:
             self.say(texts.NEW_CHECKS)
             self._reception.do(
-                lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
+                lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self.failed
             )
 
     def chosen_another(self) -> None:
@@ -107,7 +107,7 @@ class StartScreen(RowScreen):
 
     def _enter(self, screen: RowScreen) -> None:
         def left(_: None) -> None:
-            self._reception.do(self._front.release, lambda _: None, self._failed)
+            self._reception.do(self._front.release, lambda _: None, self.failed)
 
         self.app.push_screen(screen, left)
 
@@ -124,9 +124,6 @@ class StartScreen(RowScreen):
             how = texts.START_BY.format(instrument=by.instrument, port=by.port) if known else texts.START_NO_LINE
             self.about(Content(f"{what}\n{how}"))
         self.refresh_bindings()
-
-    def _failed(self, error: Exception) -> None:
-        self.say(str(error), wrong=True)
 
 
 def _row(line: SessionLine) -> Content:

@@ -12,7 +12,7 @@ from dbbstation.facts.record import Day, Moment
 from dbbstation.files.atomic import write_text
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
+from dbbstation.files.yaml.schema import Schema, format_of, read_valid
 from dbbstation.plan.bar import Bar
 
 _Uncertainty = Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)]
@@ -120,10 +120,10 @@ class BarFile(Schema):
 
 def parse_bar(path: Path, faults: list[Problem]) -> BarFile | None:
     """Read the calibration of a bar; None with faults added to `faults`."""
-    document = read_document(path, BarFile, faults)
-    bar = None if document is None else validate(document, BarFile, faults)
-    if document is None or bar is None:
+    read = read_valid(path, BarFile, faults)
+    if read is None:
         return None
+    document, bar = read
     if bar.misread:
         faults.append(document.problem(("readings", "mean_mm"), bar.misread, AFTER_MISREAD))
         return None

@@ -12,7 +12,7 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings_schema import ToleranceSettings
 from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, misspelt, time_scale_of, virtual_port
 from dbbstation.files.source_text import without_faults
-from dbbstation.files.yaml.schema import Schema, read_document, validate
+from dbbstation.files.yaml.schema import Schema, read_valid
 from dbbstation.files.yaml.text import YamlDocument
 
 _Text = Annotated[str, Field(min_length=1)]
@@ -77,10 +77,10 @@ def read_job(path: Path) -> JobFile:
 
 def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
     """Read a job and its files; None with faults added to `faults`."""
-    document = read_document(path, JobFile, faults)
-    job = None if document is None else validate(document, JobFile, faults)
-    if document is None or job is None:
+    read = read_valid(path, JobFile, faults)
+    if read is None:
         return None
+    document, job = read
     plan = parse_plan(path.parent / job.plan, faults)
     parse_machine(path.parent / job.machine, faults)
     if job.bar:

@@ -18,7 +18,7 @@ from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, S
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import dotted, format_of, read_document, validate
+from dbbstation.files.yaml.schema import dotted, format_of, read_valid
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import ErrorSource, Fitted, Owner
@@ -70,10 +70,10 @@ def _by_name(sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None) 
 
 def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Problem]) -> IdentifiedModel | None:
     """Read a model; None with faults added to `faults`."""
-    document = read_document(path, ModelFile, faults)
-    file = None if document is None else validate(document, ModelFile, faults)
-    if document is None or file is None:
+    read = read_valid(path, ModelFile, faults)
+    if read is None:
         return None
+    document, file = read
     if file.provenance is not None and file.provenance.virtual:
         note_virtual(path.name)
     machine = file.machine.to_domain()

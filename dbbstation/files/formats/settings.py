@@ -82,7 +82,10 @@ def read_settings(files: Iterable[Path]) -> Settings:
     paths, faults = tuple(files), list[Problem]()
     if not paths:
         return Settings()
-    read = [_read(path, faults) for path in paths]
+    from dbbstation.files.formats.settings_schema import SettingsFile  # noqa: PLC0415 - without a file, nothing to validate
+    from dbbstation.files.yaml.schema import read_valid  # noqa: PLC0415 - the same
+
+    read = [read_valid(path, SettingsFile, faults) for path in paths]
     if faults:
         raise InputError(faults)
     values: dict[str, Setting] = {}
@@ -91,7 +94,7 @@ def read_settings(files: Iterable[Path]) -> Settings:
     for path, found in zip(paths, read, strict=True):
         if found is None:
             continue
-        file, document = found
+        document, file = found
         blocks = {key.partition(".")[0] for key in values} - _OPEN
         own = {key: Setting(value, path, _line(document, key)) for key, value in _flat(file, path)}
         taken = set(values)
@@ -104,15 +107,6 @@ def read_settings(files: Iterable[Path]) -> Settings:
             tolerances = tuple(one.to_domain() for one in file.tolerances)
             told = f"{path}:{_line(document, 'tolerances')}"
     return Settings(values, tolerances, told, paths)
-
-
-def _read(path: Path, faults: list[Problem]) -> tuple[SettingsFile, YamlDocument] | None:
-    from dbbstation.files.formats.settings_schema import SettingsFile  # noqa: PLC0415 - the same
-    from dbbstation.files.yaml.schema import read_document, validate  # noqa: PLC0415 - without a file, nothing to validate
-
-    document = read_document(path, SettingsFile, faults)
-    file = None if document is None else validate(document, SettingsFile, faults)
-    return None if document is None or file is None else (file, document)
 
 
 def _flat(file: SettingsFile, path: Path) -> Iterable[tuple[str, Any]]:

@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Problem
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes, without_faults
-from dbbstation.files.yaml.schema import Schema, read_document, validate
+from dbbstation.files.yaml.schema import Schema, read_valid
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -151,10 +151,10 @@ class SimulatorFile(Schema):
 
 def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:
     """Read a simulator's file and inspect its Python without running it; None with faults added to `faults`."""
-    document = read_document(path, SimulatorFile, faults)
-    found = None if document is None else validate(document, SimulatorFile, faults)
-    if document is None or found is None:
+    read = read_valid(path, SimulatorFile, faults)
+    if read is None:
         return None
+    document, found = read
     before = len(faults)
     if found.python is not None:
         _look_through(path, document, found, found.python, faults)

@@ -92,6 +92,13 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem], fol
         return None
 
 
+def read_valid(path: Path, schema: type[S], faults: list[Problem]) -> tuple[YamlDocument, S] | None:
+    """Read a YAML file by `schema` and validate it; None with faults added."""
+    document = read_document(path, schema, faults)  # type: ignore[arg-type]  # a class of the union
+    found = None if document is None else validate(document, schema, faults)
+    return None if document is None or found is None else (document, found)
+
+
 def format_of(schema: type[Schema | Record]) -> str:
     """Return the name of a format with its version, such as `dbb-plan/1`."""
     return str(get_type_hints(schema)["format"].__args__[0])

@@ -58,6 +58,10 @@ class Filter(IntEnum):
         return gaussian(theta_deg, values, self.value)
 
 
+TOLERATED = Filter.UPR_30
+"""Filter of the circular deviation for tolerances, as in the predictions of `evaluate`."""
+
+
 SAMPLES_PER_UNDULATION = 4
 """Least samples per undulation of the sharp filter."""
 

@@ -16,9 +16,8 @@ from dbbstation.cli.log import drop_output, drop_unwritable, flush_output, open_
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
 from dbbstation.computing.compiling import tell_of_compiling
-from dbbstation.errors import StationError
+from dbbstation.errors import StationError, in_a_sentence
 from dbbstation.files.inputs import input_book, virtual_so_far
-from dbbstation.files.refused import in_a_sentence
 from dbbstation.system.signals import politely_ended
 
 if TYPE_CHECKING:
@@ -59,7 +58,11 @@ COMMANDS = {
 }
 """Name and one line of help of every command. Its module has its name, apart from those in `_MODULES`."""
 
-_MODULES = {"compensate": "programs.compensate", "program": "programs.program"}
+_MODULES = {
+    "compensate": "programs.compensate",
+    "instrument": "instruments.instrument",
+    "program": "programs.program",
+}
 
 
 @click.group(

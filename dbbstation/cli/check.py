@@ -128,7 +128,7 @@ def check(
 
 
 def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
-    from dbbstation.files.recordings.anchors import anchor_told
+    from dbbstation.files.recordings.event_log import anchor_told
 
     for result in results:
         if anchor is not None and result.kind.startswith("dbb-session"):
@@ -249,7 +249,7 @@ def _dry_run(
 def _print_schema(name: str) -> None:
     from dbbstation.cli.output import print_plain_json
     from dbbstation.files.checking import SCHEMAS, json_schema
-    from dbbstation.instrument.profiles import ProtocolFile
+    from dbbstation.instrument.library import ProtocolFile
     from dbbstation.results.schemas import RESULTS, result_schema
 
     formats: Any = {**SCHEMAS, "dbb-instrument/1": ProtocolFile}

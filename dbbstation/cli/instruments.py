@@ -1,4 +1,4 @@
-"""`dbbstation instrument list` and `ports`: known instruments with their line settings, and connected serial ports."""
+"""`dbbstation instrument`: commands for length instruments; known instruments with their line settings, and serial ports."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.instrument_options import PROFILE
+from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.output import echo
 from dbbstation.tasks.declare import Option
 
@@ -107,3 +108,26 @@ def ports() -> Answer:
             echo(f"{port:16} {description}" + (f"  ({hardware})" if hardware not in {"", "n/a"} else ""))
 
     return Answer({"ports": [dict(zip(keys, port, strict=True)) for port in found]}, words)
+
+
+TABLE = {
+    "emulate": "A virtual machine with a ball bar, on a line of its own.",
+    "list": "The known instruments.",
+    "monitor": "Live reading of an instrument.",
+    "ports": "The serial ports of this computer.",
+    "replay": "Send a byte log through an instrument's driver.",
+}
+
+instrument = LazyGroup(
+    name="instrument",
+    table=TABLE,
+    package="dbbstation.cli",
+    modules={"list": "instruments.instruments", "ports": "instruments.ports"},
+    help="""List instruments and ports, read an instrument, decode its recorded bytes, or emulate one.
+
+\b
+Examples:
+  dbbstation instrument list
+  dbbstation instrument monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0
+""",
+)

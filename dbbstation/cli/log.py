@@ -20,9 +20,8 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
-from dbbstation.errors import OutputError
+from dbbstation.errors import OutputError, refusal
 from dbbstation.files.recorded_ground import session_around
-from dbbstation.files.refused import refusal
 from dbbstation.system.handles import open_nothing, open_private
 from dbbstation.text.printable import printable
 

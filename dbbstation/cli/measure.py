@@ -17,7 +17,7 @@ from dbbstation.cli.instrument_options import OpenLine, RateHz, spying
 from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import RecordingOptions
-from dbbstation.files.formats.virtual_port import SLOWEST
+from dbbstation.system.ports import SLOWEST
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option

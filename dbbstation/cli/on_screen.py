@@ -15,9 +15,8 @@ from dbbstation.cli.instrument_options import spying
 from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
-from dbbstation.files.formats.virtual_port import FASTEST, virtual_port
-from dbbstation.system.hang_up import ended_when_hung_up
-from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered
+from dbbstation.system.ports import FASTEST, virtual_port
+from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered, ended_when_hung_up
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -22,9 +22,8 @@ from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.formats.simulator import SimulatorFile, parse_simulator
 from dbbstation.files.inputs import note_virtual
-from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
-from dbbstation.files.recordings.event_log import read_event_log, set_back
+from dbbstation.files.recordings.event_log import SHORTEST, anchor_of, read_event_log, set_back
 from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.seal import copy_faults

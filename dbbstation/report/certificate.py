@@ -7,8 +7,7 @@ from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import RunState
-from dbbstation.files.recordings.anchors import impossible_day, sealed_at
-from dbbstation.files.recordings.event_log import CLOCK_S
+from dbbstation.files.recordings.event_log import CLOCK_S, impossible_day, sealed_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import RunState
-from dbbstation.files.recordings.anchors import anchor_of
+from dbbstation.files.recordings.event_log import anchor_of
 from dbbstation.report.certificate import sealed_after
 from dbbstation.text.digits import to_its_place
 

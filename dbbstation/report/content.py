@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 from dbbstation.circles.budget import BudgetTerm
 from dbbstation.facts.serialise import as_objects
 from dbbstation.machine.difference import differences, in_words
-from dbbstation.report.causes_part import TitledPolar, cured_polars
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
-from dbbstation.report.polar import CIRCLE, SIZE, polar
+from dbbstation.report.polar import CIRCLE, SIZE, TitledPolar, cured_polars, polar
 from dbbstation.report.shown import ReportContent, ShownBudget, ShownFindings, ShownModel, ShownSession
 from dbbstation.results.circle_figures import RunWithoutCircle
 from dbbstation.results.circles import circles_result

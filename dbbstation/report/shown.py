@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.quality.finding import Finding
-    from dbbstation.report.causes_part import TitledPolar
     from dbbstation.report.plate_map import MapPlace
+    from dbbstation.report.polar import TitledPolar
     from dbbstation.results.ranked import Ranked
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.circles.analysis import analyse_pair, refiltered
 from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.extremes import without_noise
-from dbbstation.circles.path import Filter
+from dbbstation.circles.path import TOLERATED, Filter
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.facts.run import OfRunInSession
@@ -115,10 +115,6 @@ def _size_of_pair(pair: MeasuredPair, figure: CircleFigure, upr: int) -> Size:
 
 def _sized(budget: Budget) -> Size:
     return Size(abs(budget.value_um), budget.u_um, budget.why_not, budget.known_um)
-
-
-TOLERATED = Filter.UPR_30
-"""Filter of the circular deviation for tolerances, as in the predictions of `evaluate`."""
 
 
 def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:

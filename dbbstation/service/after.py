@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from dbbstation.circles.path import TOLERATED
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import write_text
 from dbbstation.files.gateway import content_of
 from dbbstation.files.keys import digests_of, files_of_session, key_of
 from dbbstation.files.places import real_path, unused_path
 from dbbstation.files.recordings.session import read_session
-from dbbstation.results.tolerances import TOLERATED
 from dbbstation.service.former_sessions import keep_models
 from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.work import BackgroundWork, WorkProgress

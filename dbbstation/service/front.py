@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import as_objects
-from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
@@ -27,6 +26,7 @@ from dbbstation.service.runner import Runner, opener
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.virtual_place import virtual_place
 from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.system.ports import time_scale_of, virtual_port
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -11,9 +11,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import write_text
-from dbbstation.files.formats.virtual_port import time_scale_of, virtual_port
 from dbbstation.files.gateway import content_of
 from dbbstation.instrument.library import load_instrument, with_zero
+from dbbstation.system.ports import time_scale_of, virtual_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -14,10 +14,9 @@ import sys
 import threading
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import StationError
+from dbbstation.errors import StationError, in_a_sentence
 from dbbstation.files.formats.settings import read_settings, settings_files
 from dbbstation.files.inputs import input_book
-from dbbstation.files.refused import in_a_sentence
 from dbbstation.service.job import Call
 from dbbstation.service.work import LOG_MARK, STAGE_MARK
 

@@ -17,7 +17,7 @@ from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
 from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
 from dbbstation.files.keys import key_of
-from dbbstation.files.recordings.anchors import SHORTEST, links_of
+from dbbstation.files.recordings.event_log import SHORTEST, links_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.history.order import date_faults

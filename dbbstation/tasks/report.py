@@ -92,6 +92,7 @@ def report(
     """
     from dataclasses import replace
 
+    from dbbstation.circles.path import TOLERATED
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import from_python
@@ -100,7 +101,6 @@ def report(
     from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
     from dbbstation.report.html import report_html
     from dbbstation.report.pdf import chromium, printed
-    from dbbstation.results.tolerances import TOLERATED
     from dbbstation.tasks.circle_runs import load_circles
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of

@@ -9,17 +9,18 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import budgets
+from dbbstation.circles.path import TOLERATED
 from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book
 from dbbstation.files.own_sources import every_source
-from dbbstation.files.recordings.anchors import anchor_of
+from dbbstation.files.recordings.event_log import anchor_of
 from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.results.model_warnings import model_warnings
-from dbbstation.results.tolerances import TOLERATED, tolerated_circles
+from dbbstation.results.tolerances import tolerated_circles
 from dbbstation.sources.contract import Owner
 from dbbstation.tasks.circle_runs import load_circles
 

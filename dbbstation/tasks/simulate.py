@@ -74,7 +74,7 @@ def simulate(
     from dbbstation.tasks.chosen import chosen_of
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
-    from dbbstation.virtual.under_spindle import SetUp, put_up
+    from dbbstation.virtual.truth import SetUp, put_up
 
     telling = Telling(progress, stop, say)
     every = every_source(paths_of(source_files)) if known is None else known

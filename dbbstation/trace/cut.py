@@ -10,8 +10,7 @@ import numpy as np
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
-from dbbstation.trace.average import means
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.circle import RawCircle, means
 from dbbstation.trace.columns import each
 from dbbstation.trace.loss import AFTER_LOSS, lost_samples, share_lost
 

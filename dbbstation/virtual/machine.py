@@ -10,8 +10,7 @@ import numpy as np
 from dbbstation.errors import MachineError
 from dbbstation.sources.contract import Motion, Setup
 from dbbstation.virtual.path import circle_path
-from dbbstation.virtual.truth import MeasurementErrors
-from dbbstation.virtual.under_spindle import SET_UP_MM, put_up
+from dbbstation.virtual.truth import SET_UP_MM, MeasurementErrors, put_up
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Ball, Plan, PlannedTest
     from dbbstation.sources.contract import Fitted
     from dbbstation.virtual.path import CommandedPath
-    from dbbstation.virtual.under_spindle import SetUp
+    from dbbstation.virtual.truth import SetUp
 
 _SESSION, _BAR = "virtual session", "virtual bar"
 

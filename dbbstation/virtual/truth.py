@@ -1,19 +1,76 @@
-"""Random errors of the virtual machine, reproducible by seed."""
+"""Random errors of the virtual machine, reproducible by seed; balls put up under the spindle [CAL III-A, Fig 4]."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from dbbstation.sources.contract import Fitted
+from dbbstation.sources.causes.tool_ball_offset import ToolBallOffset
+from dbbstation.sources.contract import Fitted, Motion, Owner, SetUpErrors
 from dbbstation.sources.registry import sources_named
-from dbbstation.virtual.under_spindle import SET_UP_MM, SetUp
 
 if TYPE_CHECKING:
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Ball
+    from dbbstation.sources.contract import Setup
+
+SET_UP_MM = 0.05
+"""Standard deviation per axis of the position of balls that were put up by hand [mm]."""
+
+_STANDING_S = np.array([0.0, 1.0, 2.0])
+"""Time at rest while a ball is put up [s], long enough that no motion lags."""
+
+
+class MovingBall(ToolBallOffset):
+    """The moving ball's offset from the tip, different each time."""
+
+    name = "moving-ball"
+    belongs_to = Owner.MOUNTING
+
+
+@dataclass(frozen=True, eq=False)
+class SetUp:
+    """Actual places of balls."""
+
+    fixed_ball_mm: Floats
+    moving_ball_mm: Floats
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, size_mm: float) -> Self:
+        """Draw both balls' errors, one standard deviation per axis [mm]."""
+        fixed, moving = rng.normal(0.0, size_mm, (2, 3))
+        return cls(fixed, moving)
+
+    @classmethod
+    def faultless(cls) -> Self:
+        """Return a set-up without errors."""
+        return cls(np.zeros(3), np.zeros(3))
+
+    def read(self, rng: np.random.Generator, uncertainty_mm: float) -> SetUpErrors:
+        """Return a micrometer's reading with this standard deviation [mm]."""
+        fixed, moving = rng.standard_normal((2, 3)) * uncertainty_mm
+        return SetUpErrors(self.fixed_ball_mm + fixed, self.moving_ball_mm + moving, uncertainty_mm)
+
+
+def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s: float = 0.0) -> tuple[Fitted, Fitted]:
+    """Return the effects of the fixed and the moving ball on the bar.
+
+    Raises:
+        KinematicsError: the machine cannot take the pose.
+        ModelError: a source needs data that a standing machine lacks.
+    """
+    pose = np.array([*circle.ball_mm, *circle.tilt_deg])
+    standing = Motion(np.tile(pose, (len(_STANDING_S), 1)), is_path=True, time_s=at_s + _STANDING_S, setup=setup)
+    tip = truth.of_the_machine().actual(standing).tool_frames().position_mm[-1]
+    (mounting,) = sources_named(("mounting",))
+    stands = tip + balls.fixed_ball_mm - setup.fixed_ball_mm
+    return Fitted(mounting, stands, setup.mounting), Fitted(MovingBall(), balls.moving_ball_mm, setup.mounting)
+
 
 JOINT_ERROR_MM = 0.1
 """Standard deviation of strut reference lengths and of joint coordinates of a random machine [mm]."""

@@ -12,7 +12,7 @@ import pytest
 
 from dbbstation.cli import COMMANDS, DONE, cli
 from dbbstation.cli.control import control
-from dbbstation.cli.instrument import TABLE
+from dbbstation.cli.instruments import TABLE
 from dbbstation.cli.jig import jig
 from dbbstation.cli.session import session
 from studies.__main__ import STUDIES, study

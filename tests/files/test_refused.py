@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import errno
 
+from dbbstation.errors import LONGEST_ON_WINDOWS, refusal
 from dbbstation.files.recordings.foreign_csv import kind_of
-from dbbstation.files.refused import LONGEST_ON_WINDOWS, refusal
 
 
 def test_a_path_that_windows_does_not_allow_is_named():

@@ -14,7 +14,7 @@ from dbbstation.model.observation import Observation
 from dbbstation.model.simulation import setup_of
 from dbbstation.plan.circle import Direction
 from dbbstation.trace import columns
-from dbbstation.trace.average import averaged
+from dbbstation.trace.circle import averaged
 from dbbstation.trace.columns import COLUMNS, Column, ColumnKind, currents, temperatures
 from dbbstation.trace.cut import cut
 

@@ -10,7 +10,7 @@ import pytest
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.average import means
+from dbbstation.trace.circle import means
 from dbbstation.trace.cut import (
     PIECES,
     SHAPE_ORDER,

@@ -17,8 +17,7 @@ from dbbstation.sources.registry import known_sources
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.circle import RawCircle
 from dbbstation.virtual.machine import Sizes, VirtualMachine
-from dbbstation.virtual.truth import random_kinematics
-from dbbstation.virtual.under_spindle import SET_UP_MM, SetUp
+from dbbstation.virtual.truth import SET_UP_MM, SetUp, random_kinematics
 from tests.virtual.brute_force import tool
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from dbbstation.machine.compiled import in_parallel
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.motors import motor_currents
 from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
-from dbbstation.trace.average import averaged
+from dbbstation.trace.circle import averaged
 from dbbstation.trace.columns import currents
 
 if TYPE_CHECKING:

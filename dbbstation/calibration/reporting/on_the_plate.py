@@ -12,7 +12,7 @@ from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.calibration.reporting.residual_map import names_of_tests
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.average import by_angle
+from dbbstation.trace.circle import by_angle
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration

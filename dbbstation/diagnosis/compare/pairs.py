@@ -12,7 +12,7 @@ from dbbstation.errors import TraceError
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, basis
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.trace.average import means
+from dbbstation.trace.circle import means
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,7 +12,7 @@ import numpy as np
 from dbbstation.diagnosis.compare.pairs import Sectors
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.trace.average import averaged
+from dbbstation.trace.circle import averaged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

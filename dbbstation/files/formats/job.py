@@ -10,10 +10,10 @@ from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings_schema import ToleranceSettings
-from dbbstation.files.formats.virtual_port import FASTEST, SLOWEST, misspelt, time_scale_of, virtual_port
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.schema import Schema, read_valid
 from dbbstation.files.yaml.text import YamlDocument
+from dbbstation.system.ports import FASTEST, SLOWEST, misspelt, time_scale_of, virtual_port
 
 _Text = Annotated[str, Field(min_length=1)]
 

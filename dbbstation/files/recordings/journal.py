@@ -13,12 +13,11 @@ import zlib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from dbbstation.errors import InputError, OutputError
+from dbbstation.errors import InputError, OutputError, refusal
 from dbbstation.files.atomic import set_read_only
 from dbbstation.files.formats.session import PART
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import RunFile, parse_run
-from dbbstation.files.refused import refusal
 from dbbstation.system.replacing import rename, sync_folder
 from dbbstation.trace import columns
 

@@ -11,8 +11,7 @@ import socket
 import time
 from typing import TYPE_CHECKING, Self
 
-from dbbstation.errors import OutputError
-from dbbstation.files.refused import refusal
+from dbbstation.errors import OutputError, refusal
 from dbbstation.system.handles import open_to_change, read_at, write_at
 from dbbstation.system.locks import lock
 

@@ -11,8 +11,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.session import LogMark, Seal, SessionFile
 from dbbstation.files.gateway import digest_of
-from dbbstation.files.recordings.anchors import impossible_day
-from dbbstation.files.recordings.event_log import read_event_log
+from dbbstation.files.recordings.event_log import impossible_day, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
     chained,

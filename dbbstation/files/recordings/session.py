@@ -27,8 +27,7 @@ from dbbstation.files.recordings.run_csv import (
 )
 from dbbstation.files.recordings.run_lines import split_file
 from dbbstation.files.recordings.seal import seal_faults
-from dbbstation.files.recordings.session_checks import check_bar, check_runs
-from dbbstation.files.recordings.session_set_up import check_set_up_errors, mounted_name
+from dbbstation.files.recordings.session_checks import check_bar, check_runs, check_set_up_errors, mounted_name
 from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
 from dbbstation.files.source_text import read_bytes, unreadable, without_faults
 from dbbstation.files.yaml.schema import validate

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.facts.serialise import adapter
 from dbbstation.files.formats.session import SessionDetails, SessionFile
 from dbbstation.files.recordings.event_log import EVENTS_FILE, EventLog
-from dbbstation.files.yaml.changes import changes
+from dbbstation.files.recordings.seal import changes
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_of
 

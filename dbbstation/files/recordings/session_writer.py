@@ -16,8 +16,8 @@ from dbbstation.files.recordings.new_session import make_session_folder
 from dbbstation.files.recordings.run_csv import sha256_of
 from dbbstation.files.recordings.seal import chained, hashes, keep_copies, sealed_names, sealed_over
 from dbbstation.files.recordings.session import no_session, part_entry, read_session
+from dbbstation.files.recordings.session_checks import readings_in
 from dbbstation.files.recordings.session_name import PROGRAMS, RUNS, SESSION_FILE
-from dbbstation.files.recordings.session_set_up import readings_in
 from dbbstation.files.recordings.session_state import session_data
 from dbbstation.files.recordings.session_store import SessionStore, now
 

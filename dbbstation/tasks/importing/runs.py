@@ -27,7 +27,7 @@ from dbbstation.files.formats.mapping import (
     in_run_units,
 )
 from dbbstation.files.formats.session import RunState
-from dbbstation.files.recordings.anchors import impossible_day
+from dbbstation.files.recordings.event_log import impossible_day
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.run_csv import count_in
 from dbbstation.files.recordings.table_csv import MOST_FAULTS

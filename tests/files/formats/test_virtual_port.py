@@ -2,8 +2,8 @@
 
 import pytest
 
-from dbbstation.files.formats.virtual_port import misspelt, time_scale_of, virtual_port
 from dbbstation.service.memory import Line
+from dbbstation.system.ports import misspelt, time_scale_of, virtual_port
 
 
 @pytest.mark.parametrize("scale", [0.01, 0.5, 1.0, 2.5, 10.0, 20.0, 50.0])

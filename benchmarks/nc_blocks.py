@@ -32,7 +32,7 @@ def program(blocks: int) -> str:
     lines = ["G21 G90 G94 G17", "G0 X0 Y0 Z-990 A0 B0 C0", "F2000", "G1 Z-1000"]
     for block in range(blocks):
         row, way = divmod(0.5 * block, 100.0)
-        x, y = (way - 50.0) * (-1.0) ** row, 0.1 * row - 50.0
+        x, y = (way - 50.0) * (-1.0) ** row, 0.1 * (row % 1000) - 50.0
         lines.append(f"G1 X{x:.3f} Y{y:.3f} Z{3.0 * math.sin(x / 10.0) * math.cos(y / 10.0) - 1000.0:.3f}")
     return "\n".join([*lines, "M2"]) + "\n"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
@@ -69,9 +70,17 @@ class Dialect(ABC):
         header, numbers = head()
         return self.write(replace(toolpath, numbers=numbers), header)
 
-    def file_name(self, stem: str, run: int) -> str:  # noqa: ARG002
-        """Return the name of a program's file; `run` is its number among the programs that are written together, from 1."""
-        return stem if stem.endswith(self.extension) else stem + self.extension
+    name_letters: ClassVar[str] = r"\s\S"
+    """Letters that a program's name may have, as in brackets of a regular expression; others become underscores."""
+    longest_name: ClassVar[int] = 200
+    """Greatest number of letters in a program's name, without its extension."""
+
+    def file_name(self, stem: str, run: int) -> str:
+        """Return the name of a program's file; `run` is its number among the programs that are written together, from 1. A name that is cut ends with this number."""
+        name, number = re.sub(f"[^{self.name_letters}]", "_", stem.removesuffix(self.extension)), f"_{run}"
+        if len(name) > self.longest_name:
+            name = name[: self.longest_name - len(number)] + number
+        return name + self.extension
 
     def is_in(self, text: str) -> bool:  # noqa: ARG002
         """Return whether a program may be in this language. The program asks this if several dialects share a file ending."""

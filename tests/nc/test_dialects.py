@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import textwrap
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +19,7 @@ from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.registry import GROUP, dialect_named, dialect_of_file, known_dialects
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind, ToolpathBuilder
+from dbbstation.nc.trial import faults_of
 from dbbstation.nc.words import CannotSayError
 
 ONE_FILE = '''
@@ -280,14 +280,56 @@ def test_a_dialect_learns_which_of_the_programs_it_writes(tmp_path, table2, refe
 
 def test_a_program_that_moves_nothing_is_refused_whatever_reads_it():
     with pytest.raises(InputError, match="this program moves nothing"):
-        dialect_given(str(EXAMPLE)).toolpath("M30\n", "empty.mpf")
+        dialect_named("sinumerik840d").toolpath("M30\n", "empty.mpf")
 
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "sinumerik.py"
+@pytest.mark.parametrize("name", known_dialects())
+def test_every_dialect_reads_what_it_writes(name):
+    if name != "poses":  # a table of moves, in which a rapid may have no F
+        assert faults_of(dialect_named(name)) == []
 
 
-def test_the_example_of_the_documentation_is_a_dialect(linuxcnc, crooked, table2):
-    dialect = dialect_given(str(EXAMPLE))
+@pytest.mark.parametrize(
+    "line",
+    [
+        "G2 X1 Y1 I1",
+        "G1",
+        "G1 X",
+        "G1 X1e3",
+        "G0 X5 U1",
+        "SUPA X5",
+        "T1",
+        "M6",
+        "M48",
+        "M17",
+        "G58",
+        "G4 S3",
+        "G641",
+        "TRANS X10",
+        "X5",
+    ],
+)
+def test_840d_refuses_what_it_does_not_write_with_its_line(line):
+    with pytest.raises(InputError, match=r"p\.mpf:3:1: .*is not read"):
+        dialect_named("sinumerik840d").read(f"G0 X0 Y0 Z0 A0 B0 C0\nG1 X1 F100\n{line}\nM2\n", "p.mpf")
+
+
+@pytest.mark.parametrize(
+    ("stem", "name"),
+    [
+        ("table-ccw", "table_ccw.mpf"),
+        ("a-cw", "NC_a_cw.mpf"),
+        ("part.ngc", "part_ngc.mpf"),
+        ("x" * 30, f"{'x' * 22}_7.mpf"),
+    ],
+)
+def test_names_of_840d_are_those_that_it_allows(stem, name):
+    """24 letters, digits and underscores, two letters first [Fundamentals 11/2006, page 62]."""
+    assert dialect_named("sinumerik840d").file_name(stem, 7) == name
+
+
+def test_840d_commands_what_linuxcnc_does(linuxcnc, crooked, table2):
+    dialect = dialect_named("sinumerik840d")
     part = "G21 G90 G54\nG0 X0 Y0 Z-1000 A0 B0 C0\nS800 M3\nG61\nG1 X50 F500\n(MSG, turn it)\nM0\nG4 P0.5\nG1 A5 F60\nM30\n"
     path = read_program(part, "part.ngc")
     texts = [compensated_program(path, one, Inverse(crooked)).text for one in (linuxcnc, dialect)]

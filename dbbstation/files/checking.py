@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,7 +40,9 @@ if TYPE_CHECKING:
 
     from dbbstation.facts.record import Record
     from dbbstation.files.formats.session import RunEntry
+    from dbbstation.files.formats.settings import Settings
     from dbbstation.files.yaml.schema import Schema
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.trace.recording import Recording
@@ -135,89 +137,66 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
     if document is None:
         return
     given = document.data.get("format") if isinstance(document.data, dict) else None
-    by_name: dict[str, Callable[[], None]] = {
-        "dbb-session": lambda: _session(checked),
-        "dbb-machine": lambda: _machine(checked),
-        "dbb-plan": lambda: _plan(checked),
-        "dbb-jig": lambda: _jig(checked),
-        "dbb-model": lambda: _model(checked, known_sources),
-        "dbb-settings": lambda: _settings(checked),
-        "dbb-bar": lambda: _bar(checked),
-        "dbb-job": lambda: _job(checked),
-        "dbb-mapping": lambda: _mapping(checked),
-        "dbb-simulator": lambda: _simulator(checked),
-    }
     name = str(given).partition("/")[0]
-    if name in by_name:
+    if name == "dbb-session":
         checked.kind = str(given)
-        by_name[name]()
+        _session(checked)
+        return
+    if name in _READERS:
+        checked.kind = str(given)
+        read, in_words = _READERS[name]
+        known = (known_sources,) if name == "dbb-model" else ()
+        found = read(checked.path, *known, checked.problems)
+        checked.summary = "" if found is None else in_words(found)
         return
     what = "the file does not say what format it has" if given is None else f"`{given}` is no format"
     formats = ", ".join((*SCHEMAS, "dbb-instrument/1"))
     checked.problems.append(document.problem(("format",), what, f"begin it with `format: `, one of {formats}"))
 
 
-def _machine(checked: Checked) -> None:
-    machine = parse_machine(checked.path, checked.problems)
-    if machine is not None:
-        checked.summary = f"machine {machine.name}"
-
-
-def _jig(checked: Checked) -> None:
-    jig = parse_jig(checked.path, checked.problems)
-    if jig is not None:
-        checked.summary = f"jig with {_count(len(jig.jig.bores), 'bore')}, {_count(len(jig.balls), 'ball')}"
-
-
-def _plan(checked: Checked) -> None:
-    plan = parse_plan(checked.path, checked.problems)
-    if plan is not None:
-        checked.summary = f"plan {plan.plan.name}: {_count(len(plan.plan.tests), 'test')}"
-
-
-def _model(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
-    model = parse_model(checked.path, known_sources, checked.problems)
-    if model is not None:
-        names = sorted({one.source.name for one in model.model.of_the_machine().sources})
-        checked.summary = f"model of {model.model.machine.name}: {', '.join(names) or 'no sources'}"
-
-
-def _settings(checked: Checked) -> None:
+def _settings(path: Path, faults: list[Problem]) -> Settings | None:
     try:
-        settings = read_settings([checked.path])
+        return read_settings([path])
     except InputError as error:
-        checked.problems += error.problems
-        return
-    count = len(settings.values) + len(settings.tolerances)
-    checked.summary = f"settings: {_count(count, 'value')}"
+        faults += error.problems
+        return None
 
 
-def _job(checked: Checked) -> None:
-    job = parse_job(checked.path, checked.problems)
-    if job is not None:
-        left = ", ".join(job.may_change) or "nothing"
-        limits = _count(len(job.tolerances), "tolerance")
-        checked.summary = f"job {job.name}: {limits}, {left} left to the operator"
+def _model(model: IdentifiedModel) -> str:
+    names = sorted({one.source.name for one in model.model.of_the_machine().sources})
+    return f"model of {model.model.machine.name}: {', '.join(names) or 'no sources'}"
 
 
-def _bar(checked: Checked) -> None:
-    bar = parse_bar(checked.path, checked.problems)
-    if bar is not None:
-        long_um, u_um = 1e3 * (bar.readings.mean_mm - bar.length_mm), 1e3 * bar.uncertainty_mm
-        checked.summary = f"bar {bar.serial_number}: reads {long_um:+.2f} µm long, standard uncertainty {u_um:.2f} µm"
+def _job(job: JobFile) -> str:
+    left, limits = ", ".join(job.may_change) or "nothing", _count(len(job.tolerances), "tolerance")
+    return f"job {job.name}: {limits}, {left} left to the operator"
 
 
-def _mapping(checked: Checked) -> None:
-    mapping = parse_mapping(checked.path, checked.problems)
-    if mapping is not None:
-        checked.summary = f"mapping of {_count(len(mapping.columns), 'column')}"
+def _bar(bar: BarFile) -> str:
+    long_um, u_um = 1e3 * (bar.readings.mean_mm - bar.length_mm), 1e3 * bar.uncertainty_mm
+    return f"bar {bar.serial_number}: reads {long_um:+.2f} µm long, standard uncertainty {u_um:.2f} µm"
 
 
-def _simulator(checked: Checked) -> None:
-    found = parse_simulator(checked.path, checked.problems)
-    if found is not None:
-        ports, parameters = _count(len(found.ports), "port"), _count(len(found.parameters), "parameter")
-        checked.summary = f"simulator {found.name}: {parameters}, {ports}, {_count(len(found.outputs), 'output')}"
+def _simulator(found: SimulatorFile) -> str:
+    ports, parameters = _count(len(found.ports), "port"), _count(len(found.parameters), "parameter")
+    return f"simulator {found.name}: {parameters}, {ports}, {_count(len(found.outputs), 'output')}"
+
+
+_READERS: dict[str, tuple[Callable[..., Any], Callable[[Any], str]]] = {
+    "dbb-machine": (parse_machine, lambda machine: f"machine {machine.name}"),
+    "dbb-plan": (parse_plan, lambda one: f"plan {one.plan.name}: {_count(len(one.plan.tests), 'test')}"),
+    "dbb-jig": (
+        parse_jig,
+        lambda one: f"jig with {_count(len(one.jig.bores), 'bore')}, {_count(len(one.balls), 'ball')}",
+    ),
+    "dbb-model": (parse_model, _model),
+    "dbb-settings": (_settings, lambda one: f"settings: {_count(len(one.values) + len(one.tolerances), 'value')}"),
+    "dbb-bar": (parse_bar, _bar),
+    "dbb-job": (parse_job, _job),
+    "dbb-mapping": (parse_mapping, lambda mapping: f"mapping of {_count(len(mapping.columns), 'column')}"),
+    "dbb-simulator": (parse_simulator, _simulator),
+}
+"""How each format is read, with its faults, and told in one line. A model also needs the error sources."""
 
 
 def _run(checked: Checked) -> None:

@@ -23,11 +23,11 @@ from dbbstation.errors import InputError, OutputError
 from dbbstation.files.gateway import opened
 from dbbstation.files.inputs import note_read
 from dbbstation.files.source_text import lines_of, unreadable
+from dbbstation.system.handles import Closing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
     from pathlib import Path
-    from typing import Self
 
 _HEAD = "# dbb-byte-log/1"
 _LONGEST_S = 1e9
@@ -44,7 +44,7 @@ class Chunk:
     raw: bytes
 
 
-class ByteLog:
+class ByteLog(Closing):
     """A byte log being written.
 
     Args:
@@ -94,12 +94,6 @@ class ByteLog:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def logged_instrument(path: Path) -> tuple[str, str]:

@@ -19,6 +19,7 @@ from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.instrument.reception import INCOMPLETE, Reception, Tally
 from dbbstation.instrument.sequence import SampleOrder
 from dbbstation.instrument.stamps import MachineTime, StreamStamps
+from dbbstation.system.handles import Closing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -126,7 +127,7 @@ _JOIN_S = 5.0
 """Longest wait for the end of the reader thread [s]; it usually ends within some hundredths of a second."""
 
 
-class Instrument:
+class Instrument(Closing):
     """A length instrument on a serial line; a `with` block starts and closes it.
 
     Args:
@@ -240,9 +241,6 @@ class Instrument:
     def __enter__(self) -> Self:
         self.start()
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def read(self) -> Reading:
         """Wait for the next reading and return it.

@@ -94,10 +94,10 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) 
         usual, _ = scale_of(list(means[away]))
         apart = len(away) / samples
         limit = largest_of(2.0 * apart * len(WIDTHS_DEG), ROBUST_SHARE * apart) * usual
-        top = _top(means, away)
+        top = largest_at(means, away)
         found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=False))
     numbers = [n for n in np.unique(beside[inner]) if n >= 0]
-    tops = [_top(means, np.flatnonzero(inner & (beside == n))) for n in numbers]
+    tops = [largest_at(means, np.flatnonzero(inner & (beside == n))) for n in numbers]
     for k, top in enumerate(tops):
         others = [float(means[t]) for j, t in enumerate(tops) if j != k]
         if len(others) < FEWEST:
@@ -108,5 +108,6 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) 
     return found_peaks
 
 
-def _top(means: Floats, among: Integers) -> int:
+def largest_at(means: Floats, among: Integers) -> int:
+    """Return which of the indices `among`, shape (k,), has the value of largest size."""
     return int(among[int(np.argmax(np.abs(means[among])))])

@@ -37,8 +37,7 @@ LOCAL_COEFFICIENTS = 2 * LOCAL_HARMONIC + 1
 
 def local_columns(theta_rad: Floats) -> Floats:
     """Return basis functions of an orthonormal form up to `LOCAL_HARMONIC` undulations, shape (n, 59)."""
-    angles = np.outer(theta_rad, np.arange(1, LOCAL_HARMONIC + 1))
-    return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
+    return _columns(theta_rad, LOCAL_HARMONIC)
 
 
 COEFFICIENTS = 2 * HIGHEST_HARMONIC + 1
@@ -50,7 +49,11 @@ HIGHER = (2, 3, 5, 6)
 
 def form_columns(theta_rad: Floats) -> Floats:
     """Return basis functions of an orthonormal form, shape (n, 7)."""
-    angles = np.outer(theta_rad, np.arange(1, HIGHEST_HARMONIC + 1))
+    return _columns(theta_rad, HIGHEST_HARMONIC)
+
+
+def _columns(theta_rad: Floats, highest: int) -> Floats:
+    angles = np.outer(theta_rad, np.arange(1, highest + 1))
     return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
 
 

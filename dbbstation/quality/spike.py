@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.circles.noise import LEAST_UM
-from dbbstation.quality.bump import FEWEST, near_reversals
+from dbbstation.quality.bump import FEWEST, largest_at, near_reversals
 from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.computing.arrays import Flags, Floats
 
 BESIDE = 2
 """Readings on each side whose median is compared with a reading. A spike of one or two readings does not change the
@@ -55,7 +55,9 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         limits = largest_of(len(away), freedom) * scale[away] + rounding
         worst = int(np.argmax(np.abs(apart[away]) / limits))
         candidates.append((abs(float(apart[away[worst]])), float(limits[worst]), int(away[worst])))
-    tops = [_top(apart, np.flatnonzero(sound & (near == number))) for number in np.unique(near[sound & (near >= 0)])]
+    tops = [
+        largest_at(apart, np.flatnonzero(sound & (near == number))) for number in np.unique(near[sound & (near >= 0)])
+    ]
     for k, top in enumerate(tops):
         others = [float(apart[other]) for j, other in enumerate(tops) if j != k]
         if len(others) >= FEWEST:
@@ -112,7 +114,3 @@ def _scales(apart: Floats, among: Flags) -> tuple[Floats, float]:
     each = np.repeat(np.maximum(beside, whole), np.diff(edges))
     # Neighbouring differences share readings, so about half of them are independent.
     return np.maximum(each, LEAST_UM), ROBUST_SHARE * float(among.sum()) / 2.0
-
-
-def _top(apart: Floats, among: Integers) -> int:
-    return int(among[int(np.argmax(np.abs(apart[among])))])

@@ -11,13 +11,14 @@ import os
 import time
 import zlib
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, OutputError, refusal
 from dbbstation.files.atomic import set_read_only
 from dbbstation.files.formats.session import PART
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import RunFile, parse_run
+from dbbstation.system.handles import Closing
 from dbbstation.system.replacing import rename, sync_folder
 from dbbstation.trace import columns
 
@@ -89,7 +90,7 @@ def run_line(values: Sequence[float | str], names: Sequence[str], *, exact: bool
     return body + f",{zlib.crc32(body):08x}\n".encode()
 
 
-class RunWriter:
+class RunWriter(Closing):
     """Appends samples to one run. Leaving the context keeps the `.part` unless sealed.
 
     Args:
@@ -125,13 +126,6 @@ class RunWriter:
             os.fsync(self._file.fileno())
             sync_folder(folder)
         self._synced_at = clock()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the file; an unsealed one remains a `.part`."""
-        self.close()
 
     def append(self, values: Sequence[float | str]) -> None:
         """Write one sample, and sync if the last sync is old.
@@ -240,7 +234,7 @@ class RunWriter:
         return digest
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; an unsealed one remains a `.part`."""
         self._file.close()
 
     def _write(self, line: bytes) -> None:

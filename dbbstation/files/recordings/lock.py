@@ -9,10 +9,10 @@ import contextlib
 import os
 import socket
 import time
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError, refusal
-from dbbstation.system.handles import open_to_change, read_at, write_at
+from dbbstation.system.handles import Closing, open_to_change, read_at, write_at
 from dbbstation.system.locks import lock
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ PATIENCE_S = 2.0
 _PAUSE_S = 0.01
 
 
-class SessionLock:
+class SessionLock(Closing):
     """The right to write into a session, until closed or the process ends.
 
     Attributes:
@@ -50,12 +50,6 @@ class SessionLock:
             with contextlib.suppress(OSError):  # a full disk must not keep anybody from going on
                 os.ftruncate(self._file, 0)
                 write_at(self._file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __del__(self) -> None:
         """Close a forgotten lock."""

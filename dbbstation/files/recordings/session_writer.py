@@ -20,6 +20,7 @@ from dbbstation.files.recordings.session_checks import readings_in
 from dbbstation.files.recordings.session_name import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_state import session_data
 from dbbstation.files.recordings.session_store import SessionStore, now
+from dbbstation.system.handles import Closing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
 
 
-class SessionWriter:
+class SessionWriter(Closing):
     """Writes one session folder while runs are recorded.
 
     Every step survives a crash: a run's `.part` exists before the session file names it, and is sealed before it is complete.
@@ -44,12 +45,6 @@ class SessionWriter:
         self._store = SessionStore(folder, clock)
         self._clock = clock
         self._session = self._kept = replace(read_session(folder), sha256=self._store.sha256)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Unlock the session for others; may be called twice."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +10,7 @@ from dbbstation.diagnosis.drive.findings import DriveFindings
 from dbbstation.facts.serialise import Absent
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.recordings.drive_csv import compared_csv
-from dbbstation.results.frame import Framed, picked
+from dbbstation.results.frame import Framed, of_facts, picked
 from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:
@@ -41,4 +41,4 @@ class DriveResult(Framed, DriveFindings):
 
 def drive_result(found: DriveFindings, drawing: Callable[[object], bytes] | None = None) -> DriveResult:
     """Return the findings as a result with table and figure."""
-    return DriveResult(**{one.name: getattr(found, one.name) for one in fields(found)}, drawing=drawing)
+    return of_facts(DriveResult, found, drawing=drawing)

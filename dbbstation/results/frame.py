@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from dbbstation.errors import OutputError, StationError
 from dbbstation.facts.serialise import AsItIs, Kept, json_of, plain
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from os import PathLike
 
+
+_Kind = TypeVar("_Kind")
 
 FORMATS = (".svg", ".png", ".pdf")
 """Formats of figures, by the ending of the file."""
@@ -151,6 +153,12 @@ class Framed:
 def picked(one: object, *names: str) -> dict[str, object]:
     """Return some fields of an object by name."""
     return {name: getattr(one, name) for name in names}
+
+
+def of_facts(kind: type[_Kind], *facts: object, **further: object) -> _Kind:
+    """Return a dataclass whose fields are the facts' attributes of the same name, of the first fact with each, or given."""
+    held = {one.name: fact for one in fields(kind) for fact in reversed(facts) if hasattr(fact, one.name)}  # type: ignore[arg-type]
+    return kind(**{name: getattr(fact, name) for name, fact in held.items()} | further)
 
 
 def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:

@@ -16,6 +16,7 @@ from dbbstation.results.comparison import (
     VariableSpan,
 )
 from dbbstation.results.diagnosis import BeforeAfter
+from dbbstation.results.frame import of_facts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -37,11 +38,13 @@ def comparison_result(
     largest_first = sorted(found.runs, key=lambda run: (-run.differs, -float(np.sum(run.found_mm**2)), -run.rms_um))
     pairs, held_out = found.matching, found.trial.held_out
     before, after = found.held_out
-    return ComparisonResult(
+    return of_facts(
+        ComparisonResult,
+        found,
+        pairs,
         a=a,
         b=b,
         text=verdict_text(found),
-        differ=found.differ,
         probability_of_difference=found.probability,
         runs_compared=len(found.runs),
         runs_different=sum(run.differs for run in found.runs),
@@ -53,8 +56,6 @@ def comparison_result(
         held_out_worse=None if held_out is None else held_out.is_worse,
         held_out_rms_um=BeforeAfter(1e3 * before.rms, 1e3 * after.rms),
         runs=tuple(largest_first),
-        directions=found.directions,
-        cancelling=found.cancelling,
         organised_text=organised_text(found),
         causes=(
             *(_cause(found, finding) for finding in found.there),
@@ -64,10 +65,7 @@ def comparison_result(
         left=ComparisonResidual(not found.left.is_noise, found.left.probability, residual_text(found.left)),
         only_in_a=pairs.only_a,
         only_in_b=pairs.only_b,
-        not_comparable=pairs.not_comparable,
-        averaged=pairs.averaged,
         unlike=tuple(unlike),
-        levels=found.levels,
         drawing=drawing,
         notes=notes,
     )
@@ -75,21 +73,15 @@ def comparison_result(
 
 def _cause(found: Comparison, finding: CauseFinding) -> ComparedCause:
     effect = found.effects.get(finding.name)
-    return ComparedCause(
-        name=finding.name,
+    return of_facts(
+        ComparedCause,
+        finding if effect is None else effect,
+        finding,
         form=finding.label if effect is not None else "",
         named=finding.form is None,
-        verdict=str(finding.verdict),
         acts=finding.acts.name.lower(),
-        persists=finding.persists,
-        recurs=finding.recurs,
-        gains=finding.gains,
-        probability=finding.probability,
+        rms_um=None if effect is None else effect.rms_um,
         log_evidence=finding.log_bayes_factor,
-        ambiguous_with=tuple(finding.ambiguous_with),
-        equivalent=tuple(finding.equivalent),
         spans=tuple(VariableSpan(**vars(one)) for one in finding.spans),
         parameters=finding.values,
-        text=finding.text,
-        **({} if effect is None else vars(effect)),
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
@@ -12,6 +11,7 @@ from dbbstation.facts.by_name import ByName
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.results.diagnosis import BeforeAfter, CircularityLeft, DiagnosisFigures, DiagnosisResult
+from dbbstation.results.frame import of_facts
 from dbbstation.results.levels_text import bars
 from dbbstation.trace.analysis import figures
 
@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:
     """Return the figures of a diagnosis."""
     before, after = diagnosis.held_out
-    return DiagnosisFigures(
-        mismatch=diagnosis.mismatch,
+    return of_facts(
+        DiagnosisFigures,
+        diagnosis,
         probability=diagnosis.misfit.probability,
         noise_um=1e3 * diagnosis.left.noise,
         misfit_rms_um=1e3 * diagnosis.misfit.rms,
@@ -38,9 +39,6 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         held_out="not-tested" if diagnosis.chosen_anew is None else "tested",
         held_out_worse=None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.is_worse,
         circularity_um=_circularity(diagnosis),
-        workspace=diagnosis.workspace,
-        outliers=diagnosis.outliers,
-        locations=diagnosis.locations,
         sources=ByName(
             (
                 *_mountings(diagnosis),
@@ -51,14 +49,9 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
                 ),
             )
         ),
-        cancelling=diagnosis.cancelling,
-        unexplained=diagnosis.unexplained,
         parameter_shift=diagnosis.shifts,
-        second_start_agrees=diagnosis.second_start_agrees,
         next_test=diagnosis.next_tests[0] if diagnosis.next_tests else None,
         further_tests=diagnosis.next_tests[1:],
-        levels=diagnosis.levels,
-        limits=diagnosis.limits,
     )
 
 
@@ -71,8 +64,7 @@ def diagnosis_result(
     notes: tuple[str, ...],
 ) -> DiagnosisResult:
     """Return the whole result of a diagnosis."""
-    own = {one.name: getattr(figures, one.name) for one in fields(DiagnosisFigures)}
-    return DiagnosisResult(**{**own, "drawing": drawing, "notes": notes}, effects=effects, model=model)
+    return of_facts(DiagnosisResult, figures, drawing=drawing, notes=notes, effects=effects, model=model)
 
 
 def kept_of(figures: DiagnosisFigures) -> dict[str, object]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
 from dbbstation.facts.value import finite
+from dbbstation.results.frame import of_facts
 from dbbstation.results.mismatch import (
     HeldOutRms,
     MismatchResult,
@@ -33,7 +34,9 @@ def mismatch_result(
 ) -> MismatchResult:
     """Return the result of a table."""
     compared = found.table
-    return MismatchResult(
+    return of_facts(
+        MismatchResult,
+        found,
         unit=compared.unit,
         row_count=len(compared),
         blocks=compared.names,
@@ -41,20 +44,16 @@ def mismatch_result(
             VariableResult(v.name, str(v.kind), v.unit, v.period, float(v.low), float(v.high))
             for v in compared.variables
         ),
-        levels=found.levels,
         mismatch=found.is_there,
         offset=_offset(found),
         noise=_noise(found),
         residual_rms=ResidualRms(found.rms_before, found.rms_after),
         held_out="not-tested" if found.held_out is None else "tested",
         held_out_rms=_held_out(found),
-        cancelling=found.cancelling,
         findings=tuple(replace(one, text=sentence_of(found, one)) for one in found.findings),
         parameters=found.fitted,
-        left=found.left,
         next=next_measurements(found),
         not_asked=found.lacking,
-        stopped=found.stopped,
         table={} if table is None else table,
         drawing=drawing,
         notes=notes,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from dbbstation.diagnosis.simulator.nodes import spread_of
 from dbbstation.facts.value import finite
 from dbbstation.inference.verdict import Verdict
+from dbbstation.results.frame import of_facts
 from dbbstation.results.simulator import (
     HeldOutSimulation,
     HeldOutSimulations,
@@ -30,7 +31,9 @@ HIDDEN = 0.1
 def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:
     """Return the result of a simulator."""
     found, settled, model = answer.found, answer.found.settled, answer.model
-    return SimulatorResult(
+    return of_facts(
+        SimulatorResult,
+        answer,
         simulator=model.name,
         unit=model.outputs[0].unit,
         outputs=tuple(
@@ -40,19 +43,14 @@ def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -
             )
         ),
         runs=tuple(SimulatedRun(run.name, len(run)) for run in model.runs),
-        levels=answer.levels,
         mismatch=answer.is_there,
         rms=SimulationRms(*answer.rms),
         noise=SimulationNoise(settled.noise.sigma, settled.noise.correlation_samples, finite(settled.bank.tails)),
         settled=found.is_settled,
-        stopped=answer.stopped,
         held_out="not-tested" if answer.held_out is None else "tested",
         held_out_rms=_held_out(answer),
         findings=tuple(_term(answer, one) for one in answer.findings),
-        parameters=answer.parameters,
-        left=answer.left,
         next=answer.separations,
-        not_asked=dict(answer.not_asked),
         simulations=simulations,
     )
 
@@ -68,23 +66,14 @@ def _held_out(answer: SimulatorComparison) -> HeldOutSimulations | None:
 def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
     term = next((term for term in answer.terms if term.name == one.name), None)
     port = next((port for port in answer.model.ports if one.name.endswith(f" at {port.name}")), None)
-    return PortTerm(
-        name=one.name,
-        verdict=str(one.verdict),
+    return of_facts(
+        PortTerm,
+        one,
         port=port.name if port else "",
         about=port.about if port else "",
         form=str(term.form) if term else one.name.split(" of ")[0].split(" at ")[0],
         put_in=term is not None,
-        probability=one.probability,
-        log_bayes_factor=one.log_bayes_factor,
-        rms=one.rms,
-        sigmas=one.sigmas,
-        confounded=one.confounded,
         linear_and_true_differ_by=finite(answer.nonlinear.get(one.name)),
-        values=one.values,
-        gains=one.gains,
-        equivalent=tuple(one.equivalent),
-        ambiguous_with=tuple(one.ambiguous_with),
         text=one.text or _why(one),
     )
 

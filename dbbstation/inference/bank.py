@@ -332,9 +332,8 @@ class Bank:
             even = diags_array(1.0 / spread).tocsr()
             self.whitening = even if self.whitening is None else self.whitening @ even
             self.whitening = diags_array(trust).tocsr() @ self.whitening
-        self._columns = CauseColumns(self.whitened(self.channel.base.samples), self._whitener())
-        for part in self._everywhere:
-            self._columns.add(part)
+        base = self.whitened(self.channel.base.samples)
+        self._columns = CauseColumns(base, self._whitener(), parts=self._everywhere)
 
     def whitened(self, rows: Floats) -> Floats:
         """Return the kept part of these rows, whitened, shape (m, ...)."""

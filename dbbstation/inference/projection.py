@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve
-from scipy.linalg.blas import dsyrk
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import ModelComparison, cholesky
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.blocks import Columns
@@ -36,6 +35,7 @@ class CauseColumns:
     Args:
         base: shape (n, k).
         whitened: function from columns, shape (m, q), to samples, shape (n, q), called on demand; None for identity.
+        parts: first columns, if they are whitened, shape (m, q) each.
 
     Attributes:
         numbers: columns whose products are computed, if not all.
@@ -48,18 +48,19 @@ class CauseColumns:
         base: Floats,
         whitened: Callable[[Floats], Floats] | None = None,
         room: int = BOUNDS.columns_at_first,
+        parts: Sequence[Floats] = (),
     ) -> None:
         self.base = base
         self.axes, self.on_axes = _orthonormal(base)
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
-        self._waiting: list[Floats] = []
+        self._waiting = list(parts)
         self._ready, self._shared = 0, False
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
         self._free: list[int] = []
         self._changed: list[int] = []  # replaced columns, whose products and projections are outdated
-        self.count = 0
+        self.count = sum(part.shape[1] for part in parts)
         self.numbers: Integers | None = None
 
     @property
@@ -68,7 +69,8 @@ class CauseColumns:
         if self._waiting:
             self._make_room(self.count)
         while self._waiting:
-            part = self._waiting.pop(0)  # free the copy early
+            part = np.hstack(self._waiting[: BOUNDS.sums_at_once])
+            del self._waiting[: BOUNDS.sums_at_once]  # free the copies early
             first, last = self._ready, self._ready + part.shape[1]
             self._buffer[:, first:last] = part if self._whitened is None else self._whitened(part)
             self._ready = last
@@ -221,16 +223,11 @@ class _Without(CauseColumns):
 
 def _less(products: Floats, columns: Floats) -> Floats:
     """Subtract the products of columns, shape (m, q), from the given products, shape (q, q), in place."""
-    if not columns.size:
-        return products
-    found = np.asarray(dsyrk(-1.0, columns, beta=1.0, c=products.T, trans=1, overwrite_c=1), dtype=np.float64)
-    for first in range(0, len(found), BOUNDS.mirrored_at_once):
-        # New products are above the diagonal, old ones below.
-        strip, behind = slice(first, first + BOUNDS.mirrored_at_once), slice(first + BOUNDS.mirrored_at_once, None)
-        upper = np.triu(found[strip, strip])
-        found[strip, strip] = upper + np.triu(upper, 1).T
-        found[behind, strip] = found[strip, behind].T
-    return found.T
+    for first in range(0, len(products) if columns.size else 0, BOUNDS.mirrored_at_once):
+        strip, after = slice(first, first + BOUNDS.mirrored_at_once), slice(first + BOUNDS.mirrored_at_once, None)
+        products[first:, strip] -= columns[:, first:].T @ columns[:, strip]
+        products[strip, after] = products[after, strip].T
+    return products
 
 
 def _orthonormal(base: Floats) -> tuple[Floats, Floats]:
@@ -273,7 +270,7 @@ class BesideBase:
             along, products = causes.axes.T @ columns, columns.T @ columns
             of_columns, of_axes = columns.T @ target, causes.axes.T @ target
         of_base = self._taken @ along
-        gram = _less(products, np.asfortranarray(of_base))
+        gram = _less(products, of_base)
         towards = of_columns - of_base.T @ (self._taken @ of_axes)
         gram /= self._noise**2
         return ModelComparison(gram, towards / self._noise**2, causes.numbers if only is None else only)

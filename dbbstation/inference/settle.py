@@ -20,6 +20,7 @@ from dbbstation.inference.settled import Beginning, Settled
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.facts.value import Value
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.coloured import Coloured
@@ -343,7 +344,7 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
         _between_points(bank, beside, others, member) if len(law.grids) == 1 and not len(member.variant.slack) else None
     )
     for number in range(BOUNDS.steps if law.grids or law.at else 1):
-        values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]
+        values = _values(beside, target, (member, *others))[: len(member.columns)]
         width = len(member.variant.columns)
         if not values[:width].any():
             return
@@ -356,11 +357,17 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
         member = replace(member, cause=cause, variant=same)
 
 
+def _values(beside: BesideBase, target: Floats, members: Sequence[Member]) -> Floats:
+    """Return members' values, computed from their columns alone."""
+    own = np.unique(np.concatenate([member.columns for member in members]))
+    return beside.comparison(target, own).values(members)
+
+
 def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], member: Member) -> tuple[float, ...]:
     law, target = bank.laws[member.cause.name], bank.target
     if others:
         columns = np.concatenate([one.columns for one in others])
-        values = beside.comparison(target).values([member, *others])[len(member.columns) :]
+        values = _values(beside, target, (member, *others))[len(member.columns) :]
         target = target - bank.fitted(columns) @ values
     axes = bank.axes
     target = target - axes @ (axes.T @ target)

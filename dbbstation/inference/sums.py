@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import rfft
-from scipy.special import jv
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.forms import Bump, Form, StepForm, Wave
@@ -39,6 +39,20 @@ class Sums:
     rest: Floats
     gains: Floats
     base: Floats
+
+    @cached_property
+    def scaled(self) -> tuple[Floats, float, float]:
+        """Return bins from -1 to 1, shape (b,), and their middle and half range."""
+        low, high = float(self.at.min()), float(self.at.max())
+        half = max((high - low) / 2.0, np.finfo(np.float64).tiny)
+        return (self.at - (low + high) / 2.0) / half, (low + high) / 2.0, half
+
+    @cached_property
+    def cardinal(self) -> Floats:
+        """Return the polynomials that are one at one of `NODES` and zero at the others, shape (24, b)."""
+        at_nodes, at_bins = (np.polynomial.chebyshev.chebvander(x, len(NODES) - 1) for x in (NODES, self.scaled[0]))
+        at_nodes[:, 1:] *= 2.0
+        return np.asarray(at_nodes @ at_bins.T / len(NODES))
 
     def explained(self, curves: Floats) -> Floats:
         """Return the squares, shape (m,), that curves, shape (b, m, p), explain given the base."""
@@ -118,60 +132,36 @@ def steps(low: float, high: float, count: int) -> list[Form]:
 
 
 class NearbyWaves:
-    """Squares explained by waves near a frequency, from polynomial sums.
+    """Squares explained by waves near a frequency, from sums at Chebyshev points.
 
-    For x in -1..1, exp(i a x) = J_0(a) + 2 sum i^n J_n(a) T_n(x) [Jacobi and Anger; Abramowitz and Stegun, eqs 9.1.44
-    and 9.1.45]; `TERMS` terms suffice within `REACH` waves.
+    For x in -1..1, exp(i a x) is interpolated between its values at `NODES` Chebyshev points, whose error is twice the
+    sum of the |J_n(a)| beyond [Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 4].
     """
 
     def __init__(self, sums: Sums, frequency: float) -> None:
-        self._frequency = frequency
-        low, high = float(sums.at.min()), float(sums.at.max())
-        self._half = max((high - low) / 2.0, np.finfo(np.float64).tiny)
-        x = (sums.at - (low + high) / 2.0) / self._half
-        pieces, directions = sums.rest.shape
-        self._directions, self._mean = directions, sums.gains.sum(axis=0)
-        wave = np.exp(2j * np.pi * frequency * (sums.at - (low + high) / 2.0))
-        self._rest, self._base = (
-            _moments(wave, x, values.reshape(pieces, -1), TERMS) for values in (sums.rest, sums.base)
+        self._frequency, self._directions = frequency, sums.rest.shape[1]
+        self._mean = sums.gains.sum(axis=0)
+        x, middle, self._half = sums.scaled
+        wave, pieces = np.exp(2j * np.pi * frequency * (sums.at - middle))[:, None], len(x)
+        self._rest, self._base, self._twice = (
+            sums.cardinal @ (wave**power * values.reshape(pieces, -1))
+            for values, power in ((sums.rest, 1), (sums.base, 1), (sums.gains, 2))
         )
-        self._twice = _moments(wave**2, x, sums.gains.reshape(pieces, -1), TERMS_OF_SQUARES)
 
     def explained(self, frequencies: Floats) -> Floats:
         """Return squares explained by waves of given frequencies, shape (m,)."""
         many, d = len(frequencies), self._directions
-        turned = 2.0 * np.pi * (frequencies - self._frequency) * self._half
-        once, twice = _weights(turned, TERMS), _weights(2.0 * turned, TERMS_OF_SQUARES)
-        rest = sides((once @ self._rest).conj())
-        base = sides((once @ self._base).conj()).reshape(many, 2, d, -1)
-        return solved(rest, taken(base), squares(self._mean, (twice @ self._twice).conj().reshape(many, d, d)))
+        turned = np.exp(2j * np.pi * self._half * np.outer(frequencies - self._frequency, NODES))
+        rest = sides((turned @ self._rest).conj())
+        base = sides((turned @ self._base).conj()).reshape(many, 2, d, -1)
+        return solved(rest, taken(base), squares(self._mean, (turned**2 @ self._twice).conj().reshape(many, d, d)))
 
 
 REACH = 0.55
 """Largest distance from the central frequency, in waves over the extent."""
 
-TERMS, TERMS_OF_SQUARES = 18, 24
-"""Numbers of polynomials: higher J_n(pi REACH) and J_n(2 pi REACH) are below 2e-17."""
-
-
-def _moments(wave: NDArray[np.complex128], x: Floats, values: Floats, terms: int) -> NDArray[np.complex128]:
-    """Return sums of wave times polynomials times values, shape (terms, q), from (b,), (b,) and (b, q)."""
-    curves = np.empty((terms, 2, len(x)))
-    before, now = x, np.ones(len(x))  # T_1 = T_-1, and T_0
-    for curve in curves:
-        np.multiply(wave.real, now, out=curve[0])
-        np.multiply(wave.imag, now, out=curve[1])
-        before, now = now, 2.0 * x * now - before
-    found = (curves.reshape(2 * terms, -1) @ values).reshape(terms, 2, -1)
-    return np.asarray(found[:, 0] + 1j * found[:, 1])
-
-
-def _weights(turned: Floats, terms: int) -> NDArray[np.complex128]:
-    """Return polynomials' weights in exp(i a x), shape (m, terms), from a, shape (m,)."""
-    order = np.arange(terms)
-    weights = jv(order, turned[:, None]) * 1j**order
-    weights[:, 1:] *= 2.0
-    return np.asarray(weights)
+NODES = np.cos(np.pi * (np.arange(24) + 0.5) / 24)
+"""Chebyshev points, shape (24,): J_24(2 pi REACH) is below 2e-17."""
 
 
 def sides(transform: NDArray[np.complex128]) -> Floats:

@@ -24,14 +24,11 @@ def most_probable_variance(powers: Floats, even: Floats, grows: Floats, odds: fl
     """Return the least cost and each row's most probable variance [Schwarz 1978]."""
     squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
     every = np.array(list(product(GROWN, repeat=squares.shape[1])))
-    costs = []
-    for parts in every:
-        tried = even + squares @ np.square(parts)
-        costs.append(0.5 * np.sum(np.log(tried)) + 0.5 * len(powers) * np.log(np.mean(powers / tried)))
-    parameters = np.count_nonzero(every, axis=1)
-    priced = np.array(costs) + 0.5 * np.log(len(powers)) * parameters + odds
+    tried = even + np.square(every) @ squares.T
+    costs = 0.5 * np.sum(np.log(tried), axis=1) + 0.5 * len(powers) * np.log(np.mean(powers / tried, axis=1))
+    priced = costs + 0.5 * np.log(len(powers)) * np.count_nonzero(every, axis=1) + odds
     k = int(np.argmin(priced))
-    return float(priced[k]), even + squares @ np.square(every[k])
+    return float(priced[k]), tried[k]
 
 
 def spread_by_kind(powers: Floats, kinds: Integers) -> Floats:

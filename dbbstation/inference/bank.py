@@ -5,7 +5,6 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -401,11 +400,9 @@ class Bank:
         return modulated([effect[:, None]], [law.follows.values[:, None]], None)
 
     def _on_a_grid(self, law: Law) -> tuple[Variant, ...]:
-        points = list(product(*law.grids))
-        weight = -float(np.log(len(points)))
+        weight = -float(np.log(len(law.on_grid)))
         found: list[Variant] = []
-        for point in points:
-            samples = law.columns(point)
+        for point, samples in law.on_grid:
             found += _forms(law, self._add(samples), law.plausible_of(samples), point, weight)
         return tuple(found)
 

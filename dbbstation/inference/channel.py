@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -114,6 +114,11 @@ class Law:
     acts_once: bool = False
     confirm: str = ""
     possible: Callable[[Mapping[str, float]], bool] = lambda _: True
+
+    @cached_property
+    def on_grid(self) -> tuple[tuple[tuple[float, ...], Floats], ...]:
+        """Return each combination of starting values with its columns, shape (n, p)."""
+        return tuple((point, self.columns(point)) for point in product(*self.grids))
 
     def plausible_of(self, samples: Floats) -> Floats:
         """Return prior standard deviations of amplitudes, shape (p,), for columns, shape (n, p)."""

@@ -316,7 +316,7 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
         return np.square(away - level[..., None]) @ weight, level
 
     flat, level = distance(np.ones(len(bands.count)))
-    best, found = float(flat) - 2.0 * worth, Coloured(float(np.exp(0.5 * level)))
+    best, found = float(flat) - 2.0 * worth, (float(np.exp(0.5 * level)), 0.0, 0.0, 0.0)
     angle = 2.0 * np.pi * bands.frequency
     turns = [0.0, *angle] if oscillates else [0.0]
     for decay, turn in product(DECAYS[most >= DECAYS], turns):
@@ -328,8 +328,8 @@ def first_order(bands: Bands, most: float = 1.0, *, oscillates: bool = False) ->
         if cost < best:
             best = cost
             sigma = float(np.exp(0.5 * levels[k]) * np.sqrt(1.0 + SHARES[k]))
-            found = Coloured.first_order(sigma, float(SHARES[k] / (1.0 + SHARES[k])), float(decay), float(turn))
-    return found
+            found = sigma, float(SHARES[k] / (1.0 + SHARES[k])), float(decay), float(turn)
+    return Coloured.first_order(*found) if found[1] else Coloured(found[0])
 
 
 def largest_decay(rows: int) -> float:

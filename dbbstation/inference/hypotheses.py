@@ -291,19 +291,20 @@ class _Search:
         if len(named) > BOUNDS.paired:
             worth = dict(zip((c.name for c in scan.causes), scan.log_factor.tolist(), strict=True))
             named = sorted(named, key=lambda member: -worth[member.cause.name])[: BOUNDS.paired]
-        evidences = self._comparison.log_evidence_of_pairs(members, named)
-        both = [
-            (evidence + named[a].cause.log_prior_odds + named[b].cause.log_prior_odds, a, b)
-            for (a, b), evidence in evidences.items()
-            if named[a].cause is not named[b].cause
-        ]
+        pairs, evidence = self._comparison.log_evidence_of_pairs(members, named)
+        causes = np.array([id(member.cause) for member in named])
+        apart = np.flatnonzero(causes[pairs[:, 0]] != causes[pairs[:, 1]])
+        odds = np.array([member.cause.log_prior_odds for member in named])
+        worth = evidence + odds[pairs].sum(axis=1)
+        best = apart[np.argsort(-worth[apart])]
         # A flexible form imitates two causes, so pairs of inflexible causes are examined separately.
-        slim = [pair for pair in both if max(len(named[k].variant.columns) for k in pair[1:]) < FLEXIBLE]
+        widths = np.array([len(member.variant.columns) for member in named])
+        stiff = best[widths[pairs[best]].max(axis=1) < FLEXIBLE]
         alone = self._comparison.log_evidence(members)
-        for pairs in (both, slim):
-            for evidence, a, b in sorted(pairs, reverse=True)[: BOUNDS.paired_hypotheses]:
-                if self._may_be_likely(members, alone, evidence - alone):
-                    self._look_at([*members, named[a], named[b]])
+        for some in (best, stiff):
+            for k in some[: BOUNDS.paired_hypotheses].tolist():
+                if self._may_be_likely(members, alone, worth[k] - alone):
+                    self._look_at([*members, *(named[one] for one in pairs[k])])
 
     def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
         odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Law
@@ -137,8 +138,5 @@ def lagging(values: Floats, time: Floats, constant: float) -> Floats:
     steps = np.diff(time)
     fades = np.exp(-steps / constant)
     falls = np.diff(values) * (constant / steps) * -np.expm1(-steps / constant)
-    behind, found = 0.0, [0.0]
-    for fade, fall in zip(fades.tolist(), falls.tolist(), strict=True):
-        behind = fade * behind - fall
-        found.append(behind)
-    return np.array(found)
+    recursion = np.vstack([np.ones(len(values)), np.append(-fades, 0.0)])
+    return np.asarray(solve_banded((1, 0), recursion, np.append(0.0, -falls)))

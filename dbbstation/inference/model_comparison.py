@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations
 from operator import is_
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -325,8 +324,8 @@ class ModelComparison:
         across = self._across(members, lower, columns)
         return np.asarray(own - across.T @ across, dtype=np.float64)
 
-    def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> dict[tuple[int, int], float]:
-        """Return the log marginal likelihood of the members with every pair of causes, without slack of the pair."""
+    def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> tuple[Integers, Floats]:
+        """Return every pair of causes, shape (c, 2), and the members' log marginal likelihood with it, without its slack."""
         lower, z, evidence = self._eliminated(members)
         columns = self._at(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)]))
         sd = np.concatenate([np.zeros(0), *(m.variant.plausible * m.scale for m in more)])
@@ -336,22 +335,20 @@ class ModelComparison:
             across = self._across(members, lower, columns)
             gram, towards = gram - across.T @ across, towards - across.T @ z
         information, along = sd[:, None] * gram * sd + np.eye(len(sd)), sd * towards
-        widths = [len(m.variant.columns) for m in more]
+        widths = np.array([len(m.variant.columns) for m in more], dtype=np.int64)
         starts = np.cumsum([0, *widths])
-        of_widths: dict[tuple[int, int], list[tuple[int, int]]] = {}
-        for a, b in combinations(range(len(more)), 2):
-            of_widths.setdefault((widths[a], widths[b]), []).append((a, b))
-        found: dict[tuple[int, int], float] = {}
-        for (first, second), pairs in of_widths.items():
+        every = np.column_stack(np.triu_indices(len(more), 1))
+        found = np.zeros(len(every))
+        for first, second in set(map(tuple, widths[every].tolist())):
             # Pairs with equal numbers of amplitudes are computed together.
-            a, b = starts[np.array(pairs)].T
+            same = np.flatnonzero((widths[every] == (first, second)).all(axis=1))
+            a, b = starts[every[same]].T
             own = np.hstack([a[:, None] + np.arange(first), b[:, None] + np.arange(second)])
             halves = _factors(information[own[:, :, None], own[:, None, :]])
             w = np.linalg.solve(halves, along[own][:, :, None])[:, :, 0]
             squares = 0.5 * np.square(w).sum(axis=1)
-            logs = np.log(np.diagonal(halves, axis1=1, axis2=2)).sum(axis=1)
-            found |= dict(zip(pairs, (evidence + squares - logs).tolist(), strict=True))
-        return found
+            found[same] = evidence + squares - np.log(np.diagonal(halves, axis1=1, axis2=2)).sum(axis=1)
+        return every, found
 
     def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
         """Scan every cause given members, over variants and sizes."""

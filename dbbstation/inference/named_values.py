@@ -90,6 +90,37 @@ def growth(member: Member, values: Floats) -> float:
     return size / member.variant.slack_at if size > 0.0 else 1.0
 
 
+def values_of_members(settled: Settled) -> dict[str, dict[str, Value]]:
+    """Return the best hypothesis's values by member."""
+    members, found, first = settled.best.members, dict[str, dict[str, Value]](), 0
+    if not members:
+        return found
+    estimates = settled.comparison.estimates(members)
+    for member in members:
+        own = slice(first, first + len(member.columns))
+        found[member.cause.name] = named_values(settled, member, estimates.values[own], estimates.covariance[own, own])
+        first = own.stop
+    return found
+
+
+def with_selection(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
+    """Return values with at least the jackknife uncertainty of selections without one part each.
+
+    What is fitted beside a law, and the noise, change its value. [Jackknife of a whole analysis: Mosteller and Tukey,
+    Data Analysis and Regression, 1977, ch. 8.] Parts that tell less of a value count less.
+    """
+    every = dict(found)
+    for name, value in found.items():
+        parts = [part[name] for part in without if name in part]
+        moved = np.array([one.value - value.value for one in parts])
+        with np.errstate(all="ignore"):
+            weight = np.minimum(np.square(value.uncertainty / np.array([one.uncertainty for one in parts])), 1.0)
+        squares = np.where(np.isfinite(weight), weight, 0.0) * np.square(moved)
+        if parts:
+            every[name] = value.at_least(float(np.sqrt((len(without) - 1.0) * np.mean(squares))))
+    return every
+
+
 def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
     """Return values with the larger of stated and jackknife uncertainty."""
     if not found:

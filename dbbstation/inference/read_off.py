@@ -15,7 +15,7 @@ from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigm
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.impossible import impossible, impossible_beside
 from dbbstation.inference.model_comparison import SCALES
-from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife
+from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife, with_selection
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
@@ -98,11 +98,13 @@ class Trial:
 
     Attributes:
         refits: from `refits_without`; empty to use only model uncertainties.
+        chosen: values by member of selections without one part each; may be empty.
         is_worse_here: without held-out parts, whether the findings leave larger residuals than the reference.
     """
 
     held_out: HeldOutError | ChosenAnew | None = None
     refits: Sequence[Solution] = ()
+    chosen: Sequence[Mapping[str, Mapping[str, Value]]] = ()
     is_worse_here: bool = False
 
     @property
@@ -268,7 +270,8 @@ class CauseJudge:
         first = len(self._settled.channel.base.names)
         inside = slice(first + own.start, first + own.stop)
         parts = [(one.x[inside], one.covariance[inside, inside]) for one in self._trial.refits]
-        return with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
+        found = with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
+        return with_selection(found, [one.get(member.cause.name, {}) for one in self._trial.chosen])
 
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float

@@ -84,9 +84,10 @@ def settle(
             found.append(_from(laid_out.copy(), (), one, how.part(share), found))
             continue
         if begun is None:
-            # The comparison with all causes is computed once and continued for each kind of noise.
-            bank = laid_out.copy()
-            begun, share = (bank, _settled(bank, how.part(share))), share - 1
+            # The comparison with all causes is computed once and continued for each kind of noise. Beside all causes
+            # the noise is too small, so that scans take most of a fast search and find noise.
+            bank, first = laid_out.copy(), replace(how, look=how.look and how.thorough)
+            begun, share = (bank, _settled(bank, first.part(share))), share - 1
         found.append(_from(begun[0].copy(), begun[1].best.members, one, how.part(share), found))
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from dbbstation.facts.value import Value
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife, widening
+from dbbstation.inference.named_values import with_selection
 from dbbstation.inference.settle import settle
 from tests.inference.tables import table
 from tests.inference.test_channel import EFFECTS, channel
@@ -99,3 +103,14 @@ def test_widening_hardly_changes_what_the_model_states_rightly(rng):
 def test_widening_leaves_what_is_held():
     moved = np.array([[4.0, 0.0], [-4.0, 0.0], [0.5, 0.0]])
     assert widening(np.array([1.0, 0.0]), moved, np.ones((3, 2)) * [2.0, 0.0])[1] == 1.0
+
+
+def test_a_value_that_moves_with_what_is_chosen_beside_it_has_the_jackknife_uncertainty_of_that():
+    groups = np.random.default_rng(5).normal(0.3, 0.1, 10)
+    without = [{"size": Value((groups.sum() - one) / 9.0, 0.01, "mm")} for one in groups]
+    whole = {"size": Value(float(groups.mean()), 0.01, "mm"), "limit": Value(1.0, 0.02, "mm")}
+    found = with_selection(whole, without)
+    assert found["size"].uncertainty == pytest.approx(groups.std(ddof=1) / np.sqrt(10.0))  # of a mean
+    assert found["limit"] == whole["limit"]
+    vague = [{"size": replace(one["size"], uncertainty=1e3)} for one in without]
+    assert with_selection(whole, vague) == whole

@@ -128,9 +128,9 @@ def test_evidence_of_pairs_is_that_of_members_and_pair_without_slack_of_these(pr
     extra = cause("extra", variant(8, 9, plausible=0.3))
     more = [*more, Member(extra, extra.variants[0], 1.0)]
     for beside in ([], members):
-        found = problem.comparison().log_evidence_of_pairs(beside, more)
-        assert set(found) == {(0, 1), (0, 2), (1, 2)}
-        for pair, value in found.items():
+        pairs, found = problem.comparison().log_evidence_of_pairs(beside, more)
+        assert pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
+        for pair, value in zip(pairs, found, strict=True):
             added = [more[k] for k in pair]
             columns = np.concatenate(
                 [columns_of(m for m in beside) if beside else []] + [m.variant.columns for m in added]

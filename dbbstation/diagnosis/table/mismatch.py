@@ -19,6 +19,7 @@ from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
+from dbbstation.inference.named_values import values_of_members
 from dbbstation.inference.noise import noise_of
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
@@ -212,7 +213,8 @@ def _found(
     levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)
     if held_out is not None and parts is not None and settled.best.members:
         held_out = held_out.corrected(parts.errors_with(levels.corrects))
-    findings = read_off(settled, Trial(held_out, refits, is_worse_here=is_worse_here), levels)
+    values = [values_of_members(one.settled) for one in chosen]
+    findings = read_off(settled, Trial(held_out, refits, values, is_worse_here=is_worse_here), levels)
     return Mismatch(
         table=table,
         settled=settled,

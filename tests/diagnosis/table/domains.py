@@ -3,7 +3,7 @@
     python -m tests.diagnosis.table.domains --seeds 1,2 --out docs/validation/tables-domains.json [--what effect,twin]
 
 A tank, a gyro, a sensor, a valve, a stop, a magnet, a beam in a warm room, a joint, a screw, a spring, a barometer, a scale of a ball bar, a worn
-pump, a pendulum in air, a cell under load. Rows, sizes, noise and times are drawn; half of the ordered tables have irregular times. Constants have their true values, so that u is tested.
+pump, a pendulum in air, a cell under load, a crane's rope, a photometer, a tide gauge. Rows, sizes, noise and times are drawn; half of the ordered tables have irregular times. Constants have their true values, so that u is tested.
 Results are kept in the file, and tables that are there are not run again.
 """
 
@@ -291,6 +291,33 @@ def battery(rng: np.random.Generator, t: Values) -> Scene:
     return Scene(columns, simulated, effect, frozenset({"load_a"}), ("memory of load",), true)
 
 
+def rope(rng: np.random.Generator, t: Values) -> Scene:
+    """Height of a crane's hook, simulated with a rope that does not stretch: it stretches with load times free length."""
+    load, free = rng.uniform(0.0, 50.0, len(t)), 20.0 + 6.0 * smooth(rng, len(t), 15)
+    columns = {"load_kn": load, "rope_m": free, "wind_m_s": 5.0 + smooth(rng, len(t), 20)}
+    laws = ("product of load", "product of rope", f"product of {SIMULATED}", "linear in")
+    return Scene(columns, -1000.0 * free, -0.3 * load * free, frozenset({"load_kn", "rope_m", SIMULATED}), laws)
+
+
+def stray_light(rng: np.random.Generator, t: Values) -> Scene:
+    """Absorbance of a dye, simulated by its concentration: stray light bends it at high values."""
+    dye = rng.uniform(0.0, 1.0, len(t))
+    share = float(rng.uniform(0.01, 0.05))
+    effect = -1000.0 * (np.log10((10.0 ** (-2.0 * dye) + share) / (1.0 + share)) + 2.0 * dye)
+    columns = {"dye_g_l": dye, "cell_c": 25.0 + smooth(rng, len(t), 30)}
+    return Scene(
+        columns, 2000.0 * dye, effect, frozenset({"dye_g_l", SIMULATED}), ("curve over dye", "curve over simulated")
+    )
+
+
+def gauge(rng: np.random.Generator, t: Values) -> Scene:
+    """Level of a tide gauge, simulated as outside: its well follows late."""
+    outside, constant = 800.0 * smooth(rng, len(t), 9), float((t[-1] - t[0]) / rng.uniform(20.0, 40.0))
+    columns = {"wind_m_s": 6.0 + 2.0 * smooth(rng, len(t), 12), "air_hpa": 1010.0 + 5.0 * smooth(rng, len(t), 25)}
+    laws, true = ("memory of simulated", "lag of simulated"), {"time constant": constant}
+    return Scene(columns, outside, late(outside, t, constant) - outside, frozenset({SIMULATED}), laws, true)
+
+
 SCENES: dict[str, tuple[str, Callable[[np.random.Generator, Values], Scene]]] = {
     "clip above": ("static", clip_above),
     "clip both": ("static", clip_both),
@@ -309,6 +336,9 @@ SCENES: dict[str, tuple[str, Callable[[np.random.Generator, Values], Scene]]] = 
     "pump": ("static", pump),
     "pendulum": ("static", pendulum),
     "battery": ("memory", battery),
+    "rope": ("static", rope),
+    "stray light": ("static", stray_light),
+    "gauge": ("memory", gauge),
 }
 UNORDERED = frozenset({"barometer"})
 NOISES = ("white", "slow", "long tails", "rounded", "grows")

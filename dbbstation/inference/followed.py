@@ -12,7 +12,7 @@ from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.levels import RUN, TIME
-from dbbstation.inference.model_comparison import FLEXIBLE
+from dbbstation.inference.model_comparison import FLEXIBLE, slices_of
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.uneven import log_student
@@ -71,16 +71,15 @@ def way_of(bank: Bank, name: str) -> str:
 
 def only_begun(settled: Settled) -> frozenset[str]:
     """Return uncertain members with memory whose effect is mostly the initial transient; these follow time."""
-    channel, bank, found, first = settled.channel, settled.bank, set(), 0
+    channel, bank, found = settled.channel, settled.bank, set()
     members = settled.best.members
     remembering = {name for name, law in bank.laws.items() if law.family is Family.MEMORY}
     if not remembering.intersection(settled.best.names):
         return frozenset()
     values = settled.comparison.estimates(members).values
     axes = np.linalg.qr(channel.base.samples[channel.kept])[0]
-    for member in members:
-        own = values[first : first + len(member.columns)]
-        first += len(member.columns)
+    for member, place in zip(members, slices_of(members), strict=True):
+        own = values[place]
         count = len(member.variant.columns)
         if member.cause.name not in remembering or count < 2:  # noqa: PLR2004 - its gain and its initial states
             continue

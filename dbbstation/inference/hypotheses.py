@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, with_slack_of
+from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, slices_of, with_slack_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -369,12 +369,9 @@ class _Search:
             return found
         estimates = comparison.estimates(members)
         sigma = np.sqrt(np.diag(estimates.covariance))
-        first = 0
-        for k, member in enumerate(members):
-            for j, positive in enumerate(member.variant.positive):
-                if positive:
-                    found[k] += float(log_ndtr(estimates.values[first + j] / sigma[first + j]) + np.log(2.0))
-            first += len(member.columns)
+        for k, (member, own) in enumerate(zip(members, slices_of(members), strict=True)):
+            for j in np.flatnonzero(member.variant.positive) + own.start:
+                found[k] += float(log_ndtr(estimates.values[j] / sigma[j]) + np.log(2.0))
         return found
 
     def _as_close_as_it_is(self, beside: _Beside, members: list[Member]) -> tuple[list[Member], float]:

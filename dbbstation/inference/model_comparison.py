@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from operator import is_
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -383,10 +384,9 @@ class ModelComparison:
         information = self._information(columns, sd)
         inverse = np.linalg.inv(information)
         values = inverse @ (sd * self._towards[self._at(columns)])
-        found, first = [], 0
-        for member in members:
-            own = slice(first, first + len(member.variant.columns))
-            first += len(member.columns)
+        found = []
+        for member, every in zip(members, slices_of(members), strict=True):
+            own = slice(every.start, every.start + len(member.variant.columns))
             beside = np.linalg.inv(inverse[own, own])
             towards = beside @ values[own] / member.scale
             blocks = (beside - np.eye(len(beside))) / member.scale**2
@@ -557,6 +557,12 @@ def _log_factors(seen: Floats, along: Floats) -> Floats:
     return np.asarray(
         0.5 * np.sum(squares * along[:, None, :] / information - np.log(information), axis=2), dtype=np.float64
     )
+
+
+def slices_of(members: Sequence[Member], first: int = 0) -> list[slice]:
+    """Return each member's place among the columns of all, which begin at `first`."""
+    ends = np.cumsum([first, *(len(member.columns) for member in members)]).tolist()
+    return [slice(*pair) for pair in pairwise(ends)]
 
 
 def _stacked(members: Sequence[Member]) -> tuple[Integers, Floats]:

@@ -10,7 +10,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
-from dbbstation.inference.model_comparison import amplitude_size
+from dbbstation.inference.model_comparison import amplitude_size, slices_of
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
 
@@ -90,17 +90,12 @@ def growth(member: Member, values: Floats) -> float:
     return size / member.variant.slack_at if size > 0.0 else 1.0
 
 
-def values_of_members(settled: Settled) -> dict[str, dict[str, Value]]:
-    """Return the best hypothesis's values by member."""
-    members, found, first = settled.best.members, dict[str, dict[str, Value]](), 0
+def values_of_members(settled: Settled, members: Sequence[Member]) -> dict[str, dict[str, Value]]:
+    """Return values of members that are fitted together, by name."""
     if not members:
-        return found
-    estimates = settled.comparison.estimates(members)
-    for member in members:
-        own = slice(first, first + len(member.columns))
-        found[member.cause.name] = named_values(settled, member, estimates.values[own], estimates.covariance[own, own])
-        first = own.stop
-    return found
+        return {}
+    found, every = settled.comparison.estimates(members), zip(members, slices_of(members), strict=True)
+    return {m.cause.name: named_values(settled, m, found.values[own], found.covariance[own, own]) for m, own in every}
 
 
 def with_selection(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:

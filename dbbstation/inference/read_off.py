@@ -14,7 +14,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.impossible import impossible, impossible_beside
-from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.model_comparison import SCALES, slices_of
 from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife, with_selection
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
@@ -155,11 +155,8 @@ class CauseJudge:
         self._classes = self._alternatives.classes
         estimates = settled.comparison.estimates(self._best.members) if self._members else None
         self._values: dict[str, tuple[Floats, Floats]] = {}
-        self._own: dict[str, slice] = {}
-        first = 0
-        for name, member in self._members.items():
-            own = self._own[name] = slice(first, first + len(member.columns))
-            first = own.stop
+        self._own = dict(zip(self._members, slices_of(self._best.members), strict=True))
+        for name, own in self._own.items():
             if estimates is not None:
                 self._values[name] = (estimates.values[own], estimates.covariance[own, own])
         worse = trial is not None and trial.is_worse

@@ -12,6 +12,7 @@ from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
 from dbbstation.inference.impossible import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
+from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.named_values import moved, values_of_law
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
@@ -397,10 +398,8 @@ def _impossible(settled: Settled) -> dict[str, str]:
     estimates = settled.comparison.estimates(members)
     found: dict[str, str] = {}
     own: dict[str, dict[str, Value]] = {}
-    first = 0
-    for member in members:
-        name, part = member.cause.name, slice(first, first + len(member.columns))
-        first = part.stop
+    for member, part in zip(members, slices_of(members), strict=True):
+        name = member.cause.name
         if name not in laws:
             continue
         width, values, covariance = (

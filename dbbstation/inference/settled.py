@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.model_comparison import slices_of
+
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
@@ -64,10 +66,9 @@ class Settled:
         """
         total, members = np.zeros(len(self.channel.residual)), self.best.members if members is None else members
         values = self.comparison.estimates(members).values if members else np.zeros(0)
-        for member in members:
-            own, values = values[: len(member.columns)], values[len(member.columns) :]
+        for member, own in zip(members, slices_of(members), strict=True):
             if names is None or member.cause.name in names:
-                total += self.bank.samples(member.columns) @ own
+                total += self.bank.samples(member.columns) @ values[own]
         return total
 
     def base_values(self, effect: Floats | None = None) -> Floats:

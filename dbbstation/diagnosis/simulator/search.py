@@ -15,7 +15,7 @@ from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.bounds import BOUNDS, SIMULATORS
-from dbbstation.inference.named_values import named_values
+from dbbstation.inference.named_values import values_of_members
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.triangle import rms
@@ -212,15 +212,10 @@ def moves(node: Node, settled: Settled) -> dict[str, float]:
 
 def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, float]]:
     members = [member for member in settled.best.members if member.cause.name in node.names]
-    if not members:
-        return {}
-    found, first, said = settled.comparison.estimates(members), 0, {}
+    found, said = values_of_members(settled, members), dict[tuple[str, str], tuple[float, float]]()
     terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
-    for member in members:
-        own = slice(first, first + len(member.columns))
-        first = own.stop
-        one, term = terms[member.cause.name]
-        values = named_values(settled, member, found.values[own], found.covariance[own, own])
+    for of, values in found.items():
+        one, term = terms[of]
         for k, name in enumerate(one.names):
             # Responses to shapes are linearised about the fitted shape.
             about = term.numbers[k] if k >= len(term.amplitudes) else 0.0

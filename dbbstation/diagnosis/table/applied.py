@@ -15,6 +15,7 @@ from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.levels import ONCE
+from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.named_values import growth, moved
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.settle import static_patterns
@@ -64,10 +65,8 @@ def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) 
     fitted = fitted_together(settled)
     columns = [channel.base.samples]
     values, over, left_out = np.zeros(len(other)), set[str](), list[str]()
-    first = channel.base.samples.shape[1]
-    for member in settled.best.members:
-        own = slice(first, first + len(member.columns))
-        first = own.stop
+    members = settled.best.members
+    for member, own in zip(members, slices_of(members, channel.base.samples.shape[1]), strict=True):
         follows = followed_by(bank, member.cause.name)
         if follows <= ONCE or (corrects and not follows & corrects):
             left_out.append(member.cause.name)

@@ -213,7 +213,7 @@ def _found(
     levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)
     if held_out is not None and parts is not None and settled.best.members:
         held_out = held_out.corrected(parts.errors_with(levels.corrects))
-    values = [values_of_members(one.settled) for one in chosen]
+    values = [values_of_members(one.settled, one.settled.best.members) for one in chosen]
     findings = read_off(settled, Trial(held_out, refits, values, is_worse_here=is_worse_here), levels)
     return Mismatch(
         table=table,

@@ -22,12 +22,13 @@ from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.formats.simulator import SimulatorFile, parse_simulator
 from dbbstation.files.inputs import note_virtual
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.event_log import SHORTEST, anchor_of, read_event_log, set_back
 from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.seal import copy_faults
-from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
+from dbbstation.files.recordings.session import SessionFolder, no_session, parse_session, unlisted_sealed
 from dbbstation.files.yaml.schema import format_of
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.plan.bar import BAR_LENGTH

@@ -1,4 +1,4 @@
-"""Refuse to write results into session folders."""
+"""Names in a session folder, and the refusal to write results into it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 SESSION_FILE = "session.yaml"
 """File that marks a session folder."""
+
+MACHINE_FILE, PLAN_FILE, RUNS, PROGRAMS = "machine.yaml", "plan.yaml", "runs", "programs"
+"""Other names in a session of this program."""
 
 _MARK, _WITHIN = b"dbb-session/", 4096
 """First characters of a session file, and the number of bytes that must contain them."""

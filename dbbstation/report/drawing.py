@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.plan.circle import Direction
-from dbbstation.report.svg import as_svg
+from dbbstation.report.figure_format import as_svg
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.report.drawing import AFTER
-from dbbstation.report.label_places import Box, place_labels
 from dbbstation.report.polar import step_of
-from dbbstation.report.sheet import TEXT_PT, line_in, width_of_in, wrapped
+from dbbstation.report.sheet import TEXT_PT, Box, line_in, place_labels, width_of_in, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

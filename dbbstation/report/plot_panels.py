@@ -10,9 +10,8 @@ from matplotlib.patches import Circle as Ring
 from dbbstation.circles.quantity import FIRST
 from dbbstation.plan.circle import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
-from dbbstation.report.label_places import Box
 from dbbstation.report.polar import CIRCLE, REACH, SIZE, step_of, thinned
-from dbbstation.report.sheet import TEXT_PT, line_in, wrapped
+from dbbstation.report.sheet import TEXT_PT, Box, line_in, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

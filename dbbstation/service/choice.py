@@ -11,7 +11,8 @@ from dbbstation.files.formats.bar import read_bar
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy, SessionDetails
-from dbbstation.files.recordings.session import SESSION_FILE, read_session
+from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import circles_s
 from dbbstation.plan.order import LARGEST_LEAK, height_and_drift, mountings
 from dbbstation.service.memory import Line

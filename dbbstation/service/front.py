@@ -18,10 +18,9 @@ from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
-from dbbstation.service.held_line import HeldLine, HeldOpen
+from dbbstation.service.held_line import HeldLine, HeldOpen, ProbeOutcome, ports, probe
 from dbbstation.service.job import Call
 from dbbstation.service.memory import VIRTUAL, Line, Memory
-from dbbstation.service.port_probe import ProbeOutcome, ports, probe
 from dbbstation.service.runner import Runner, opener
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.virtual_place import virtual_place

@@ -16,9 +16,9 @@ from dbbstation.files.inputs import input_book, note_known
 from dbbstation.files.keys import files_of_session, key_of, program_identity
 from dbbstation.files.places import real_path, text_of_name
 from dbbstation.files.provenance import from_python
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.report.fleet_page import fleet_html
 from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, StoredFiles
 from dbbstation.sisters.unlike import FALSE_ALARMS

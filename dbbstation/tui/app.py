@@ -14,9 +14,8 @@ from textual.screen import ModalScreen
 from dbbstation.computing.threads import Background
 from dbbstation.errors import StationError
 from dbbstation.service.after import After
-from dbbstation.service.board import Board
+from dbbstation.service.board import Board, Message, Weight
 from dbbstation.service.live_trace import last_traces
-from dbbstation.service.messages import Message, Weight
 from dbbstation.service.operated import JobAnswer
 from dbbstation.service.session_notes import add_note, give_verdict, shop_degc
 from dbbstation.station.commands import AddNote, Command, Judge, Quit

@@ -9,7 +9,7 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from dbbstation.service.messages import Weight
+from dbbstation.service.board import Weight
 from dbbstation.tui import texts
 from dbbstation.tui.panel import Panel, lines
 
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
-    from dbbstation.service.board import Board
-    from dbbstation.service.messages import Message
+    from dbbstation.service.board import Board, Message
 
 STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold $text-error"}
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
-    from dbbstation.service.port_probe import ProbeOutcome
+    from dbbstation.service.held_line import ProbeOutcome
     from dbbstation.tui.reception import StationDesk
 
 _Kind = TypeVar("_Kind", Order, Gate)

@@ -9,8 +9,7 @@ from textual.content import Content
 
 from dbbstation.plan.circle import Direction, circles_s
 from dbbstation.quality.finding import against_limit
-from dbbstation.service.board import Mark, RunDecision
-from dbbstation.service.messages import problem_alone
+from dbbstation.service.board import Mark, RunDecision, problem_alone
 from dbbstation.station.commands import GoTo
 from dbbstation.station.states import State
 from dbbstation.tui import texts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.quality.answer import Advice
-from dbbstation.service.messages import problem_alone
+from dbbstation.service.board import problem_alone
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from dbbstation.circles.budget import spectrum_of
 from dbbstation.circles.path import Filter
 from dbbstation.report.circles_figure import PlotKind, Plotted, draw_circles
 from dbbstation.report.drawing import in_style
-from dbbstation.report.label_places import Box, place_labels
-from dbbstation.report.sheet import width_of_in, wrapped
+from dbbstation.report.sheet import Box, place_labels, width_of_in, wrapped
 from dbbstation.tasks.circle_runs import load_circles
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import table_ii_plan

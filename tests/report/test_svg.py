@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from dbbstation.report.drawing import in_style
-from dbbstation.report.svg import _shorter, as_svg
+from dbbstation.report.figure_format import _shorter, as_svg
 
 coordinate = st.floats(-2000.0, 2000.0).map(lambda x: round(x, 6))
 NUMBER = r"-?(?:\d+\.?\d*|\.\d+)"

@@ -12,9 +12,8 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan
-from dbbstation.service.board import Board, Mark, RunDecision, SequenceOpened
+from dbbstation.service.board import Board, Mark, RunDecision, SequenceOpened, Weight
 from dbbstation.service.live_trace import LiveTrace, View, difference
-from dbbstation.service.messages import Weight
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Judge, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.judging import JudgedRun

@@ -27,10 +27,10 @@ from dbbstation.service.after import After, Result
 from dbbstation.service.candidates import CandidateFormat, candidates
 from dbbstation.service.choice import Choice, SetUpPart
 from dbbstation.service.front import Front
+from dbbstation.service.held_line import probe
 from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
-from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.session_notes import add_note, shop_degc
 from dbbstation.service.work import BackgroundWork, WorkProgress

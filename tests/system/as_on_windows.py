@@ -15,7 +15,7 @@ from dbbstation.errors import OutputError
 from dbbstation.files.recordings.lock import SessionLock
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import load_instrument
-from dbbstation.service.port_probe import probe
+from dbbstation.service.held_line import probe
 from dbbstation.system import locks, pseudo_terminal, replacing, signals
 from tests.station.bench import STREAM, bench, lines_of, wait_for
 

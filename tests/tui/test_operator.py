@@ -28,11 +28,10 @@ from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
-from dbbstation.service.board import Board, RunDecision
+from dbbstation.service.board import Board, Message, RunDecision, Weight, message_of
 from dbbstation.service.front import Front
 from dbbstation.service.job import Call
 from dbbstation.service.memory import Memory
-from dbbstation.service.messages import Message, Weight, message_of
 from dbbstation.service.operated import SHIFT_S, Answered, JobAnswer, answer_of, read_operated
 from dbbstation.service.work import WorkProgress
 from dbbstation.station.assembly import Job, assemble

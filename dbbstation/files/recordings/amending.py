@@ -11,6 +11,7 @@ from dbbstation.files.atomic import set_read_only, write_bytes, write_folder
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.plan import plan_text, read_inline_plan
 from dbbstation.files.formats.session import Amendment
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
@@ -24,7 +25,7 @@ from dbbstation.files.recordings.seal import (
     sealed_names,
     sealed_over,
 )
-from dbbstation.files.recordings.session import SESSION_FILE, parse_session, read_session
+from dbbstation.files.recordings.session import parse_session, read_session
 from dbbstation.files.recordings.session_state import Stands, session_data, standing
 from dbbstation.files.recordings.session_store import SessionStore
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.gateway import head_of
 from dbbstation.files.places import real_path, text_of_name
-from dbbstation.files.recordings.session_name import SESSION_FILE
+from dbbstation.files.recorded_ground import SESSION_FILE
 
 if TYPE_CHECKING:
     from pathlib import Path

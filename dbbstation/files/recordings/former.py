@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.session import parse_session
-from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.machine.difference import differences
 
 if TYPE_CHECKING:

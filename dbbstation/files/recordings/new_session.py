@@ -11,12 +11,11 @@ from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
 from dbbstation.files.formats.session import CommandedProgram, RunEntry, RunState, SessionDetails, SessionFile
-from dbbstation.files.recorded_ground import refuse_recorded
+from dbbstation.files.recorded_ground import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE, refuse_recorded
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import run_header, run_line, run_name
 from dbbstation.files.recordings.seal import chained, copy_name, is_copy, sealed_over
 from dbbstation.files.recordings.session_checks import check_bar
-from dbbstation.files.recordings.session_name import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_state import session_data, text_of
 from dbbstation.files.recordings.session_store import first_log
 from dbbstation.files.yaml.schema import validate

@@ -11,6 +11,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.session import LogMark, Seal, SessionFile
 from dbbstation.files.gateway import digest_of
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.event_log import impossible_day, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
@@ -22,7 +23,6 @@ from dbbstation.files.recordings.seal import (
     sealed_names,
     sealed_over,
 )
-from dbbstation.files.recordings.session import SESSION_FILE
 from dbbstation.files.recordings.session_state import SEALED, Stands, data_of, mark_of, standing
 from dbbstation.files.recordings.session_store import SessionStore, log_faults
 from dbbstation.files.source_text import decode, read_bytes

@@ -17,7 +17,7 @@ from dbbstation.files.formats.session import PART, RunEntry, RunState, SessionDe
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_virtual
 from dbbstation.files.places import name_of
-from dbbstation.files.recordings import session_name
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.run_csv import (
     RunFile,
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
     from dbbstation.trace.recording import Recording
-
-SESSION_FILE = session_name.SESSION_FILE
-"""File that marks a session folder."""
 
 _UNLIKE_RADIUS = 0.2
 """Largest relative difference of readings from the bar's length; no ball bar has such a travel."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import write_folder, write_text
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.event_log import (
     EVENTS_FILE,
     EventLog,
@@ -22,7 +23,6 @@ from dbbstation.files.recordings.event_log import (
     taken_back,
 )
 from dbbstation.files.recordings.seal import AMEND, copy_name
-from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.files.recordings.session_state import (
     READINGS,
     SEALED,

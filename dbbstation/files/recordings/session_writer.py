@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import remove_leftovers, write_bytes
 from dbbstation.files.formats.session import CommandedProgram, LogMark, Note, RunEntry, RunState, SessionDetails
+from dbbstation.files.recorded_ground import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import RunWriter, run_name
 from dbbstation.files.recordings.lock import SessionLock
@@ -17,7 +18,6 @@ from dbbstation.files.recordings.run_csv import sha256_of
 from dbbstation.files.recordings.seal import chained, hashes, keep_copies, sealed_names, sealed_over
 from dbbstation.files.recordings.session import no_session, part_entry, read_session
 from dbbstation.files.recordings.session_checks import readings_in
-from dbbstation.files.recordings.session_name import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_state import session_data
 from dbbstation.files.recordings.session_store import SessionStore, now
 from dbbstation.system.handles import Closing

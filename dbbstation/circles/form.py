@@ -125,14 +125,18 @@ def _averaged(power: Floats) -> Floats:
     return np.where(of > 0.0, total / np.maximum(of, 1.0), everywhere)
 
 
-def drawn_lines(apart: FormAndNoise, passed: Floats, draws: int, rng: np.random.Generator) -> NDArray[np.complex128]:
+def drawn_lines(
+    apart: FormAndNoise, passed: Floats, shape: tuple[int, int], rng: np.random.Generator
+) -> NDArray[np.complex128]:
     """Return drawn noise spectra, as of `numpy.fft.rfft`, shape (draws, n // 2 + 1) [µm].
 
     Args:
         passed: amplitude that the filter passes, by line, shape (n // 2 + 1,).
+        shape: draws, and length of the inverse transform, at least n.
     """
-    lines = np.fft.rfft(apart.pushes.drawn(rng, draws, len(apart.form_um)), axis=1)
-    below = apart.continued.drawn(rng, draws)
+    lines = np.fft.rfft(apart.pushes.drawn(rng, *shape), axis=1)[:, : len(passed)]
+    lines *= np.sqrt(shape[1] / len(apart.form_um))
+    below = apart.continued.drawn(rng, shape[0])
     seen = below.shape[1]
     lines[:, :seen] *= np.sqrt(below) * passed[:seen]
     lines[:, seen:] *= np.sqrt(apart.power_um2[seen:]) * passed[seen:]

@@ -50,10 +50,11 @@ TESTS = ("-m", "pytest", "-q", "-p", "no:cacheprovider")
 _REPORT: dict[str, tuple[str, ...]] = {
     "report": ("report", "{session}", "--model", "{model}", "--out", "{out}/report.html")
 }
-_SIMULATE: dict[str, tuple[str, ...]] = {
-    "simulate": ("simulate", "--model", "{model}", "--plan", "{plan}", "--out", "{out}/simulated")
+_OPTIONS: dict[str, tuple[str, ...]] = {
+    "simulate": ("simulate", "--model", "{model}", "--plan", "{plan}", "--out", "{out}/simulated"),
+    "predict": ("predict", "--model", "{model}", "--poses", "{poses}", "--out", "{out}/actual.csv"),
 }
-SAID_OTHERWISE: dict[str, dict[str, tuple[str, ...]]] = {"e461050": _REPORT | _SIMULATE, "f2b049e3": _REPORT}
+SAID_OTHERWISE: dict[str, dict[str, tuple[str, ...]]] = {"e461050": _REPORT | _OPTIONS, "f2b049e3": _REPORT}
 """By the beginning of a commit: command lines that have other words there."""
 
 PART = "G21 G90 G94\nG0 X-60 Y-40 Z-1000 A5 B-4 C0\nG1 X60 F600\nG1 Y40\nG2 X-60 Y40 I-60 J0\nG1 Y-40\nM2\n"

@@ -90,7 +90,7 @@ def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) ->
     if not variables or np.ptp(simulated) == 0.0:
         return found
     own = simulated - simulated.mean()
-    same = [v for v in variables if abs(float(np.corrcoef(v.values, simulated)[0, 1])) > 1.0 - SAME]
+    same = [v for v in variables if is_same(v.values, simulated)]
     for v in same:
         found[v.name] = float(np.sign(np.corrcoef(v.values, simulated)[0, 1]))
     if same:
@@ -107,6 +107,11 @@ def grows_with(variables: Sequence[Variable], simulated: Floats, size: float) ->
 
 SAME = 1e-6
 """A variable with 1 - correlation below this is the simulated value itself."""
+
+
+def is_same(one: Floats, other: Floats) -> bool:
+    """Return whether columns are equal but for scale and origin, within a thousandth."""
+    return abs(float(np.corrcoef(one, other)[0, 1])) > 1.0 - SAME
 
 
 def _bend(family: Family, variable: Variable, grows: float, size: float, unit: str, members: int) -> Law:

@@ -116,9 +116,6 @@ class Bounds:
     selection_draws: int = 20
     """Draws of a selection frequency, which determine one half to a tenth."""
 
-    selection_columns: int = 128
-    """Columns processed together; all at once would double the memory."""
-
     pieces_of_time: int = 4096
     """Most possible starts and ends of a stretch in the first scan."""
 

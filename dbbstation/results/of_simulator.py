@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.simulator.nodes import spread_of
+from dbbstation.diagnosis.table.words import CONFOUNDED
 from dbbstation.facts.value import finite
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.frame import of_facts
@@ -23,9 +24,6 @@ from dbbstation.results.simulator import (
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison
     from dbbstation.inference.read_off import CauseFinding
-
-HIDDEN = 0.1
-"""Least reported share of an effect that fitted parameters had absorbed."""
 
 
 def simulator_result(answer: SimulatorComparison, simulations: SimulationsRun) -> SimulatorResult:
@@ -81,5 +79,7 @@ def _term(answer: SimulatorComparison, one: CauseFinding) -> PortTerm:
 def _why(one: CauseFinding) -> str:
     if one.verdict is not Verdict.IDENTIFIED:
         return ""
-    hidden = f" The parameters had taken up {100.0 * one.confounded:.0f} % of it." if one.confounded > HIDDEN else ""
+    hidden = (
+        f" The parameters had taken up {100.0 * one.confounded:.0f} % of it." if one.confounded > CONFOUNDED else ""
+    )
     return f"The recordings want it, and nothing else that was asked does as well.{hidden}"

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.naming import acts
 from dbbstation.diagnosis.drive.recordings import with_waves
 from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
@@ -32,6 +31,11 @@ if TYPE_CHECKING:
 MASS, VISCOUS = "mass_kg", "viscous_n_s_m"
 BASE_UNITS = {MASS: "kg", VISCOUS: "N·s/m"}
 """Parameters of the base model, F = M a + F_v v, and their units."""
+
+COULOMB, COGGING, TRANSIENT = "coulomb-friction", "cogging", "transient-force"
+"""Causes with additional results: friction at one speed, waves over position, stretches of time."""
+
+DRIFT = "friction-drift"
 
 METHOD_SHARE = 0.002
 """Least noise, relative to the force's rms: low-pass and differences leave so much of an exactly simulated drive,
@@ -310,3 +314,22 @@ def _power(waves: Floats, position: Floats, left: Floats) -> Floats:
             for k in range(0, len(waves), BOUNDS.waves_at_once)
         ]
     )
+
+
+def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -> str:
+    """Return a member's source; empty for patterns."""
+    if name in drive.of_law:
+        return drive.of_law[name][0].name
+    pattern = patterns.get(name)
+    if pattern is None:
+        return ""
+    if pattern.family is Family.PULSES:
+        return TRANSIENT if TRANSIENT in drive.sources else ""
+    if pattern.family is Family.WAVE and [variable.name for variable in pattern.variables] == ["position"]:
+        return COGGING if COGGING in drive.sources else ""
+    return ""
+
+
+def acts(source: str) -> Acts:
+    """Return whether a cause is a single event, as forces in time and drift."""
+    return Acts.ONCE if source in {TRANSIENT, DRIFT} else Acts.ALWAYS

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.drive.channel import COULOMB, source_of
 from dbbstation.diagnosis.drive.findings import HeldOutForce
 from dbbstation.diagnosis.drive.moving import within
-from dbbstation.diagnosis.drive.naming import COULOMB, source_of
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_without
 from dbbstation.inference.settle import settle

@@ -14,6 +14,7 @@ from dbbstation.diagnosis.drive.moving import impulse_response
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
     from dbbstation.trace.recording import DriveRecording
-
-DISSIPATES_SIGMA = 5.0
-"""Standard deviations below zero at which negative dissipation is significant."""
 
 AGAINST = 0.3
 """Negative correlation with speed that proves a wrong sign: a tenth of the squared force. A delay in a drive with
@@ -169,7 +167,7 @@ def _refuse_wrong_sign(one: Recordings) -> None:
     powers = [float(np.mean(part)) for part in np.array_split(left * speed, BOUNDS.power_stretches)]
     mean, sigma = float(np.mean(powers)), float(np.std(powers)) / np.sqrt(len(powers))
     agreement = float(left @ speed) / max(float(np.linalg.norm(left) * np.linalg.norm(speed)), 1e-300)
-    if mean < -DISSIPATES_SIGMA * sigma and agreement < -AGAINST:
+    if mean < -OUT * sigma and agreement < -AGAINST:
         raise CalibrationError(
             f"the force has the wrong sign: it acts against the motion (correlation with the speed {agreement:.2f}), so that "
             f"the drive would gain {-mean:.3g} W from its friction",

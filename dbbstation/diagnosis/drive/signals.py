@@ -29,8 +29,7 @@ from dbbstation.diagnosis.drive.moving import (
     weights,
     within,
 )
-from dbbstation.diagnosis.drive.sampling import evenly_sampled
-from dbbstation.diagnosis.drive.stuck import stuck_samples
+from dbbstation.diagnosis.drive.sampling import evenly_sampled, stuck_samples
 from dbbstation.diagnosis.drive.travel import resolution_of, retreat_m, turning_points, ways
 from dbbstation.errors import CalibrationError
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.channel import METHOD_SHARE
+from dbbstation.diagnosis.drive.channel import COGGING, COULOMB, METHOD_SHARE, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.findings import CausePart, DriveFinding, UnexplainedForce
-from dbbstation.diagnosis.drive.naming import COGGING, COULOMB, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.patterns import Family

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.law import law_of
-from dbbstation.inference.bent import bent_laws, grows_with
+from dbbstation.inference.bent import bent_laws, grows_with, is_same
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.memory import memory_laws
-from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.variables import STILL, Kind, Variable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -121,9 +121,7 @@ class Table:
     @property
     def simulated_is_variable(self) -> bool:
         """Return whether the simulated value varies and equals no other variable."""
-        return bool(np.ptp(self.simulated) > 0.0) and not any(
-            _is_same(v.values, self.simulated) for v in self.variables
-        )
+        return bool(np.ptp(self.simulated) > 0.0) and not any(is_same(v.values, self.simulated) for v in self.variables)
 
     def _law(self, source: TableSource) -> Law:
         parameters = source.parameters()
@@ -154,23 +152,10 @@ def _sizes_of_noise(
 def step_of(values: Floats) -> float:
     """Return the largest step of which all values, shape (n,), are multiples."""
     steps = np.diff(np.unique(values))
-    steps = steps[steps > EQUAL * np.ptp(values)]
+    steps = steps[steps > STILL * np.ptp(values)]
     return float(steps.min()) if len(steps) else 0.0
 
 
 def rounding_of(values: Floats) -> float:
     """Return rounding's standard deviation [JCGM 100:2008, sec. F.2.2.1]."""
     return step_of(values) / float(np.sqrt(12.0))
-
-
-EQUAL = 1e-9
-"""Relative difference of equal values, over the range."""
-
-
-def _is_same(one: Floats, other: Floats) -> bool:
-    """Return whether columns are equal but for scale and origin, within a thousandth."""
-    return abs(float(np.corrcoef(one, other)[0, 1])) > SAME
-
-
-SAME = 1.0 - 1e-6
-"""Correlation above which the simulated value equals a variable, which then represents both."""

@@ -98,35 +98,26 @@ def values_of_members(settled: Settled, members: Sequence[Member]) -> dict[str, 
     return {m.cause.name: named_values(settled, m, found.values[own], found.covariance[own, own]) for m, own in every}
 
 
-def with_selection(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
-    """Return values with at least the jackknife uncertainty of selections without one part each.
+def with_jackknife(
+    found: Mapping[str, Value], without: Sequence[Mapping[str, Value]], most: float = np.inf
+) -> dict[str, Value]:
+    """Return values with the larger of stated and jackknife uncertainty.
 
-    What is fitted beside a law, and the noise, change its value. [Jackknife of a whole analysis: Mosteller and Tukey,
-    Data Analysis and Regression, 1977, ch. 8.] Parts that tell less of a value count less.
+    Args:
+        without: values without one part each; some may lack a value.
+        most: largest weight of a part. For k selections without one part each, in which noise and other effects change,
+            it is 1 - 1 / k [Mosteller and Tukey, Data Analysis and Regression, 1977, ch. 8].
     """
-    every = dict(found)
+    every = {}
     for name, value in found.items():
-        parts = [part[name] for part in without if name in part]
-        moved = np.array([one.value - value.value for one in parts])
-        with np.errstate(all="ignore"):
-            weight = np.minimum(np.square(value.uncertainty / np.array([one.uncertainty for one in parts])), 1.0)
-        squares = np.where(np.isfinite(weight), weight, 0.0) * np.square(moved)
-        if parts:
-            every[name] = value.at_least(float(np.sqrt((len(without) - 1.0) * np.mean(squares))))
+        parts = np.array([(part[name].value, part[name].uncertainty) for part in without if name in part]).reshape(
+            -1, 2
+        )
+        own, there = np.square(value.uncertainty), max(len(parts), 1)
+        variances = np.maximum(np.square(parts[:, 1]), own / most)
+        u = weighted_jackknife(np.array(value.value), np.array(own), parts[:, 0], variances)
+        every[name] = value.at_least(float(u * np.sqrt(len(without) / there)))
     return every
-
-
-def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
-    """Return values with the larger of stated and jackknife uncertainty."""
-    if not found:
-        return {}
-    u = weighted_jackknife(
-        np.array([value.value for value in found.values()]),
-        np.square([value.uncertainty for value in found.values()]),
-        np.array([[part[name].value for name in found] for part in without]),
-        np.square([[part[name].uncertainty for name in found] for part in without]),
-    )
-    return {name: value.at_least(float(own)) for (name, value), own in zip(found.items(), u, strict=True)}
 
 
 _NAMES = {

@@ -51,7 +51,7 @@ class CauseColumns:
         parts: Sequence[Floats] = (),
     ) -> None:
         self.base = base
-        self.axes, self.on_axes = _orthonormal(base)
+        self.axes, self.on_axes = np.linalg.qr(base)
         self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
         self._waiting = list(parts)
@@ -228,11 +228,6 @@ def _less(products: Floats, columns: Floats) -> Floats:
         products[first:, strip] -= columns[:, first:].T @ columns[:, strip]
         products[strip, after] = products[after, strip].T
     return products
-
-
-def _orthonormal(base: Floats) -> tuple[Floats, Floats]:
-    axes, on_axes = np.linalg.qr(base)
-    return axes, on_axes
 
 
 class BesideBase:

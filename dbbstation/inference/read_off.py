@@ -15,7 +15,7 @@ from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigm
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.impossible import impossible, impossible_beside
 from dbbstation.inference.model_comparison import SCALES, slices_of
-from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife, with_selection
+from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
@@ -268,7 +268,8 @@ class CauseJudge:
         inside = slice(first + own.start, first + own.stop)
         parts = [(one.x[inside], one.covariance[inside, inside]) for one in self._trial.refits]
         found = with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
-        return with_selection(found, [one.get(member.cause.name, {}) for one in self._trial.chosen])
+        chosen = [one.get(member.cause.name, {}) for one in self._trial.chosen]
+        return with_jackknife(found, chosen, 1.0 - 1.0 / max(len(chosen), 2))
 
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife, widening
-from dbbstation.inference.named_values import with_selection
+from dbbstation.inference.named_values import with_jackknife
 from dbbstation.inference.settle import settle
 from tests.inference.tables import table
 from tests.inference.test_channel import EFFECTS, channel
@@ -109,8 +109,8 @@ def test_a_value_that_moves_with_what_is_chosen_beside_it_has_the_jackknife_unce
     groups = np.random.default_rng(5).normal(0.3, 0.1, 10)
     without = [{"size": Value((groups.sum() - one) / 9.0, 0.01, "mm")} for one in groups]
     whole = {"size": Value(float(groups.mean()), 0.01, "mm"), "limit": Value(1.0, 0.02, "mm")}
-    found = with_selection(whole, without)
+    found = with_jackknife(whole, without, 0.9)
     assert found["size"].uncertainty == pytest.approx(groups.std(ddof=1) / np.sqrt(10.0))  # of a mean
     assert found["limit"] == whole["limit"]
     vague = [{"size": replace(one["size"], uncertainty=1e3)} for one in without]
-    assert with_selection(whole, vague) == whole
+    assert with_jackknife(whole, vague, 0.9) == whole

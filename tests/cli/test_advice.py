@@ -75,7 +75,7 @@ def test_every_option_that_a_text_names_exists():
     ]
     assert len(named) > 300
     assert [
-        one for one in named if one[1] not in EVERY | OTHERS and not one[0].startswith(("report/pdf", "cli/renamed"))
+        one for one in named if one[1] not in EVERY | OTHERS and not one[0].startswith(("report/pdf", "cli/lazy"))
     ] == []
 
 

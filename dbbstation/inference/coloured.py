@@ -13,7 +13,6 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg.blas import dtbsv
 from scipy.sparse import csr_array
 
 from dbbstation.inference.bounds import BOUNDS
@@ -201,11 +200,17 @@ class Coloured:
             for k in range(begun):
                 own[k] = new[k] / np.sqrt(left[-1] / left[k]) + coefficients[k] @ own[:k][::-1]
             if len(own) > most:
-                # The filter is a banded matrix: its right-hand side keeps the first rows as they are.
-                kept = np.convolve(own[:most], self.filter)[:most]
-                bands = np.repeat(self.filter[None], len(own), axis=0).T
-                own[:] = dtbsv(most, bands, np.concatenate([kept, new[most:]]), lower=1, diag=1)
+                from scipy.signal import lfilter  # noqa: PLC0415 - takes half a second; many commands measure no colour
+
+                state = _state(self.filter, own[:most])
+                own[most:] = lfilter([1.0], self.filter, new[most:], zi=state)[0]
         return found
+
+
+def _state(taps: Floats, before: Floats) -> Floats:
+    order = len(taps) - 1
+    recent = before[::-1]
+    return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
 
 
 def partial_autocorrelations(correlation: Floats) -> tuple[float, ...]:

@@ -3,7 +3,7 @@
     python -m tests.fuzz FOLDER --cases 50000 --seed 1
 
 Goes on where an earlier call with the same folder and seed ended; `--report` only counts. It fails where a case had an
-internal fault, took more than 500 MB, or 30 s beyond the work of its command on the sound files.
+internal fault, took more than 500 MB, or 20 s beyond the work of its command on the sound files.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-MOST_MB, MOST_S = 500, 30.0
+MOST_MB, MOST_S = 500, 20.0
 STUCK_S = 600.0
 """A worker that says nothing for so long is ended: a case that does not even take time."""
 

@@ -63,7 +63,7 @@ class Line(BaseModel):
             at_zero_mm: length at the zero of a relative instrument, if the line states none.
 
         Raises:
-            StationError: no such instrument, or nobody states the length at its zero.
+            StationError: no such instrument, or the length at its zero is not stated.
         """
         found = load_instrument(self.instrument, self.profile or None)
         if not found.length.relative:

@@ -107,7 +107,7 @@ class TitleLine(Panel):
                 Content.styled(board.announced.run.label, "bold"),
             ]
         state = Content(str(board.state) if board.state else "opening")
-        # What stands at the end is the most important; where there is no room the plan's name is shortened first.
+        # The end of the line is the most important part. A narrow screen shortens the plan's name first.
         room = (self.content_size.width or _NARROWEST) - len(sign) - 1
         rest = Content(" · ").join([*run, state])
         plan = _shortened(self._plan, room - len(rest) - len(" · "))

@@ -153,7 +153,7 @@ class ControlClient:
         url: such as `tcp://127.0.0.1:41234`.
 
     Raises:
-        MachineError: no such address, or another computer, whose machine nobody watches.
+        MachineError: no such address, or the address of another computer.
     """
 
     def __init__(self, url: str) -> None:
@@ -201,7 +201,7 @@ class ControlClient:
         """Stop a run whose program has ended.
 
         Raises:
-            MachineError: nobody answers.
+            MachineError: no answer.
         """
         if self.ask("status").get("state") == "running":
             self.ask("stop")

@@ -296,7 +296,7 @@ _OF_RUNS = frozenset({"run started", "run sealed", "taken in"})
 
 
 SHORTEST = 16
-"""Least number of hex digits of an anchor: nobody can make another log with the same sixteen digits."""
+"""Least number of hex digits of an anchor. No one can make a second log with sixteen equal digits."""
 
 
 def anchor_of(seal: Seal | None) -> str:

@@ -300,7 +300,7 @@ def rope(rng: np.random.Generator, t: Values) -> Scene:
 
 
 def stray_light(rng: np.random.Generator, t: Values) -> Scene:
-    """Absorbance of a dye, simulated by its concentration: stray light bends it at high values."""
+    """Absorbance of a dye. The simulation is linear in concentration; stray light bends high values."""
     dye = rng.uniform(0.0, 1.0, len(t))
     share = float(rng.uniform(0.01, 0.05))
     effect = -1000.0 * (np.log10((10.0 ** (-2.0 * dye) + share) / (1.0 + share)) + 2.0 * dye)

@@ -27,7 +27,7 @@ from dbbstation.inference.coloured import (
 from dbbstation.inference.harmonics import LEAST_LEFT
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
-from dbbstation.inference.patterns import NAMED, Family, log_odds, odds_of_driven
+from dbbstation.inference.patterns import NAMED, ZERO_SD, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.triangle import RANK
@@ -408,8 +408,20 @@ class Bank:
 
     def _cause(self, pattern: Pattern, own: Integers, plausible: float) -> Cause:
         size = np.full(len(own), plausible)
+        slack = own[list(pattern.slack)]
+        # A zero moves by the ratio of its column's value to the amplitudes.
+        moved = np.full(len(slack), ZERO_SD * LARGE * plausible)
         variants = tuple(
-            Variant(own[list(part)], size[list(part)], label=label, log_weight=weight)
+            Variant(
+                own[list(part)],
+                size[list(part)],
+                label=label,
+                log_weight=weight,
+                slack=slack,
+                slack_sd=moved,
+                slack_at=LARGE,
+                tangents=len(slack),
+            )
             for part, weight, label in pattern.choices
         )
         if pattern.family is Family.BLOCKS:
@@ -495,6 +507,10 @@ def alike(one: Coloured, other: Coloured) -> bool:
 HARDLY_TAKEN = 0.95
 """Remaining share of noise above which absorbed power is not restored."""
 
+
+LARGE = 2.0
+"""Amplitude of a product, in plausible sizes, at which its slack is stated: `MOST_SLACK` times more, it fills the
+largest scale."""
 
 TIE = 1e-3
 """Difference in log odds between successive variables of a table, so that the first of two equal variables is named."""

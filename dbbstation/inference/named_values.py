@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
 from dbbstation.inference.model_comparison import amplitude_size, slices_of
+from dbbstation.inference.patterns import ZEROS, covers_turns, zeros_text
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
 
@@ -88,6 +90,19 @@ def growth(member: Member, values: Floats) -> float:
         return 1.0
     size = amplitude_size(member, values[: len(member.variant.columns)])
     return size / member.variant.slack_at if size > 0.0 else 1.0
+
+
+def label_of(settled: Settled, member: Member, values: Floats) -> str:
+    """Return the variant's label, for a product with its fitted zeros."""
+    pattern, width = settled.bank.patterns.get(member.cause.name), len(member.variant.columns)
+    if pattern is None or not pattern.slack:
+        return member.variant.label
+    label = [text for _, _, text in pattern.choices].index(member.variant.label)
+    lines = [v for v in pattern.variables if not covers_turns(v)]
+    begun = list(product(ZEROS, repeat=len(lines)))[label]
+    own, moving = values[:width], values[width:].reshape(-1, width)[::-1]
+    zeros = begun - moving @ own / max(float(own @ own), 1e-300)
+    return f"about {zeros_text(lines, zeros.tolist())}"
 
 
 def values_of_members(settled: Settled, members: Sequence[Member]) -> dict[str, dict[str, Value]]:

@@ -89,6 +89,7 @@ class Pattern:
         per: divisors that convert to these units, shape (p,).
         tried: number of independent forms from which it was picked.
         choices: alternative forms: columns, log probability, label.
+        slack: columns that move the zeros of every form's factors; see `ZERO_SD`.
         acts_once: whether it is a single event that other rows cannot show.
     """
 
@@ -101,6 +102,7 @@ class Pattern:
     label: str = ""
     tried: float = 1.0
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    slack: tuple[int, ...] = ()
     acts_once: bool = False
 
     @property
@@ -257,31 +259,46 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Return products of two variables, each with its zero at the ends or the middle of its range."""
+    """Return products of two variables about zeros within their ranges, with columns that move these zeros.
+
+    (x - x0 - d) (y - y0 - e) is (x - x0) (y - y0) less d y and e x, up to a constant. Angles have waves once per turn
+    instead of x, whose zeros are known.
+    """
     # For angles, products of cosines and sines give waves of sum and difference.
-    if covers_turns(one) or covers_turns(other):
-        a, b = (
-            turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)
-            for v in (one, other)
-        )
+    waves = [v for v in (one, other) if covers_turns(v)]
+    lines = [v for v in (one, other) if not covers_turns(v)]
+    if not lines:
+        a, b = (turn(v, 1).columns(v.values) for v in waves)
         return Pattern(Family.PRODUCT, (one, other), (a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
+    wave = turn(waves[0], 1).columns(waves[0].values) if waves else np.ones((len(one.values), 1))
     columns, labels = [], []
-    for zeros in product(ZEROS, ZEROS):
-        columns.append((one.scaled - zeros[0]) * (other.scaled - zeros[1]))
-        at = [0.5 * (v.low + v.high) + zero * v.half_range for v, zero in zip((one, other), zeros, strict=True)]
-        named = (f"{v.name} {place:.4g} {v.unit}".strip() for v, place in zip((one, other), at, strict=True))
-        labels.append(f"about {' and '.join(named)}")
-    width, weight = len(labels), -float(np.log(len(labels)))
+    for zeros in product(ZEROS, repeat=len(lines)):
+        columns.append(wave * np.prod([v.scaled - z for v, z in zip(lines, zeros, strict=True)], axis=0)[:, None])
+        labels.append(f"about {zeros_text(lines, zeros)}")
+    moving = [wave] if waves else [one.scaled[:, None], other.scaled[:, None]]
+    width, weight = wave.shape[1], -float(np.log(len(labels)))
+    choices = tuple((tuple(range(k * width, (k + 1) * width)), weight, label) for k, label in enumerate(labels))
+    whole = width * len(labels)
+    slack = tuple(range(whole, whole + sum(part.shape[1] for part in moving)))
     first, second = (f"({v.unit})" if "/" in v.unit or " " in v.unit else v.unit or v.name for v in (one, other))
     unit = f"/{first}²" if first == second else f"/({first} {second})"
-    choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
-    per = (one.half_range * other.half_range,) * width
-    return Pattern(Family.PRODUCT, (one, other), np.column_stack(columns), None, (unit,) * width, per, choices=choices)
+    units, per = ((unit,) * whole, (one.half_range * other.half_range,) * whole) if not waves else ((), ())
+    samples = np.hstack([*columns, *moving])
+    return Pattern(Family.PRODUCT, (one, other), samples, None, units, per, choices=choices, slack=slack)
 
 
-ZEROS = (-1.0, 0.0, 1.0)
-"""Zeros of a factor: ends and middle of its range. Farther zeros give nearly a straight line in the other factor, a
-separate and more probable cause."""
+def zeros_text(lines: Sequence[Variable], zeros: Sequence[float]) -> str:
+    """Return places in scaled units as text, such as `x 3 mm and y -1 mm`."""
+    at = [0.5 * (v.low + v.high) + zero * v.half_range for v, zero in zip(lines, zeros, strict=True)]
+    return " and ".join(f"{v.name} {place:.4g} {v.unit}".strip() for v, place in zip(lines, at, strict=True))
+
+
+ZERO_SD = 1.0 / 3.0
+"""Prior standard deviation of a zero about a tried one, half their distance, in half ranges of the factor."""
+
+ZEROS = (-2.0 * ZERO_SD, 0.0, 2.0 * ZERO_SD)
+"""Tried zeros of a factor: middles of thirds of its range. Farther zeros give nearly a straight line in the other
+factor, a separate and more probable cause."""
 
 
 def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:

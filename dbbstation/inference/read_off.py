@@ -15,7 +15,7 @@ from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigm
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.impossible import impossible, impossible_beside
 from dbbstation.inference.model_comparison import SCALES, slices_of
-from dbbstation.inference.named_values import named_values, values_of_law, with_jackknife
+from dbbstation.inference.named_values import label_of, named_values, values_of_law, with_jackknife
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
@@ -207,7 +207,7 @@ class CauseJudge:
             name=cause.name,
             verdict=verdict,
             form=pattern.family if pattern else law.family if law else None,
-            label=shown.variant.label,
+            label=label_of(self._settled, shown, values),
             variables=tuple(v.name for v in variables),
             probability=probability,
             log_bayes_factor=gain,

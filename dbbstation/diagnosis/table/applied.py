@@ -111,7 +111,7 @@ def _effect(found: Mismatch, channel: Channel, member: Member, values: Floats) -
     name, bank, width = member.cause.name, found.settled.bank, len(member.variant.columns)
     slopes = np.zeros((len(channel.residual), len(values)))
     if name not in bank.laws:
-        slopes[:, :width] = _samples(bank.patterns[name], channel, member.variant.label)
+        slopes[:] = _samples(bank.patterns[name], channel, member.variant.label)
         return slopes @ values, slopes
     law = next((one for one in channel.laws if one.name == name), None)
     if law is None:
@@ -139,7 +139,7 @@ def _samples(pattern: Pattern, channel: Channel, label: str) -> Floats:
     if same is None:
         raise _unknown(pattern.name)
     part = next((part for part, _, one in pattern.choices if one == label), None)
-    return same.samples if part is None else same.samples[:, list(part)]
+    return same.samples if part is None else same.samples[:, [*part, *same.slack]]
 
 
 def _unknown(name: str) -> CalibrationError:

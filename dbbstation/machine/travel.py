@@ -9,13 +9,12 @@ import numpy as np
 from dbbstation.errors import TravelError
 from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.kinematics import inverse, strut_jacobian
+from dbbstation.machine.rotation import Frames, rotation_matrices
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-    from dbbstation.machine.kinematics import Struts
 
 ROUNDING = 1e-9
 """Tolerance for rounding: a pose exactly on the limit is inside [mm or deg]."""
@@ -37,21 +36,32 @@ def check_travel(machine: Machine, poses: Floats, *, where: str, remedy: str = S
     Raises:
         TravelError: names `where`, the first pose outside, and the limit that it exceeds most.
     """
-    quantities = _limited_quantities(machine, poses)
-    excess = np.stack([np.maximum(low - value, value - high) for _, _, value, low, high in quantities])
-    # NaN is also outside.
-    outside = ~(excess <= ROUNDING)
-    if not outside.any():
+    number, value = first_outside(machine, poses)
+    if number == len(poses):
         return
-    pose_number = int(np.argmax(outside.any(axis=0)))
-    worst = int(np.argmax(np.where(np.isnan(excess[:, pose_number]), np.inf, excess[:, pose_number])))
-    name, unit, value, low, high = quantities[worst]
-    pose = " ".join(f"{axis} {coordinate:.3f}" for axis, coordinate in zip("XYZABC", poses[pose_number], strict=True))
+    limits = _limits(machine)
+    low, high = np.array([limit[2:] for limit in limits]).T
+    worst = int(np.argmax(np.nan_to_num(np.maximum(low - value, value - high), nan=np.inf)))
+    name, unit, *_ = limits[worst]
+    pose = " ".join(f"{axis} {coordinate:.3f}" for axis, coordinate in zip("XYZABC", poses[number], strict=True))
     raise TravelError(
-        f"{name} is {value[pose_number]:.3f} {unit}, its travel {low:g} to {high:g} {unit} (at {pose})",
-        where=where if len(poses) == 1 else f"{where}, pose {pose_number + 1} of {len(poses)}",
+        f"{name} is {value[worst]:.3f} {unit}, its travel {low[worst]:g} to {high[worst]:g} {unit} (at {pose})",
+        where=where if len(poses) == 1 else f"{where}, pose {number + 1} of {len(poses)}",
         remedy=remedy,
     )
+
+
+def first_outside(machine: Machine, poses: Floats) -> tuple[int, Floats]:
+    """Return the number of the first pose, shape (n, 6) [mm, deg], outside the nominal travel, and its limited quantities; n if all are inside."""
+    hexapod = machine.hexapod
+    limits = np.array([limit[2:] for limit in _limits(machine)])
+    held = np.linalg.det(strut_jacobian(inverse(hexapod, middle(machine))))[0]
+    base, platform = (np.ascontiguousarray(each) for each in (hexapod.base_joints_mm, hexapod.platform_joints_mm))
+    found = np.empty(len(limits))
+    rotation = rotation_matrices(poses[:, 3:], hexapod.rotation)
+    error_mm = machine.reference_length_error_mm
+    number = _first_outside(np.ascontiguousarray(poses), rotation, base, platform, error_mm, held, limits, found)
+    return number, found
 
 
 def middle(machine: Machine) -> Frames:
@@ -60,45 +70,56 @@ def middle(machine: Machine) -> Frames:
     return Frames.from_poses(np.array([[0.0, 0.0, height, 0.0, 0.0, 0.0]]), machine.hexapod.rotation)
 
 
-def _limited_quantities(
-    machine: Machine,
-    poses: Floats,
-) -> list[tuple[str, str, Floats, float, float]]:
+def _limits(machine: Machine) -> list[tuple[str, str, float, float]]:
     travel = machine.travel
-    radius = np.hypot(poses[:, 0], poses[:, 1])
-    struts = inverse(machine.hexapod, Frames.from_poses(poses, machine.hexapod.rotation))
-    driven = struts.length_mm - machine.reference_length_error_mm
     return [
-        ("the hold of the struts on the platform", "of the middle's", _hold(machine, struts), LEAST_STIFFNESS, np.inf),
-        ("the distance from the Z axis", "mm", radius, 0.0, travel.xy_radius_mm),
-        ("X", "mm", poses[:, 0], *travel.x_mm),
-        ("Y", "mm", poses[:, 1], *travel.y_mm),
-        ("Z", "mm", poses[:, 2], *travel.z_mm),
-        ("A", "deg", poses[:, 3], *travel.a_deg),
-        ("B", "deg", poses[:, 4], *travel.b_deg),
-        ("C", "deg", poses[:, 5], *travel.c_deg),
-        *((f"strut {i + 1}", "mm", driven[:, i], *travel.strut_mm) for i in range(STRUTS)),
+        ("the hold of the struts on the platform", "of the middle's", LEAST_STIFFNESS, np.inf),
+        ("the distance from the Z axis", "mm", 0.0, travel.xy_radius_mm),
+        ("X", "mm", *travel.x_mm),
+        ("Y", "mm", *travel.y_mm),
+        ("Z", "mm", *travel.z_mm),
+        ("A", "deg", *travel.a_deg),
+        ("B", "deg", *travel.b_deg),
+        ("C", "deg", *travel.c_deg),
+        *((f"strut {i + 1}", "mm", *travel.strut_mm) for i in range(STRUTS)),
     ]
 
 
-def _hold(machine: Machine, struts: Struts) -> Floats:
-    there = inverse(machine.hexapod, middle(machine))
-    return _determinants(struts.unit, struts.arm_mm) / _determinants(there.unit, there.arm_mm)
-
-
 @compiled
-def _determinants(unit: Floats, arm: Floats) -> Floats:
-    """Return determinants of strut Jacobians, shape (n,): five times as quick as NumPy's."""
-    found = np.empty(len(unit))
+def _first_outside(
+    poses: Floats,
+    rotation: Floats,
+    base: Floats,
+    platform: Floats,
+    error_mm: Floats,
+    held: float,
+    limits: Floats,
+    found: Floats,
+) -> int:
+    """Fill `found` with the quantities of successive poses in the order of `_limits`; return the first pose outside."""
     rows = np.empty((STRUTS, STRUTS))
-    for pose in range(len(unit)):
+    for number in range(len(poses)):
+        x, y, z = poses[number, :3]
+        r = rotation[number]
+        for axis in range(6):
+            found[2 + axis] = poses[number, axis]
         for strut in range(STRUTS):
-            ux, uy, uz = unit[pose, strut]
-            ax, ay, az = arm[pose, strut]
+            px, py, pz = platform[strut]
+            ax = r[0, 0] * px + r[0, 1] * py + r[0, 2] * pz
+            ay = r[1, 0] * px + r[1, 1] * py + r[1, 2] * pz
+            az = r[2, 0] * px + r[2, 1] * py + r[2, 2] * pz
+            ux, uy, uz = x + ax - base[strut, 0], y + ay - base[strut, 1], z + az - base[strut, 2]
+            length = np.sqrt(ux * ux + uy * uy + uz * uz)
+            found[8 + strut] = length - error_mm[strut]
+            ux, uy, uz = ux / length, uy / length, uz / length
             rows[strut, 0], rows[strut, 1], rows[strut, 2] = ux, uy, uz
             rows[strut, 3], rows[strut, 4], rows[strut, 5] = ay * uz - az * uy, az * ux - ax * uz, ax * uy - ay * ux
-        found[pose] = _eliminated(rows)
-    return found
+        found[0], found[1] = _eliminated(rows) / held, np.hypot(x, y)
+        for k in range(len(found)):
+            # NaN is also outside.
+            if not limits[k, 0] - ROUNDING <= found[k] <= limits[k, 1] + ROUNDING:
+                return number
+    return len(poses)
 
 
 @inlined

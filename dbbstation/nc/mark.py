@@ -36,8 +36,8 @@ LEAST_WAY_MM, LEAST_TURN_DEG, LEAST_ONLY_TURN_DEG = 1e-3, 1e-6, 1e-3
 STEPS_APART, STEPS_TURNED, STEPS_ONLY_TURNED = 200.0, 1.0, 2000.0
 """The same in last decimals, for dialects with few decimals: one step of X, Y or Z, or nine steps of angles, are then half a percent."""
 
-COARSER = range(2, 8)
-"""Decimals of other dialects, which may also have marked a program."""
+COARSEST = 2
+"""Fewest decimals of other dialects, which may also have marked a program."""
 
 _SAME = 1e-9
 """Numbers that differ by less are equal: poses have fifteen digits."""
@@ -139,13 +139,11 @@ def _distinct(sums: NDArray[np.uint64]) -> int:
 def decimals_of(toolpath: Toolpath) -> Iterator[tuple[int, ...]]:
     """Yield the decimals in which a dialect may have written the poses, this program's first."""
     yield DECIMALS
-    least = [
-        next(
-            (n for n in COARSER if n <= most and all(_off(each[:, axes], n) < _SAME for each in _known(toolpath))),
-            most + 1,
-        )
-        for axes, most in _GROUPS
-    ]
+    least = [COARSEST] * len(_GROUPS)
+    for numbers in _known(toolpath):
+        for group, (axes, most) in enumerate(_GROUPS):
+            while least[group] <= most and _off(numbers[:, axes], least[group]) >= _SAME:
+                least[group] += 1
     enough = [range(fewest, most + 1) for fewest, (_, most) in zip(least, _GROUPS, strict=True)]
     yield from (found for mm in enough[0] for deg in enough[1] if (found := (mm,) * 3 + (deg,) * 3) != DECIMALS)
 

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import MachineError, TravelError
-from dbbstation.machine.travel import check_travel
+from dbbstation.errors import MachineError
+from dbbstation.machine.travel import check_travel, first_outside
 from dbbstation.nc.toolpath import RowKind, in_pieces
 
 if TYPE_CHECKING:
-    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
 
@@ -36,7 +35,17 @@ def check_reach(machine: Machine, toolpath: Toolpath) -> None:
         block = np.cumsum(pieces) // AT_ONCE
         for rows in np.split(np.arange(len(part)), np.flatnonzero(np.diff(block)) + 1):
             row, share = in_pieces(pieces[rows])
-            _Poses(part, rows[row], share).check(machine, part)
+            row = rows[row]
+            poses = part.poses[row] if (share == 1.0).all() else part.between(row, share)
+            known = part.is_move[row]
+            row, poses = row[known], poses[known]
+            if len(rows) and rows[0] == 0:
+                # The pose before the first move; lines before that have no place.
+                row, poses = np.append(np.argmax(part.is_move), row), np.vstack([part.before[:1], poses])
+            outside, _ = first_outside(machine, poses)
+            if outside < len(poses):
+                where = part.where(int(row[outside]))
+                check_travel(machine, poses[outside : outside + 1], where=where, remedy=DECLARED)
 
 
 def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
@@ -57,37 +66,3 @@ def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
                 where=part.where(row),
                 remedy=f"give a smaller F; its file states the limit as `{key}`",
             )
-
-
-class _Poses:
-    """Known poses within rows of a toolpath, its start first."""
-
-    def __init__(self, toolpath: Toolpath, row: Integers, share: Floats) -> None:
-        poses = toolpath.poses[row] if (share == 1.0).all() else toolpath.between(row, share)
-        known = toolpath.is_move[row]
-        self.row, self.poses = row[known], poses[known]
-        if len(row) and row[0] == 0:
-            # The pose before the first move; lines before that have no place.
-            begins = int(np.argmax(toolpath.is_move))
-            self.row, self.poses = np.concatenate([[begins], self.row]), np.vstack([toolpath.before[:1], self.poses])
-
-    def check(self, machine: Machine, toolpath: Toolpath) -> None:
-        """Refuse the first pose outside the travel, naming its line."""
-        if _is_inside(machine, self.poses):
-            return
-        inside, outside = 0, len(self.poses) - 1
-        while outside - inside > 0:
-            middle = (inside + outside) // 2
-            inside, outside = (
-                (middle + 1, outside) if _is_inside(machine, self.poses[: middle + 1]) else (inside, middle)
-            )
-        where = toolpath.where(int(self.row[outside]))
-        check_travel(machine, self.poses[outside : outside + 1], where=where, remedy=DECLARED)
-
-
-def _is_inside(machine: Machine, poses: Floats) -> bool:
-    try:
-        check_travel(machine, poses, where="")
-    except TravelError:
-        return False
-    return True

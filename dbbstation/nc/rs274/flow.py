@@ -38,15 +38,17 @@ LOCAL = 30
 """Parameters with numbers up to this belong to the running subprogram."""
 
 _O_LINE = re.compile(
-    r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?[oO][ \t]*(?P<label><[^>\n]*>|[0-9]+)[ \t]*(?P<keyword>[A-Za-z]*)(?P<rest>[^\n]*)$"
+    r"[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?[oO][ \t]*(?P<label><[^>]*>|[0-9]+)[ \t]*(?P<keyword>[A-Za-z]*)(?P<rest>.*)",
+    re.DOTALL,
 )
 _KEYWORDS = frozenset(
     "sub endsub return call if elseif else endif while endwhile do repeat endrepeat break continue".split()  # noqa: SIM905 - words
 )
 _MACRO = re.compile(
-    r"(?m)^[ \t]*(?:[nN][ \t]*[0-9]+[ \t]*)?(?=[WwIiEe]|[Gg][Oo])"
-    r"(?P<word>(?i:WHILE|IF|GOTO|END(?=[ \t]*[0-9]+[ \t]*(?:[;(]|\r?$))))(?P<rest>[^\n]*)$"
+    r"[ \t]*(?:N[ \t]*[0-9]+[ \t]*)?(?P<word>WHILE|IF|GOTO|END(?=[ \t]*[0-9]+[ \t]*(?:[;(]|\r?$)))(?P<rest>.*)",
+    re.IGNORECASE | re.DOTALL,
 )
+_LETTERS_OF_FLOW = np.isin(np.arange(256), np.frombuffer(b"OoIiDd", dtype=np.uint8))
 _DO = re.compile(r"\bDO[ \t]*(?P<number>[0-9]+)\Z", re.IGNORECASE)
 _GOTO = re.compile(r"\A[ \t]*(?:GOTO)?[ \t]*(?P<number>[0-9]+)\Z", re.IGNORECASE)
 _END = re.compile(r"\A[ \t]*(?P<number>[0-9]+)\Z")
@@ -115,22 +117,15 @@ class Flow:
         self._ran = 0
 
     def _append(self, text: str, file: str) -> None:
-        before = self._count
+        before, behind = self._count, len(self._text)
         self.files += ((before, file),)
-        behind = len(self._text)
         self._text += f"{text}\n"
-        begins = behind + 1 + np.flatnonzero(letters_of(self._text[behind:]) == ord("\n"))
-        self._begins = np.concatenate([self._begins, begins])
-        line, begin = 1 + before, 0
-        for match in _O_LINE.finditer(text):
-            line, begin = line + text.count("\n", begin, match.start()), match.start()
-            one = self._o_line(match, line)
-            self._o_lines[line] = one
-            self._labels.setdefault(one.label, []).append(one)
-        for match in _MACRO.finditer(text):
-            line = 1 + before + text.count("\n", 0, match.start())
-            rest, column = _COMMENT.sub("", match["rest"]).rstrip(BLANKS), match.start("rest") - match.start()
-            self._macros[line] = OLine(line, "", match["word"].upper(), rest, column)
+        letters = letters_of(self._text[behind:])
+        self._begins = np.concatenate([self._begins, behind + 1 + np.flatnonzero(letters == ord("\n"))])
+        # Every word of the flow has one of these letters, and few other lines have one.
+        may = np.flatnonzero(_LETTERS_OF_FLOW[letters]) + behind
+        for at in np.unique(np.searchsorted(self._begins, may, side="right") - 1).tolist():
+            self._take_word(self._line(at), at + 1)
         self._window = -1, letters_of("")
 
     @property
@@ -289,12 +284,17 @@ class Flow:
         what = f"the program ends without {end}: it may have been cut short"
         return Problem(self.files[0][1], self._own_lines, 0, what, "copy it again, or add its end if it is complete")
 
-    @staticmethod
-    def _o_line(match: re.Match[str], line: int) -> OLine:
-        label = re.sub(r"\s", "", match["label"]).lower()
-        keyword, column = match["keyword"].lower(), match.start("rest") - match.start()
-        rest = _COMMENT.sub(lambda comment: " " * len(comment[0]), match["rest"]).rstrip(BLANKS)
-        return OLine(line, label if label[0] == "<" else str(int(label)), keyword, rest, column)
+    def _take_word(self, text: str, line: int) -> None:
+        word, macro = _O_LINE.match(text), _MACRO.match(text)
+        if word:
+            label, column = re.sub(r"\s", "", word["label"]).lower(), word.start("rest")
+            rest = _COMMENT.sub(lambda comment: " " * len(comment[0]), word["rest"]).rstrip(BLANKS)
+            label = label if label[0] == "<" else str(int(label))
+            self._o_lines[line] = OLine(line, label, word["keyword"].lower(), rest, column)
+            self._labels.setdefault(label, []).append(self._o_lines[line])
+        elif macro:
+            rest = _COMMENT.sub("", macro["rest"]).rstrip(BLANKS)
+            self._macros[line] = OLine(line, "", macro["word"].upper(), rest, macro.start("rest"))
 
     def _run(self, word: OLine, place: Place) -> None:
         if word.keyword and word.keyword not in _KEYWORDS:

@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats, Integers
 
-LEAST_LINES, MOST_LINES = 4, 20_000
-"""Least and greatest number of lines that are read at once; fewer lines are read faster one by one."""
+LEAST_LINES, MOST_LINES = 4, 5_000
+"""Least and greatest number of lines that are read at once. Fewer lines are read faster one by one; more lines need arrays
+that short programs do not fill."""
 
 MOST_DIGITS = 15
 """A number with more digits is read separately: floating point cannot hold its digits exactly."""

@@ -16,9 +16,9 @@ from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.facts.serialise import plain
 from dbbstation.files.recordings.drive_csv import read_drive
+from dbbstation.results.comparison import comparison_result
 from dbbstation.results.drive import drive_result
-from dbbstation.results.of_comparison import comparison_result
-from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.results.mismatch import mismatch_result
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates
 from dbbstation.tasks.load import load_sessions

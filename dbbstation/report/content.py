@@ -18,11 +18,14 @@ from dbbstation.report.shown import ReportContent, ShownBudget, ShownFindings, S
 from dbbstation.results.circle_figures import RunWithoutCircle
 from dbbstation.results.circles import circles_result
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
-from dbbstation.results.of_report import compared, means_of, side_by_side, tolerances_by_test
 from dbbstation.results.report import (
     CertificateState,
     NotEvaluated,
     ReportResult,
+    compared,
+    means_of,
+    side_by_side,
+    tolerances_by_test,
 )
 from dbbstation.results.report_verdict import verdict_of
 from dbbstation.results.tolerances import tolerated_circles, tolerated_pairs

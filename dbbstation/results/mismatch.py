@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
 from dbbstation.diagnosis.table.mismatch import RefittedParameter
-from dbbstation.diagnosis.table.next_measurement import Next
+from dbbstation.diagnosis.table.next_measurement import Next, next_measurements
+from dbbstation.diagnosis.table.words import sentence_of
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
-from dbbstation.facts.value import Value
+from dbbstation.facts.value import Value, finite
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.inference.cancelling import Cancelling
@@ -20,8 +21,13 @@ from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import CauseFinding
-from dbbstation.results.frame import Framed, picked
+from dbbstation.results.frame import Framed, of_facts, picked
 from dbbstation.results.levels_text import level_sentences
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.diagnosis.table.mismatch import Mismatch
 
 
 @dataclass(frozen=True)
@@ -145,3 +151,70 @@ class MismatchResult(Framed):
         """Return one row per effect."""
         shown = ("name", "verdict", "probability", "log_bayes_factor", "rms", "confounded", "text")
         return [picked(one, *shown) for one in self.findings]
+
+
+def mismatch_result(
+    found: Mismatch,
+    *,
+    table: Mapping[str, tuple[str | float, ...]] | None = None,
+    drawing: Callable[[object], bytes] | None = None,
+    notes: tuple[str, ...] = (),
+) -> MismatchResult:
+    """Return the result of a table."""
+    compared = found.table
+    return of_facts(
+        MismatchResult,
+        found,
+        unit=compared.unit,
+        row_count=len(compared),
+        blocks=compared.names,
+        variables=tuple(
+            VariableResult(v.name, str(v.kind), v.unit, v.period, float(v.low), float(v.high))
+            for v in compared.variables
+        ),
+        mismatch=found.is_there,
+        offset=_offset(found),
+        noise=_noise(found),
+        residual_rms=ResidualRms(found.rms_before, found.rms_after),
+        held_out="not-tested" if found.held_out is None else "tested",
+        held_out_rms=_held_out(found),
+        findings=tuple(replace(one, text=sentence_of(found, one)) for one in found.findings),
+        parameters=found.fitted,
+        next=next_measurements(found),
+        not_asked=found.lacking,
+        table={} if table is None else table,
+        drawing=drawing,
+        notes=notes,
+    )
+
+
+def _offset(found: Mismatch) -> OffsetResult | None:
+    if found.offset is None:
+        return None
+    known = found.offset
+    return OffsetResult(known.value, known.uncertainty, known.unit, found.offset_is_there)
+
+
+def _noise(found: Mismatch) -> NoiseResult:
+    settled, noise = found.settled, found.settled.noise
+    return NoiseResult(
+        sigma=noise.sigma,
+        rows_as_one=noise.correlation_samples,
+        measured_in_order=settled.channel.time is not None,
+        order=noise.order,
+        degrees_of_freedom=finite(settled.bank.tails),
+        grows_with=settled.bank.grows_with or None,
+        beginnings=tuple(
+            SearchBeginning(
+                one.beginning.value, one.log_probability - settled.log_probability, tuple(sorted(one.best.names))
+            )
+            for one in (settled, *settled.others)
+        ),
+    )
+
+
+def _held_out(found: Mismatch) -> HeldOutRms | None:
+    held_out = found.held_out
+    if held_out is None:
+        return None
+    return HeldOutRms(held_out.as_simulated, held_out.before, held_out.after, found.is_worse, held_out.folds)

@@ -58,7 +58,7 @@ def compare(
     from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
     from dbbstation.diagnosis.compare.notes import notes_of
     from dbbstation.diagnosis.diagnose import usable_sources
-    from dbbstation.results.of_comparison import comparison_result
+    from dbbstation.results.comparison import comparison_result
     from dbbstation.sources.registry import known_sources, sources_named
     from dbbstation.tasks.diagnosed import default_candidates
     from dbbstation.tasks.load import load

@@ -88,7 +88,7 @@ def diagnose(
     from dbbstation.diagnosis import diagnose as search
     from dbbstation.diagnosis.effects import effects_of
     from dbbstation.files.own_sources import every_source
-    from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result, kept_of
+    from dbbstation.results.diagnosis import diagnosis_figures, diagnosis_result, kept_of
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.diagnosed import diagnosed_of
 

@@ -10,7 +10,7 @@ from dbbstation.diagnosis import diagnose as search
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.errors import ModelError
 from dbbstation.facts.serialise import plain
-from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import loaded
 from dbbstation.tasks.telling import Telling

@@ -23,7 +23,7 @@ from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.history.order import date_faults
 from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
-from dbbstation.results.of_history import history_result
+from dbbstation.results.history import history_result
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

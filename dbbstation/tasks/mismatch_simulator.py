@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.diagnosis.simulator.answer import find
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.files.recordings.table_csv import table_csv
-from dbbstation.results.of_simulator import simulator_result
-from dbbstation.results.simulator import SimulationsRun
+from dbbstation.results.simulator import SimulationsRun, simulator_result
 from dbbstation.simulators.code import missing_code
 from dbbstation.simulators.loading import load_simulator
 from dbbstation.simulators.running import MOST_SECONDS, Runs

@@ -19,7 +19,7 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import pose_errors, position_uncertainty_mm, predicted_poses
 from dbbstation.report.content import parameters
-from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import sources_named
 from dbbstation.virtual.truth import random_kinematics

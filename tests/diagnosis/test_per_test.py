@@ -8,7 +8,7 @@ import pytest
 from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.facts.serialise import plain
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.diagnosis import diagnosis_figures
 from tests.diagnosis.joint_fits import joint_fit
 
 

@@ -11,7 +11,7 @@ from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.facts.serialise import plain
-from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.balls import BadSeating

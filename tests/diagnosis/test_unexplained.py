@@ -17,7 +17,7 @@ from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.compensation import compensated
 from dbbstation.model.uncertainty import position_uncertainty_mm
-from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnosed import default_candidates

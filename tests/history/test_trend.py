@@ -11,7 +11,7 @@ from dbbstation.history.run_length import average_run_length
 from dbbstation.history.trend import TrendOptions, histories
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
-from dbbstation.results.of_history import history_result
+from dbbstation.results.history import history_result
 
 ASKED = TrendOptions(2.0)
 

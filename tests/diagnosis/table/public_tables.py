@@ -29,7 +29,7 @@ from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.levels import CORRECTS
 from dbbstation.inference.variables import Kind, Variable
-from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.results.mismatch import mismatch_result
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -23,7 +23,7 @@ from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
-from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.results.mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables
 from tests.diagnosis.table import plant
 from tests.diagnosis.table.plant import PULSE_S, Truth, record

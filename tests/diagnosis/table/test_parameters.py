@@ -11,7 +11,7 @@ from dbbstation.diagnosis.table.mismatch import find_mismatch, refitted
 from dbbstation.errors import ArgumentError, InputError
 from dbbstation.facts.value import Value
 from dbbstation.inference.verdict import Verdict
-from dbbstation.results.of_mismatch import mismatch_result
+from dbbstation.results.mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables, stated_uncertainties
 
 ROWS, NOISE_MM, LINE_MM, STIFFNESS_OFF = 400, 0.01, 0.06, 0.02

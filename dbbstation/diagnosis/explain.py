@@ -365,7 +365,8 @@ def _lay_out(
     sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
     for _ in range(BOUNDS.steps_of_rivals if rival.variant.nonlinear else 1):
         hypothesis = Hypothesis((*others, rival), 0.0)
-        values = _estimated(channel, beside.comparison(target), hypothesis)[-1]
+        own = np.unique(np.concatenate([m.columns for m in hypothesis.members]))
+        values = _estimated(channel, beside.comparison(target, own), hypothesis)[-1]
         if values is None or not values.any():
             return
         channel.refine(name, law, dict.fromkeys(sets, values), fit)

@@ -13,7 +13,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.impossible import impossible
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
-from dbbstation.inference.triangle import left_by
+from dbbstation.inference.triangle import left_by, triangle_of
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -165,16 +165,23 @@ def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], 
     bank = settled.bank
     own = np.concatenate([m.columns for m in other])
     effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]
-    beside = np.hstack([bank.base, *(bank.fitted(m.columns) for m in others)])
-    forms = [np.hstack([bank.fitted(m.columns) for m in one])]
     law = bank.laws.get(one[0].cause.name) if len(one) == 1 else None
-    if law is not None and law.grids:
-        forms += [bank.whitened(law.columns(point)) for point in product(*((grid[0], grid[-1]) for grid in law.grids))]
-    left = float(np.sum(np.square(left_by(beside, effect))))
-    return any(
-        float(np.sum(np.square(left_by(np.hstack([beside, form]), effect)))) <= (1.0 - EQUIVALENT**2) * left
-        for form in forms
+    corners = product(*((grid[0], grid[-1]) for grid in law.grids)) if law is not None and law.grids else ()
+    parts = [
+        bank.base,
+        bank.fitted(np.concatenate([m.columns for m in (*others, *one)])),
+        *(bank.whitened(law.columns(point)) for point in corners if law is not None),
+    ]
+    widths = [part.shape[1] for part in parts]
+    beside = widths[0] + sum(len(m.columns) for m in others)
+    # An orthogonal transform keeps what each fit leaves: the triangle has as many rows as columns.
+    rows = triangle_of(np.hstack([*parts, effect[:, None]]))
+    always, *each = np.split(rows[:, :-1], [beside, *np.cumsum(widths)[1:-1]], axis=1)
+    left, *alone = (
+        float(np.sum(np.square(left_by(columns, rows[:, -1]))))
+        for columns in (always, *(np.hstack([always, form]) for form in each))
     )
+    return min(alone) <= (1.0 - EQUIVALENT**2) * left
 
 
 def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> bool:

@@ -23,8 +23,8 @@ def triangle_of(stacked: Floats) -> Floats:
     slab = max(BOUNDS.slab, 4 * columns)  # each round leaves at most a quarter of the rows
     while len(stacked) >= 2 * slab:
         whole = len(stacked) // slab * slab
-        triangles = np.asarray(np.linalg.qr(stacked[:whole].reshape(-1, slab, columns), mode="r"), dtype=np.float64)
-        stacked = np.concatenate([triangles.reshape(-1, columns), stacked[whole:]])
+        slabs = np.split(stacked[:whole], whole // slab)  # one at a time: a factorisation copies its matrix
+        stacked = np.concatenate([*(np.linalg.qr(one, mode="r") for one in slabs), stacked[whole:]])
     triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
     if not np.isfinite(triangle).all():
         raise ValueError("measurements and their derivatives must be numbers")
@@ -44,7 +44,7 @@ def axes_of(columns: Floats, least: float = RANK) -> Floats:
 def left_by(columns: Floats, values: Floats) -> Floats:
     """Return the residual of values, shape (n,), after a least-squares fit of columns, shape (n, k)."""
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0])
+    return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=RANK)[0])
 
 
 def rms(values: Floats) -> float:

@@ -382,7 +382,7 @@ class ModelComparison:
         # Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
         columns, sd = _stacked(members)
         information = self._information(columns, sd)
-        inverse = np.linalg.inv(information)
+        inverse = cho_solve((cholesky(information), True), np.eye(len(sd)))
         values = inverse @ (sd * self._towards[self._at(columns)])
         found = []
         for member, every in zip(members, slices_of(members), strict=True):

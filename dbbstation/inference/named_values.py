@@ -141,6 +141,7 @@ _NAMES = {
     "wave": ("cosine", "sine", *(f"{name} {k}" for k in range(2, max(HARMONICS) + 1) for name in ("cosine", "sine"))),
     "hysteresis": ("half width",),
     "speed": ("per speed",),
+    "drag": ("coefficient",),
     "lag": ("delay",),
     "product": ("coefficient",),
     "bump": ("height",),

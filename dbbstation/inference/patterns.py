@@ -41,6 +41,7 @@ class Family(StrEnum):
     TWICE = "twice per turn"
     HYSTERESIS = "hysteresis"
     SPEED = "speed"
+    DRAG = "drag"
     LAG = "lag"
     MEMORY = "memory"
     DEAD_TIME = "dead time"
@@ -69,6 +70,7 @@ NAMED = frozenset(
         Family.TWICE,
         Family.HYSTERESIS,
         Family.SPEED,
+        Family.DRAG,
         Family.LAG,
         Family.DRIFT,
         Family.PRODUCT,
@@ -119,6 +121,7 @@ _JOIN = {
     Family.TWICE: " of ",
     Family.HYSTERESIS: " of ",
     Family.SPEED: " of ",
+    Family.DRAG: " of ",
     Family.LAG: " of ",
     Family.DRIFT: " with ",
     Family.PRODUCT: " of ",
@@ -141,6 +144,8 @@ def patterns(
     """
     usable = [v for v in variables if v.distinct >= 2]  # noqa: PLR2004 - a constant has no effect
     found = [pattern for v in usable for pattern in _over(v)]
+    # A speed and the rate of its path would be two names of one drag.
+    speeds = [(v, v.values, f"({v.unit})") for v in usable if v.kind is Kind.SPEED]
     if time is not None:
         for variable in usable:
             if variable.kind in TRAVELS:
@@ -148,9 +153,12 @@ def patterns(
         late = simulated.name if simulated is not None else ""
         paths = [v for v in usable if v.kind in TRAVELS and v.name != late and v.is_path(blocks)]
         found += [_speed(v, time, blocks, f"/({v.unit or v.name}/{time_unit})") for v in paths]
+        places = [v for v in paths if v.kind in {Kind.ANGLE, Kind.LENGTH}]
+        speeds = speeds or [(v, v.rates(time, blocks), f"({v.unit}/{time_unit})") for v in places]
         if simulated is not None and simulated.is_path(blocks):
             # A delay T shifts a value by T times its rate.
             found.append(_speed(simulated, time, blocks, time_unit, Family.LAG))
+    found += [_drag(v, rate, unit) for v, rate, unit in speeds]
     found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
     if len(blocks) > 1:
         found.append(_of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
@@ -256,6 +264,13 @@ def _speed(
     if family is Family.LAG:
         rate = -rate
     return Pattern(family, (variable,), rate[:, None] / size, None, (unit,), (size,))
+
+
+def _drag(variable: Variable, rate: Floats, unit: str) -> Pattern:
+    """Return the square of a speed, against it [Landau and Lifshitz, Fluid Mechanics, 2nd ed., sec. 45]."""
+    size = float(np.abs(rate).max(initial=0.0)) or 1.0
+    samples = rate * np.abs(rate) / size**2
+    return Pattern(Family.DRAG, (variable,), samples[:, None], None, (f"/{unit}²",), (size**2,))
 
 
 def _product(one: Variable, other: Variable) -> Pattern:

@@ -19,6 +19,7 @@ MEANINGS: dict[Family, str] = {
     Family.TWICE: "It has two periods per turn: a part is oval, or an axis wobbles.",
     Family.HYSTERESIS: "Its sign changes with the direction of travel: play or friction. Positive is more while this variable rises.",
     Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
+    Family.DRAG: "It grows with the square of the speed: drag of a fluid, or turbulent flow.",
     Family.LAG: "The measured value lags behind the simulated one (negative: leads).",
     Family.MEMORY: "It follows this variable late: a body warms up, a material creeps, a sensor or a filter lags.",
     Family.DEAD_TIME: "It follows this variable after a dead time: transport, a network, or a clock that is off.",

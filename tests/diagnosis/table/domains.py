@@ -41,6 +41,7 @@ class Scene:
         follows: variables that are right to name, any of them.
         laws: beginnings of names that are right.
         true: value of a constant by a word in its name.
+        parts: beginnings of names of a true part, which is not wrong and is no whole answer.
     """
 
     columns: dict[str, Values]
@@ -50,6 +51,7 @@ class Scene:
     laws: tuple[str, ...]
     true: dict[str, float] = field(default_factory=dict)
     derivatives: dict[str, Values] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()
 
 
 def smooth(rng: np.random.Generator, rows: int, width: float) -> Values:
@@ -163,6 +165,7 @@ def gyro(rng: np.random.Generator, t: Values) -> Scene:
         frozenset({"rate_v", SIMULATED}),
         ("integral of rate", "linear in simulated"),
         {"rate": gain},
+        parts=("drift with",),  # by the bias
     )
 
 
@@ -276,7 +279,8 @@ def pendulum(rng: np.random.Generator, t: Values) -> Scene:
         -1.3 * np.sin(angle),
         -drag * np.abs(rate) * rate,
         frozenset({"rate_rad_s", "swing_rad"}),
-        ("curve over rate",),
+        ("drag of rate", "curve over rate"),
+        {"coefficient": drag},
     )
 
 
@@ -410,7 +414,7 @@ def answer(name: str, seed: int, what: str) -> dict[str, object]:
         "wrong": any(not one & (truth | {TIME}) for one in named),
         "laws": laws,
         "right_law": any(law.startswith(scene.laws) for law in laws) and what == "effect",
-        "wrong_law": any(not law.startswith(scene.laws) or what != "effect" for law in laws),
+        "wrong_law": any(not law.startswith((*scene.laws, *scene.parts)) or what != "effect" for law in laws),
         "false_ruled_out": any(str(one.verdict) == "ruled-out" and one.name.startswith(scene.laws) for one in found.findings),
         "claimed": {str(v): [one.name for one in found.findings if one.verdict is v] for v in {one.verdict for one in found.findings}},
         "off_u": off_u(found, scene, laws) if what == "effect" else {},

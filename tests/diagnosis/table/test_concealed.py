@@ -2,7 +2,22 @@
 
 import pytest
 
+from tests.diagnosis.table import domains
 from tests.diagnosis.table.concealed import answer
+
+
+@pytest.mark.parametrize(("case", "size"), [("payload", 2.0), ("expansion", 5.0)])
+def test_a_product_is_named_without_its_lines(case, size):
+    """Its factors are zero at other places than the middles of their ranges."""
+    said = answer(case, 1, "averaged", size)
+    assert said["answer"] == "right", said
+
+
+def test_the_drag_of_air_is_named_with_its_coefficient():
+    said = domains.answer("pendulum", 103, what="effect")
+    assert said["laws"] == ["drag of rate_rad_s"]
+    assert abs(said["off_u"]["drag of rate_rad_s: coefficient"]) < 3.0
+    assert said["left"] < 0.02
 
 
 @pytest.mark.parametrize("case", ["load-cell", "creep", "dead-time"])

@@ -19,7 +19,7 @@ import numpy as np
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.compensate import compensate_toolpath
+from dbbstation.nc.compensate import compensated_parts
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
@@ -59,6 +59,12 @@ def zigzag() -> str:
     return "\n".join(["G21 G90 G94", "G64 P0.01", "G0 X-60 Y-40 Z-1000 A0 B0 C0", *lines, "M2", ""])
 
 
+def compensated(path: Toolpath, model: MachineModel) -> None:
+    """Compensate all parts of a program."""
+    for _ in compensated_parts(path, model):
+        pass
+
+
 def main() -> None:
     """Measure and print."""
     drawn = np.random.default_rng(SEED)
@@ -73,10 +79,10 @@ def main() -> None:
     for name, text in (("fourteen moves", FOURTEEN), ("eleven lines", zigzag())):
         path: Toolpath = read_program(text, f"{name}.ngc")
         model = MachineModel(replace(machine, acceleration_mm_s2=50_000.0), (struts,))
-        without = timed(partial(compensate_toolpath, path, model), 5)
+        without = timed(partial(compensated, path, model), 5)
         rows.append(Row(f"{name}, no history", without.best_s, "s"))
         for cause, fitted in remembered.items():
-            with_it = timed(partial(compensate_toolpath, path, replace(model, sources=(struts, fitted))), 5)
+            with_it = timed(partial(compensated, path, replace(model, sources=(struts, fitted))), 5)
             rows.append(Row(f"{name}, {cause}", with_it.best_s, "s"))
     show("programs under models with a history", rows, "best of five")
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import CommandCurve, felt_mm, row_and_share
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
@@ -17,14 +16,12 @@ from dbbstation.nc.splitting import (
     Pieces,
     along,
     looked_at,
-    moves_of,
     off_chord_mm,
     parts_of,
-    rows_as_pieces,
     runs_of,
     split,
 )
-from dbbstation.nc.toolpath import RowKind, joined, rounded
+from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -94,18 +91,11 @@ class Compensation:
         )
 
 
-@with_one_thread
-def compensate_toolpath(toolpath: Toolpath, model: MachineModel, **how: Any) -> Compensation:  # noqa: ANN401 - as below
-    """Return `compensated_parts` as one toolpath."""
-    parts = list(compensated_parts(toolpath, model, **how))
-    return Compensation.together(parts, joined([part.toolpath for part in parts]))
-
-
 def compensated_parts(
     toolpath: Toolpath,
     model: MachineModel,
     *,
-    chord_mm: float | None = CHORD_MM,
+    chord_mm: float = CHORD_MM,
     keep_arcs: bool = False,
     started_s: float | None = None,
     largest_mm: float = LARGEST_CORRECTION_MM,
@@ -116,7 +106,7 @@ def compensated_parts(
 
     Args:
         model: calibrated; only sources of the machine are inverted.
-        chord_mm: tolerance of the longest pieces; None: one move for each.
+        chord_mm: tolerance of the longest pieces.
         keep_arcs: keep the chords of arcs, chosen earlier for the feed.
         started_s: start of the program on the time scale of the model's sessions; None: unknown.
         largest_mm: greatest correction of the tip, and of a point `LEVER_MM` from it by the tilt.
@@ -130,7 +120,7 @@ def compensated_parts(
     commanded_before = toolpath.start
 
     def runs_in(part: Toolpath) -> Integers:
-        return moves_of(part) if chord_mm is None else runs_of(part, _needed_mm(part, planner))
+        return runs_of(part, planner.needed_mm(np.where(cuts(part), np.nan_to_num(part.feed) / 60.0, 0.0)))
 
     for path, runs in parts_of(toolpath, runs_in):
         whole = keep_arcs & (path.rows["arc_number"] != 0)
@@ -139,7 +129,7 @@ def compensated_parts(
         shift_mm = felt_mm(commanded - path.between(*row_and_share(pieces.end)))
         _check_corrections(path, pieces, shift_mm, largest_mm)
         off_mm = np.where(path.kind[pieces.row] == RowKind.FEED, off_mm, 0.0)
-        corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
+        corner_mm = 0.0 if keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
         done = _assembled(path, pieces, commanded, runs, model.machine, corner_mm, commanded_before)
         worst = int(np.argmax(off_mm)) if len(off_mm) else 0
         too_short = planner.row_mm_s(done) * 60.0
@@ -163,16 +153,13 @@ def compensated_parts(
 def _commanded(
     curve: CommandCurve,
     model: MachineModel,
-    chord_mm: float | None,
+    chord_mm: float,
     runs: Integers,
     whole: Flags,
 ) -> tuple[Pieces, Floats, Floats]:
     """Return pieces, poses to command at their ends, shape (k, 6) [mm, deg], and the curve's distance from them, shape (k,) [mm]."""
-    if chord_mm is None:
-        pieces = rows_as_pieces(curve.toolpath)
-    else:
-        pieces, ends, off_mm = split(curve, model, chord_mm, runs, whole=whole)
-    if chord_mm is None or curve.has_history:
+    pieces, ends, off_mm = split(curve, model, chord_mm, runs, whole=whole)
+    if curve.has_history:
         at = looked_at(curve, pieces, DENSELY)
         return pieces, at[:, -1], off_chord_mm(at, DENSELY)
     some = np.flatnonzero(np.isnan(off_mm))
@@ -194,11 +181,6 @@ def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: Floats, lar
         where=toolpath.where(int(pieces.row[worst])),
         remedy="check that the model is of this machine and its values are right; for a machine with such large errors, give --largest-correction-mm",
     )
-
-
-def _needed_mm(toolpath: Toolpath, planner: Planner) -> Floats:
-    mm_s = np.where(cuts(toolpath), np.nan_to_num(toolpath.feed) / 60.0, 0.0)
-    return np.where(cuts(toolpath), planner.needed_mm(mm_s), 0.0)
 
 
 def _assembled(

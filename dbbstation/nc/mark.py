@@ -106,12 +106,15 @@ def is_marked(toolpath: Toolpath) -> bool:
     for numbers in _known(toolpath):
         groups = zip(_GROUPS, least, strict=True)
         sums.append(np.column_stack([_sums(_numbers(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups]))
-    # What has few decimals has zeros as the further ones.
     place, angle = np.concatenate(sums).T
-    further = ((decimals[0] - least[0], decimals[3] - least[1]) for decimals in tried)
-    each = [place * np.uint64(10**more) + angle * np.uint64(10**turned) for more, turned in further]
-    count = _distinct(each[0])
-    return any(has_marks(one, count) for one in each)
+
+    def sums_with(decimals: Sequence[int]) -> NDArray[np.uint64]:
+        # What has few decimals has zeros as the further ones.
+        further = place * np.uint64(10 ** (decimals[0] - least[0]))
+        return further + angle * np.uint64(10 ** (decimals[3] - least[1]))
+
+    count = _distinct(sums_with(DECIMALS))
+    return any(has_marks(sums_with(decimals), count) for decimals in tried)
 
 
 def has_marks(sums: NDArray[np.uint64], count: int | None = None) -> bool:

@@ -12,23 +12,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
 
-def longest(
-    way: Floats,
-    curve: Floats,
-    may_end: Flags,
-    tolerance_mm: float,
-) -> Integers:
-    """Return the ends of pieces, each as long as the tolerance allows.
-
-    Args:
-        may_end: where pieces may end, besides first and last place, shape (n,).
-        tolerance_mm: from a place to the point of its piece at the same share of the way.
-    """
-    ends = may_end.copy()
-    ends[-1] = True
-    return _farthest(np.ascontiguousarray(way), np.ascontiguousarray(curve), ends, tolerance_mm)
-
-
 @compiled
 def _distance_mm(way: Floats, curve: Floats, start: int, end: int) -> float:
     worst = 0.0
@@ -47,23 +30,29 @@ def _distance_mm(way: Floats, curve: Floats, start: int, end: int) -> float:
 
 
 @compiled
-def _farthest(
-    way: Floats,
-    curve: Floats,
-    may_end: Flags,
-    tolerance_mm: float,
-) -> Integers:
+def longest(way: Floats, curve: Floats, may_end: Flags, must_end: Flags, tolerance_mm: float) -> Integers:
+    """Return the ends of pieces, each as long as the tolerance allows.
+
+    Args:
+        way: of the places that pieces may join, shape (n,).
+        curve: the commands there, shape (n, 6) [mm].
+        may_end: where pieces may end, shape (n,).
+        must_end: where they end in any case, shape (n,); the last place is one.
+        tolerance_mm: from a place to the point of its piece at the same share of the way.
+    """
     count = len(way)
     ended = np.zeros(count, np.int64)
     start = pieces = 0
     while start < count - 1:
         found = 0
         for end in range(start + 1, count):
-            if not may_end[end]:
+            if not (may_end[end] or must_end[end]):
                 continue
             if found > 0 and _distance_mm(way, curve, start, end) > tolerance_mm:
                 break
             found = end
+            if must_end[end]:
+                break
         ended[pieces] = found
         pieces += 1
         start = found

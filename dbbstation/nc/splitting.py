@@ -81,12 +81,6 @@ class Pieces:
         return np.where(shares == 1.0, self.end[:, None], inside)
 
 
-def rows_as_pieces(toolpath: Toolpath) -> Pieces:
-    """Return one piece for each row. For sources with a history, rapids are divided into steps."""
-    history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
-    return _in(toolpath, np.where(toolpath.kind == RowKind.RAPID, history, 1.0))
-
-
 def moves_of(toolpath: Toolpath) -> Integers:
     """Return the written move of each row, shape (n,); an arc is one move."""
     goes_on = np.zeros(len(toolpath), dtype=np.bool_)
@@ -175,46 +169,22 @@ def split(
     chosen = (toolpath.kind[row] == RowKind.FEED) & curve.leads_on[row] & ~whole[row]
     alone = np.bincount(number)[number] == 1
     chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
-    begins, ends, known = [cells.begin[~chosen]], [cells.end[~chosen]], [off_mm[~chosen]]
-    command = [at[~chosen][:, [0, -1]]]
-    places = cells.places(shares)
-    for of in _runs(number, chosen):
-        nodes = _Nodes(curve, cells.begin[of[0]], places[of], at[of], off_mm[of] > tolerance_mm)
-        ended = longest(nodes.way, in_mm(nodes.at), nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
-        begun = np.concatenate([[0], ended[:-1]])
-        begins.append(nodes.places[begun])
-        ends.append(nodes.places[ended])
-        command.append(nodes.at[np.column_stack([begun, ended])])
-        known.append(np.full(len(ended), np.nan))
-    order = np.argsort(np.concatenate(ends), kind="stable")
-    begin, end, commanded, off = (np.concatenate(each)[order] for each in (begins, ends, command, known))
-    return Pieces(begin, end), commanded, off
-
-
-class _Nodes:
-    """Points of one move that its pieces may join."""
-
-    def __init__(
-        self,
-        curve: CommandCurve,
-        begin: float,
-        places: Floats,
-        at: Floats,
-        steps: Flags,
-    ) -> None:
-        toolpath = curve.toolpath
-        self.places = np.concatenate([[begin], places.reshape(-1)])
-        self.at = np.vstack([at[0, :1], at[:, 1:].reshape(-1, 6)])
-        # A cell with a step in it is not cut again.
-        inner = np.ones(places.shape, dtype=np.bool_)
-        inner[steps, :-1] = False
-        self.may_end = np.concatenate([[True], inner.reshape(-1)])
-        row, share = row_and_share(self.places[1:])
-        length = toolpath.tip_mm if toolpath.tip_mm[row].any() else toolpath.turn_deg
-        behind = np.concatenate([[0.0], np.cumsum(length[row[0] : row[-1] + 1])])
-        way = behind[row - row[0]] + share * length[row]
-        first = (begin - row[0]) * length[row[0]]
-        self.way = np.concatenate([[first], way])
+    may_end, must_end = np.zeros((2, *at[:, 1:, 0].shape), dtype=np.bool_)
+    # A cell with a step in it is not cut again.
+    may_end[chosen & (off_mm <= tolerance_mm)] = may_end[:, -1] = True
+    must_end[:-1, -1], must_end[-1:, -1] = (number[1:] != number[:-1]) | ~chosen[1:] | ~chosen[:-1], True
+    nodes = np.vstack([at[:1, 0], at[:, 1:].reshape(-1, 6)])
+    places = np.concatenate([cells.begin[:1], cells.places(shares).reshape(-1)])
+    node_row, share = row_and_share(places)
+    way = np.where(np.bincount(runs, weights=toolpath.tip_mm)[runs] > 0.0, toolpath.tip_mm, toolpath.turn_deg)
+    behind = np.cumsum(way) - way
+    way = behind[node_row] + share * way[node_row]
+    may, must = (np.concatenate([[False], each.reshape(-1)]) for each in (may_end, must_end))
+    ended = longest(way, in_mm(nodes), may, must, OF_THE_TOLERANCE * tolerance_mm)
+    begun = np.concatenate([[0], ended[:-1]])
+    cell = (ended - 1) // len(shares)
+    known = np.where(chosen[cell], np.nan, off_mm[cell])
+    return Pieces(places[begun], places[ended]), nodes[np.column_stack([begun, ended])], known
 
 
 def off_chord_mm(at: Floats, shares: Floats) -> Floats:
@@ -329,9 +299,3 @@ def _check_number(toolpath: Toolpath, cells: float) -> None:
     if cells > MOST_CELLS:
         what = f"the path is too long to be compensated at once: {cells:.0f} pieces, at most {MOST_CELLS}"
         raise StationError(what, where=toolpath.name, remedy="compensate it in parts, or allow a larger chord error")
-
-
-def _runs(number: Integers, chosen: Flags) -> Iterator[Integers]:
-    which = np.flatnonzero(chosen)
-    if len(which):
-        yield from np.split(which, np.flatnonzero(np.diff(number[which])) + 1)

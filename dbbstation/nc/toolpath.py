@@ -296,7 +296,7 @@ class Toolpath:
             arc = self.arc[row[chord]]
             plane = PLANES[arc[:, 3].astype(np.int64)]
             first, last = (np.take_along_axis(each[chord], plane, axis=1) for each in (before, after))
-            inside[chord[:, None], plane] = _on_arc(first, last, arc, share[chord])
+            inside[chord[:, None], plane] = on_arc(first, last, arc, share[chord])
         # The end of a row is its programmed pose to the last bit.
         return np.where(share[:, None] == 1.0, after, inside)
 
@@ -507,12 +507,14 @@ def bits_of(axes: Flags) -> int:
     return int(axes @ (1 << np.arange(6)))
 
 
-def _on_arc(
-    before: Floats,
-    after: Floats,
-    arc: Floats,
-    share: Floats,
-) -> Floats:
+def on_arc(before: Floats, after: Floats, arc: Floats, share: Floats) -> Floats:
+    """Return points at shares of arcs in their planes, shape (k, 2) [mm]; the radius changes evenly.
+
+    Args:
+        before: begin of each arc, shape (k, 2), or of one arc for all shares, shape (1, 2) [mm].
+        after: end of each arc, of the same shape.
+        arc: as in `Toolpath.arcs`; the plane is not needed.
+    """
     centre, turned = arc[:, :2], share * arc[:, 2]
     first, last = before - centre, after - centre
     radius = np.linalg.norm(first, axis=1)

@@ -6,10 +6,10 @@ import numpy as np
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
+from tests.nc.whole import compensate_toolpath
 from tests.plant.hexapod import strut_lengths
 from tests.plant.machine import reference_machine
 from tests.plant.mechanisms.play_operator import follower

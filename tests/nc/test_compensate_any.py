@@ -9,10 +9,10 @@ from dbbstation.errors import ModelError, StationError, TravelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
+from tests.nc.whole import compensate_toolpath
 
 PART = """\
 G21 G90 G94

@@ -9,11 +9,12 @@ import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import arc_phi_deg, chord_error_mm, circle_toolpath
-from dbbstation.nc.compensate import Prefer, compensate_toolpath
+from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.nc.toolpath import RowKind, Toolpath, in_pieces
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Motion
+from tests.nc.whole import compensate_toolpath
 
 
 def reached(model: MachineModel, poses: np.ndarray) -> np.ndarray:
@@ -92,7 +93,7 @@ def test_a_machine_without_errors_gets_the_nominal_program(linuxcnc, table2, ref
 
 def test_nominal_and_compensated_programs_differ_in_numbers_only(linuxcnc, all_runs, crooked):
     path = circle_toolpath(all_runs[4], "x")
-    done = compensate_toolpath(path, crooked, chord_mm=None).toolpath
+    done = compensate_toolpath(path, crooked, keep_arcs=True).toolpath
     np.testing.assert_array_equal(done.kind, path.kind)
     np.testing.assert_array_equal(done.feed_mm_min, path.feed_mm_min)
     assert done.text == path.text

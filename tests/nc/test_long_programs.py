@@ -9,11 +9,11 @@ import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc import splitting
-from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.splitting import parts_of, runs_of
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
+from tests.nc.whole import compensate_toolpath
 
 GAPS_UM = np.array([3.0, 5.0, 2.0, 4.0, 6.0, 1.0])
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import StationError
-from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.mark import BITS, BY_CHANCE, _has_mark, _numbers, _sums, is_marked, marked
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import DECIMALS
+from tests.nc.whole import compensate_toolpath
 
 PART = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X20 F500\nG4 P0.5\nG1 Y5 A2\nX7 Y7\nX0 Y9\nX3 Y0\nM0\nG0 Z-950\nM2\n"
 
@@ -127,7 +127,7 @@ def test_the_chance_is_what_is_said():
 def test_the_mark_moves_no_tip_where_the_angles_move(crooked, table2):
     from dbbstation.nc.circle_program import circle_toolpath  # noqa: PLC0415
 
-    done = compensate_toolpath(circle_toolpath(table2.tests["g"].circle, "g"), crooked, chord_mm=None).toolpath
+    done = compensate_toolpath(circle_toolpath(table2.tests["g"].circle, "g"), crooked, keep_arcs=True).toolpath
     with_mark = marked(done)
     assert is_marked(with_mark)
     off = np.abs(with_mark.poses - done.poses)[done.is_move]

@@ -15,7 +15,6 @@ from dbbstation.errors import InputError, MachineError, StationError
 from dbbstation.machine.geometry import GREATEST_FEED_MM_MIN
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.rs274.blocks import LONGEST_BYTES
@@ -34,6 +33,7 @@ from dbbstation.sources.contract import (
     Texts,
 )
 from dbbstation.sources.registry import known_sources
+from tests.nc.whole import compensate_toolpath
 
 FIRST = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
 

@@ -12,7 +12,7 @@ import pytest
 from dbbstation.errors import StationError
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.compensate import Prefer, compensate_toolpath
+from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.curve import felt_mm
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
@@ -21,6 +21,7 @@ from dbbstation.nc.planner import LookAhead, Planner
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from tests.nc.test_compensate_any import Wound
+from tests.nc.whole import compensate_toolpath
 
 SLOW = Planner(1000.0, LookAhead(0.5))
 
@@ -48,7 +49,8 @@ def drawn(seed, count=9):
 def test_pieces_keep_the_tolerance_and_are_nearly_as_few_as_any_cut_allows(seed):
     way, curve = drawn(seed)
     tolerance = 0.15
-    ended = (0, *longest(way, curve, np.ones(len(way), dtype=bool), tolerance).tolist())
+    may_end, must_end = np.ones(len(way), dtype=bool), np.arange(len(way)) == len(way) - 1
+    ended = (0, *longest(way, curve, may_end, must_end, tolerance).tolist())
     pieces = list(pairwise(ended))
     # Neighbours may always be joined: there is nothing between them.
     assert all(distance(way, curve, a, b) <= tolerance for a, b in pieces)
@@ -103,7 +105,7 @@ def test_what_is_reported_is_looked_for_at_many_places(linuxcnc, reference):
     """A wave whose zeros are at begin, middle and end of each cell that is looked at first: 50 mm of 25 mm."""
     model = MachineModel(reference, (Fitted(Wave(), np.array([0.01])),))
     path = linuxcnc.read("G21 G90\nG0 X-100 Y0 Z-1000 A0 B0 C0\nG1 X100 F600\nM2\n", "line.ngc")
-    done = compensate_toolpath(path, model, chord_mm=None)
+    done = compensate_toolpath(path, model, chord_mm=1.0)
     # One move for the line: it leaves the curve by the whole wave, about 10 µm times the height over the strut's way.
     row = np.flatnonzero(done.toolpath.kind == RowKind.FEED)
     share = np.linspace(0.0, 1.0, 1001)
@@ -135,7 +137,7 @@ def test_the_chord_error_is_that_of_all_places_of_a_piece(linuxcnc, reference):
     """A piece whose ends and whose middle lie on it: a whole wave, against 800 places of the inverse itself."""
     model = MachineModel(reference, (Fitted(Waved(), np.array([0.02])),))
     path = linuxcnc.read("G21 G90\nG0 X-50 Y0 Z-1000 A0 B0 C0\nG1 X50 F1000\nM2\n", "line.ngc")
-    done = compensate_toolpath(path, model, chord_mm=None)
+    done = compensate_toolpath(path, model, chord_mm=1.0)
     share = np.linspace(0.0, 1.0, 801)
     at = compensated(model, Motion(poses=path.between(np.ones(801, dtype=np.int64), share), is_path=True))
     off_um = 1e3 * felt_mm(at - (at[0] + share[:, None] * (at[-1] - at[0])))

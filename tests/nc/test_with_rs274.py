@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RowKind
 from tests.nc.interpreter import calls, events, needs_rs274
 from tests.nc.test_fuzz_rs274 import difference
+from tests.nc.whole import compensate_toolpath
 
 pytestmark = needs_rs274
 
@@ -57,7 +57,7 @@ def moves(calls) -> np.ndarray:
 @pytest.mark.parametrize("test", ["a", "g", "o"])
 def test_it_reads_nominal_and_compensated_circles_as_meant(canonical, linuxcnc, table2, crooked, test):
     path = circle_toolpath(table2.tests[test].circle, "run")
-    for written in (path, compensate_toolpath(path, crooked, chord_mm=None).toolpath):
+    for written in (path, compensate_toolpath(path, crooked, keep_arcs=True).toolpath):
         calls = canonical(linuxcnc.write(written, ["header (with) brackets", "x" * 400]))
         np.testing.assert_allclose(moves(calls), written.poses[written.is_move], rtol=0.0, atol=0.51e-4)
         assert [numbers for name, numbers in calls if name == "DWELL"] == [[1.0], [0.3], [0.3], [1.0]]

@@ -45,28 +45,28 @@ def arc_of(
     turns, start = _turns(block), state.pose
     if radius is not None:
         if any(offsets):
-            raise block.place.fault(radius.column, "an arc has R, or I, J and K, not both", "remove one")
+            raise block.fault("an arc has R, or I, J and K, not both", "remove one", radius)
         by_radius = centre_by_radius(start[axes], target[axes], radius.value * state.unit_mm, clockwise=clockwise)
         if by_radius is None:
             what = f"no arc of R{radius.value:g} leads from the point before to this one"
-            raise block.place.fault(radius.column, what, "check R, or write a full turn with its centre")
+            raise block.fault(what, "check R, or write a full turn with its centre", radius)
         return Arc(start, target, by_radius, clockwise=clockwise, turns=turns, plane=plane)
     if not any(offsets):
         letters = " and ".join(CENTRES[axis] for axis in sorted(axes))
-        raise block.place.fault(column, f"{code} needs {letters}, or R", "give the centre")
+        raise block.fault(f"{code} needs {letters}, or R", "give the centre", column)
     centre = np.array([0.0 if word is None else word.value * state.unit_mm for word in offsets])
     if not absolute:
         centre += start[axes]
     elif not all(offsets):
         letters = " and ".join(CENTRES[axis] for axis in sorted(axes))
-        raise block.place.fault(column, f"G90.1 needs both {letters}", "give both, or G91.1")
+        raise block.fault(f"G90.1 needs both {letters}", "give both, or G91.1", column)
     else:
         centre += np.array(state.offset)[axes]
     arc = Arc(start, target, (float(centre[0]), float(centre[1])), clockwise=clockwise, turns=turns, plane=plane)
     if not arc.is_round(state.unit_mm):
         first, last = arc.radii_mm()
         what = f"start and end of the arc lie {first:.4f} and {last:.4f} mm from its centre"
-        raise block.place.fault(column, what, "check end point and centre")
+        raise block.fault(what, "check end point and centre", column)
     return arc
 
 
@@ -84,7 +84,7 @@ def curve_of(block: ProgramBlock, state: ControlState, target: Floats) -> Floats
     words = [word.value for letter in letters if (word := block.words.pop(letter, None)) is not None]
     if len(words) < len(letters):
         what = f"{name('G', code.value)} needs {', '.join(letters)}"
-        raise block.place.fault(code.column, what, "give the control points")
+        raise block.fault(what, "give the control points", code)
     offsets = np.array(words).reshape(-1, 2) * state.unit_mm
     begin, end = state.pose[:2], target[:2]
     points = np.array([begin, begin + offsets[0], *(end + offsets[1:]), end])[:, None]
@@ -105,5 +105,5 @@ def _turns(block: ProgramBlock) -> int:
     if word is None:
         return 1
     if word.value < 1.0 or word.value != int(word.value):
-        raise block.place.fault(word.column, f"P{word.value:g} is not a number of turns", "give a whole number from 1")
+        raise block.fault(f"P{word.value:g} is not a number of turns", "give a whole number from 1", word)
     return int(word.value)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.toolpath import PLANES
+from dbbstation.nc.toolpath import PLANES, on_arc
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -55,9 +55,8 @@ class Arc:
 
     def radii_mm(self) -> tuple[float, float]:
         """Return distances of start and end from the centre [mm]."""
-        (x, y), (first, second) = self.centre_mm, PLANES[self.plane]
-        ends = (math.hypot(pose[first] - x, pose[second] - y) for pose in (self.start, self.end))
-        return next(ends), next(ends)
+        plane = PLANES[self.plane]
+        return math.dist(self.start[plane], self.centre_mm), math.dist(self.end[plane], self.centre_mm)
 
     def is_round(self, unit_mm: float) -> bool:
         """Return whether both ends lie on one circle within LinuxCNC's tolerance."""
@@ -70,7 +69,8 @@ class Arc:
     @property
     def swept_rad(self) -> float:
         """Return the angle from start to end in the arc's direction, over all turns."""
-        begin, end = (self._angle_rad(pose) for pose in (self.start, self.end))
+        plane = PLANES[self.plane]
+        begin, end = (math.atan2(*(pose[plane] - self.centre_mm)[::-1]) for pose in (self.start, self.end))
         swept = math.fmod(end - begin if not self.clockwise else begin - end, math.tau)
         while swept <= FULL_TURN_RAD:
             swept += math.tau
@@ -96,19 +96,13 @@ class Arc:
 
     def poses(self) -> Floats:
         """Return end points of the chords, shape (k, 6) [mm, deg]."""
-        (x, y), (first, last) = self.centre_mm, self.radii_mm()
         turned = -self.swept_rad if self.clockwise else self.swept_rad
-        share = np.arange(1, self.chords + 1) / self.chords
+        share, plane = np.arange(1, self.chords + 1) / self.chords, PLANES[self.plane]
         poses = self.start + share[:, None] * (self.end - self.start)
-        radius, angle = first + share * (last - first), self._angle_rad(self.start) + share * turned
-        poses[:, PLANES[self.plane, 0]] = x + radius * np.cos(angle)
-        poses[:, PLANES[self.plane, 1]] = y + radius * np.sin(angle)
+        ends = self.start[None, plane], self.end[None, plane]
+        poses[:, plane] = on_arc(*ends, np.array([[*self.centre_mm, turned]]), share)
         poses[-1] = self.end
         return poses
-
-    def _angle_rad(self, pose: Floats) -> float:
-        first, second = PLANES[self.plane]
-        return math.atan2(pose[second] - self.centre_mm[1], pose[first] - self.centre_mm[0])
 
 
 def centre_by_radius(

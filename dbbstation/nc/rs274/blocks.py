@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.nc.rs274 import codes
 from dbbstation.nc.rs274.codes import ModalGroup
-from dbbstation.nc.rs274.tokens import Comment, ParameterSetting, Place, Word, tokens, unknown_value
+from dbbstation.nc.rs274.tokens import BadLine, Comment, ParameterSetting, Place, Word, tokens, unknown_value
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,6 +50,11 @@ class ProgramBlock:
         """Return the column of the first word that is neither code nor line number; if there is none, of the first code."""
         words = [word.column for word in self.words.values()]
         return min(words) if words else next((word.column for word in self.codes.values()), 1)
+
+    def fault(self, what: str, remedy: str, at: Word | Comment | int | None = None) -> BadLine:
+        """Return the exception for a fault at a word, a column or the first word."""
+        column = self.first_column if at is None else at if isinstance(at, int) else at.column
+        return self.place.fault(column, what, remedy)
 
 
 def block_of(line: str, place: Place, value_of: Callable[[int | str], float | None] = unknown_value) -> ProgramBlock:
@@ -106,7 +111,7 @@ def _take_comment(block: ProgramBlock, comment: Comment) -> None:
     text = comment.text.lstrip(BLANKS)
     if _PYTHON.match(text):
         what = "a comment that runs Python in the control, which may move it"
-        raise block.place.fault(comment.column, what, "post the program without it")
+        raise block.fault(what, "post the program without it", comment)
     if comment.bracketed and block.message:
         block.comments.append(block.message.rstrip(BLANKS))
         block.message = ""
@@ -126,11 +131,11 @@ def _take_code(block: ProgramBlock, word: Word) -> None:
         return
     name = codes.name(word.letter, word.value)
     if group is None:
-        raise block.place.fault(word.column, f"{name} is not read", codes.remedy(word.letter, word.value))
+        raise block.fault(f"{name} is not read", codes.remedy(word.letter, word.value), word)
     if group in block.codes:
         other = block.codes[group]
         what = f"{name} and {codes.name(other.letter, other.value)} exclude each other in one line ({group})"
-        raise block.place.fault(word.column, what, "write them in separate lines, or remove one")
+        raise block.fault(what, "write them in separate lines, or remove one", word)
     block.codes[group] = word._replace(value=value)
 
 

@@ -83,7 +83,7 @@ class ModalCycle:
         lacking = {"Z", "R", *(["Q"] if code in PECKS else [])} - numbers.keys()
         if lacking:
             what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
-            raise block.place.fault(column, what, "give them in its line")
+            raise block.fault(what, "give them in its line", column)
         unknown = [each for each, at in zip(AXES, state.pose, strict=True) if np.isnan(at)]
         up = self.begun_at
         if unknown or math.isnan(up):
@@ -91,12 +91,12 @@ class ModalCycle:
         clear = numbers["R"] + (offset if absolute else up)
         bottom = numbers["Z"] + (offset if absolute else clear)
         if bottom > clear or (code in PECKS and numbers["Q"] <= 0.0):
-            raise block.place.fault(column, "a cycle goes down from R to Z, by a positive Q", "check R, Z and Q")
+            raise block.fault("a cycle goes down from R to Z, by a positive Q", "check R, Z and Q", column)
         if code in PECKS and (clear - bottom) / numbers["Q"] > MOST_PECKS:
-            raise block.place.fault(column, f"more than {MOST_PECKS} pecks in one hole", "check Q")
+            raise block.fault(f"more than {MOST_PECKS} pecks in one hole", "check Q", column)
         if self.to_clear is None and up > clear:
             what = "neither G98 nor G99 says how high a cycle ends, and controls differ in what they begin with"
-            raise block.place.fault(column, what, "write G98 or G99 before it")
+            raise block.fault(what, "write G98 or G99 before it", column)
         return Depths(clear, bottom, clear if self.to_clear else max(up, clear), numbers.get("Q", 0.0))
 
 

@@ -16,7 +16,6 @@ NUMBER = re.compile(r"[+-]?+[ \t]*+(?:[0-9][0-9 \t]*+(?:\.[0-9 \t]*+)?+|\.[ \t]*
 """Pattern of a number. White space inside it is legal: LinuxCNC reads `X1 0` as X10. Every repeat is possessive, so
 that no line is searched twice."""
 
-_BLANK = re.compile(r"[ \t]*+")
 _WORD = re.compile(r"[A-Za-z]+")
 _OPERATOR = re.compile(r"\*\*|[-+*/]|MOD|AND|XOR|OR|EQ|NE|GT|GE|LT|LE", re.IGNORECASE)
 
@@ -72,6 +71,16 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 }
 
 
+def closed_up(text: str) -> str:
+    """Return a text without blanks and tabs."""
+    return text.replace(" ", "").replace("\t", "")
+
+
+def shown(which: int | str) -> str:
+    """Return a parameter as people write it: #5, #<depth>."""
+    return f"#{which}" if isinstance(which, int) else f"#<{which}>"
+
+
 class ValueReader:
     """Reads successive values of one line from a position.
 
@@ -91,12 +100,11 @@ class ValueReader:
         Raises:
             BadLine: there is none, or it has no value.
         """
-        self._skip()
-        number = NUMBER.match(self._text, self.position)
+        letter, at = self.blanks(), self.position
+        number = NUMBER.match(self._text, at)
         if number is not None:
             self.position = number.end()
-            return float(number[0].replace(" ", "").replace("\t", ""))
-        at, letter = self.position, self._peek()
+            return float(closed_up(number[0]))
         if letter in {"+", "-"}:
             self.position += 1
             return self.value() if letter == "+" else -self.value()
@@ -117,8 +125,7 @@ class ValueReader:
 
     def bracket(self) -> float:
         """Return the value of an expression in brackets."""
-        at = self.position
-        self._expect("[")
+        at = self._expect("[")
         self._depth += 1
         if self._depth > DEEPEST:
             raise self._place.fault(at + 1, f"more than {DEEPEST} nested brackets", "write it in several lines")
@@ -129,14 +136,12 @@ class ValueReader:
 
     def parameter(self) -> int | str:
         """Return the number or lower-case name of the parameter at this position."""
-        at = self.position
-        self._expect("#")
-        self._skip()
-        if self._peek() == "<":
+        at = self._expect("#")
+        if self.blanks() == "<":
             end = self._text.find(">", self.position)
             if end < 0:
                 raise self._place.fault(at + 1, "the name of a parameter lacks its closing >", "close it")
-            name = re.sub(r"[ \t]", "", self._text[self.position + 1 : end]).lower()
+            name = closed_up(self._text[self.position + 1 : end]).lower()
             self.position = end + 1
             return name
         number = self.value()
@@ -150,15 +155,15 @@ class ValueReader:
 
     def blanks(self) -> str:
         """Skip blanks and return the next character; empty at the end."""
-        self._skip()
-        return self._peek()
+        while self._text[self.position : self.position + 1] in {" ", "\t"}:
+            self.position += 1
+        return self._text[self.position : self.position + 1]
 
     def _parameter_value(self) -> float:
         at, which = self.position, self.parameter()
         value = self._value_of(which)
         if value is None:
-            name = f"#{which}" if isinstance(which, int) else f"#<{which}>"
-            what = f"{name} is read before the program sets it: its value is the control's"
+            what = f"{shown(which)} is read before the program sets it: its value is the control's"
             raise self._place.fault(
                 at + 1, what, "set it in the program, or give LinuxCNC's parameter file with --parameters"
             )
@@ -168,34 +173,26 @@ class ValueReader:
         at, name = self.position, word[0].upper()
         self.position = word.end()
         if name == "EXISTS":
-            return self._exists()
+            self._expect("[")
+            which = self.parameter()
+            self._expect("]")
+            return float(self._value_of(which) is not None)
         if name != "ATAN" and name not in _FUNCTIONS:
             raise self._place.fault(
                 at + 1, f"{word[0]!r} is no function", f"write a number, or one of {', '.join(_FUNCTIONS)}"
             )
-        self._skip()
         first = self.bracket()
         if name != "ATAN":
             return self._computed(at, _FUNCTIONS[name], first)
-        self._skip()
         self._expect("/")
-        self._skip()
         return math.degrees(math.atan2(first, self.bracket()))
-
-    def _exists(self) -> float:
-        self._skip()
-        self._expect("[")
-        self._skip()
-        which = self.parameter()
-        self._expect("]")
-        return float(self._value_of(which) is not None)
 
     def _level(self, level: int) -> float:
         if level == len(_LEVELS):
             return self.value()
         value = self._level(level + 1)
         while True:
-            self._skip()
+            self.blanks()
             sign = _OPERATOR.match(self._text, self.position)
             made = None if sign is None else _LEVELS[level].get(sign[0].upper())
             if sign is None or made is None:
@@ -214,21 +211,13 @@ class ValueReader:
             raise self._place.fault(at + 1, "this has no value", "check the expression")
         return value
 
-    def _expect(self, letter: str) -> None:
-        self._skip()
-        if self._peek() != letter:
-            raise self._place.fault(
-                self.position + 1, f"{letter!r} is missing here", "check the brackets of the expression"
-            )
+    def _expect(self, letter: str) -> int:
+        """Skip a character; return its index."""
+        found, at = self.blanks(), self.position
+        if found != letter:
+            raise self._place.fault(at + 1, f"{letter!r} is missing here", "check the brackets of the expression")
         self.position += 1
-
-    def _peek(self) -> str:
-        return self._text[self.position : self.position + 1]
-
-    def _skip(self) -> None:
-        match = _BLANK.match(self._text, self.position)
-        if match is not None:
-            self.position = match.end()
+        return at
 
 
 MOST_PARAMETER = 5602

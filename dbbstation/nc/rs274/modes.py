@@ -12,6 +12,7 @@ from dbbstation.nc.rs274.arc_words import CENTRES
 from dbbstation.nc.rs274.codes import CURVES, CYCLES, STORED, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
+from dbbstation.nc.rs274.expressions import shown
 from dbbstation.nc.rs274.flow import Flow
 from dbbstation.nc.rs274.state import AXES, ControlState
 from dbbstation.nc.toolpath import (
@@ -133,13 +134,12 @@ class Modes:
         if any(self._state.g92):
             self._hold("G92", self._state.g92)
 
-    def _set(self, block: ProgramBlock, which: int | str, value: float, column: int) -> None:
-        if (isinstance(which, int) and which > LAST_OWN) or (
-            isinstance(which, str) and self._state.parameter(which) is not None
-        ):
-            what = f"#{which if isinstance(which, int) else f'<{which}>'} is the control's own"
-            raise block.place.fault(column, what, "set offsets with G10 L2, and lengths with --tool-lengths-mm")
-        self.flow.set(which, value)
+    def _set(self, block: ProgramBlock) -> None:
+        for which, value, column in block.settings:
+            if which > LAST_OWN if isinstance(which, int) else self._state.parameter(which) is not None:
+                what = f"{shown(which)} is the control's own"
+                raise block.fault(what, "set offsets with G10 L2, and lengths with --tool-lengths-mm", column)
+            self.flow.set(which, value)
 
     def _said(self, block: ProgramBlock) -> None:
         for comment in block.comments:
@@ -171,9 +171,11 @@ class Modes:
             said = f"F{block.words['F'].value:g} in the line of G20 counts in millimetres, as in LinuxCNC; inches would be faster"
             self.path.notes += (f"{block.place}: {said}",)
         elif unit_mm != self._state.unit_mm and "F" in block.words:
-            column, code = block.words["F"].column, name("G", units)
+            code = name("G", units)
             what = f"F in the line of {code} counts in the units before it on some controls and after it on others"
-            self._unsure_feed = block.place.fault(column, what, f"write {code} in a line before, or F in the next cut")
+            self._unsure_feed = block.fault(
+                what, f"write {code} in a line before, or F in the next cut", block.words["F"]
+            )
         self._state.unit_mm = unit_mm
 
     def _feed(self, block: ProgramBlock) -> None:
@@ -186,21 +188,21 @@ class Modes:
         word = block.words.pop("F", None)
         if word is not None:
             if word.value < 0.0:
-                raise block.place.fault(word.column, f"the feed is negative (F{word.value:g})", "give a positive feed")
+                raise block.fault(f"the feed is negative (F{word.value:g})", "give a positive feed", word)
             # Degrees are degrees in G20 as well: only the speed of the tool tip counts in inches.
             self._speed = Feed(word.value * self._feed_unit_mm, word.value)
 
     def _functions(self, block: ProgramBlock) -> None:
         speed, tool = block.words.get("S"), block.words.get("T")
         if speed is not None and speed.value < 0.0:
-            raise block.place.fault(speed.column, f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4")
+            raise block.fault(f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4", speed)
         if tool is not None and (tool.value < 0.0 or tool.value != int(tool.value)):
-            raise block.place.fault(tool.column, f"T{tool.value:g} is no tool", "give a whole number")
+            raise block.fault(f"T{tool.value:g} is no tool", "give a whole number", tool)
         change, number_set = block.codes.get(ModalGroup.TOOL), None
         if change is not None and change.value == SET_TOOL:
             number_set = block.words.pop("Q", None)
             if number_set is None or number_set.value < 0.0 or number_set.value != int(number_set.value):
-                raise block.place.fault(change.column, "M61 needs Q", "give the number of the tool")
+                raise block.fault("M61 needs Q", "give the number of the tool", change)
         said = [block.words.pop("T", None), change, number_set]
         said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
         self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
@@ -237,14 +239,12 @@ class Modes:
         users += [name("M", block.codes[ModalGroup.OUTPUT].value)] if ModalGroup.OUTPUT in block.codes else []
         both = [code for code in users if code]
         if len(both) > 1 and ("P" in block.words or both[0] == name("G", DWELL)):
-            column = block.words["P"].column if "P" in block.words else 1
             what = f"{' and '.join(both)} both take P"
-            raise block.place.fault(column, what, "write them in separate lines")
+            raise block.fault(what, "write them in separate lines", block.words.get("P", 1))
         once = block.code(ModalGroup.ONCE)
         if once in TAKES_AXES and block.code(ModalGroup.MOTION) not in {None, RAPID, LINEAR}:
-            column = block.codes[ModalGroup.ONCE].column
             what = f"{name('G', once or 0.0)} and {name('G', block.codes[ModalGroup.MOTION].value)} both take axes"
-            raise block.place.fault(column, what, "write them in separate lines")
+            raise block.fault(what, "write them in separate lines", block.codes[ModalGroup.ONCE])
 
     @staticmethod
     def _in_line(block: ProgramBlock, group: ModalGroup, values: set[float] | frozenset[float]) -> str:
@@ -259,8 +259,8 @@ class Modes:
     def _dwell_s(self, block: ProgramBlock) -> float:
         word = block.words.pop("P", None) or block.words.pop("X", None)  # X as for Fanuc
         if word is None or word.value < 0.0:
-            column = block.codes[ModalGroup.ONCE].column
-            raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
+            what = "G4 needs the seconds to wait"
+            raise block.fault(what, "write G4 P0.5 for half a second", block.codes[ModalGroup.ONCE])
         if word.value > LONG_S:
             said = f"{block.place} waits {word.value:g} s: LinuxCNC counts seconds, some controls milliseconds"
             self.path.notes += (said,)
@@ -290,7 +290,7 @@ class Modes:
             dwells = block.code(ModalGroup.ONCE) == DWELL
             if self._cutter is not None and block.codes.keys() & _NOT_BESIDE > ({ModalGroup.ONCE} if dwells else set()):
                 what = "beside a contour (G41, G42) the line changes what moves mean"
-                raise block.place.fault(block.first_column, what, "write it before the contour or behind G40")
+                raise block.fault(what, "write it before the contour or behind G40")
             return
         if word.value == 40.0:  # noqa: PLR2004
             self._left_contour = self._beside is not None
@@ -299,7 +299,7 @@ class Modes:
         if self._cutter is not None or self._plane > 1 or self._per_move:
             code = name("G", word.value)
             what = f"{code} {'while another one is in force' if self._cutter else 'in G19 or under G93'}"
-            raise block.place.fault(word.column, what, "write G40 before it, and G17 or G18 and G94")
+            raise block.fault(what, "write G40 before it, and G17 or G18 and G94", word)
         is_left = int(word.value) == 41  # noqa: PLR2004
         radius_mm = self._diameter_mm(block, word, number) / 2.0
         self._left_contour = False
@@ -309,12 +309,12 @@ class Modes:
     def _diameter_mm(self, block: ProgramBlock, word: Word, number: Word | None) -> float:
         if word.value != int(word.value):  # G41.1 and G42.1 name a diameter
             if number is None:
-                raise block.place.fault(word.column, f"{name('G', word.value)} needs D", "give the diameter")
+                raise block.fault(f"{name('G', word.value)} needs D", "give the diameter", word)
             return number.value * self._state.unit_mm
         tool = self._state.tool if number is None else number.value
         if tool is None or tool not in self._state.diameters:
             what = f"the diameter of tool {'in the spindle' if tool is None else f'{tool:g}'} is not known"
-            raise block.place.fault(word.column, what, "give LinuxCNC's tool table with --tools")
+            raise block.fault(what, "give LinuxCNC's tool table with --tools", word)
         diameter_mm = self._state.diameters[int(tool)]
         if tool not in self._state.tools_set:
             self._hold(f"D{tool:g}", (diameter_mm,))
@@ -346,7 +346,7 @@ class Modes:
         """Remove high-speed modes of other controls (G5 P, G5.1 Q, G187)."""
         word, said = block.codes[ModalGroup.SMOOTHING], [block.words.pop(letter, None) for letter in "EPQR"]
         if block.words.keys() & set(AXES + CENTRES):
-            raise block.place.fault(word.column, f"{name('G', word.value)} with axes is not read", CURVES)
+            raise block.fault(f"{name('G', word.value)} with axes is not read", CURVES, word)
         text = " ".join(f"{each.letter}{each.value:g}" for each in (word, *said) if each is not None)
         self.path.say(RowKind.COMMENT, f"{text} is left out", line=block.place.line)
 
@@ -364,7 +364,7 @@ class Modes:
             tilt = self._state.pose[3:5]
             if np.isnan(tilt).any() or np.abs(tilt).max() > 0.0:
                 what = "G43.4 while A or B is not zero"
-                raise block.place.fault(word.column, what, "post the program for the tip, without G43.4")
+                raise block.fault(what, "post the program for the tip, without G43.4", word)
             self._upright = True  # A and B must stay so: G43.4 would tilt the tool length
         tool = block.words.pop("H", None)
         which = self._state.use_length(tool, block, word)

@@ -56,7 +56,7 @@ class Moves(Modes):
     def _go_to(self, block: ProgramBlock, named: list[str], *, in_machine: bool) -> None:
         if self._motion is None:
             what = f"{named[0]} without a motion code"
-            raise block.place.fault(block.first_column, what, "write G0 or G1 before it")
+            raise block.fault(what, "write G0 or G1 before it")
         if self._since_cycle:
             self.path.notes += (f"{block.place}: {named[0]} behind G80 is taken for a rapid, as before the cycle",)
             self._since_cycle = False
@@ -78,7 +78,7 @@ class Moves(Modes):
 
     def _arc(self, block: ProgramBlock, target: Floats) -> Arc:
         if self._left_contour:
-            raise block.place.fault(block.first_column, "the move behind G40 is an arc", "leave it straight")
+            raise block.fault("the move behind G40 is an arc", "leave it straight")
         arc = arc_of(
             block,
             self._state,
@@ -103,7 +103,7 @@ class Moves(Modes):
             or self._left_contour
         ):
             what = f"{name('G', code.value)} is a curve in X and Y, without G41, G42, G90.1 and another motion"
-            raise block.place.fault(code.column, what, CURVES)
+            raise block.fault(what, CURVES, code)
         if np.isnan(self._state.pose).any():
             raise unknown_place(
                 block, [letter for letter, at in zip(AXES, self._state.pose, strict=True) if np.isnan(at)]
@@ -134,7 +134,7 @@ class Moves(Modes):
         except NoRoomError:
             what = f"a tool with radius {cutter.radius_mm:g} mm has no room here beside the contour"
             remedy = "enter contours (G41, G42) by more than the radius, or take a smaller tool"
-            raise block.place.fault(block.first_column, what, remedy) from None
+            raise block.fault(what, remedy) from None
         self._state.pose = target
 
     def _along(self, cutter: Cutter, element: Element, arc: Arc | None, block: ProgramBlock, target: Floats) -> None:
@@ -210,22 +210,20 @@ class Moves(Modes):
             self._moved = True
         if self._upright and self._state.length_said and np.abs(target[3:5]).max() > 0.0:
             what = "A or B turns under G43.4, which would tilt the tool length"
-            raise block.place.fault(block.first_column, what, "post the program for the tip, without G43.4")
+            raise block.fault(what, "post the program for the tip, without G43.4")
 
     def _check_machine(self, machine: Word, block: ProgramBlock, named: list[str]) -> None:
         if self._motion not in {RAPID, LINEAR} or not named:
-            raise block.place.fault(machine.column, "G53 is allowed only with G0 or G1, and with axes", "remove it")
+            raise block.fault("G53 is allowed only with G0 or G1, and with axes", "remove it", machine)
         if not self._absolute:
-            raise block.place.fault(
-                machine.column, "G53 is allowed only with absolute distances (G90)", "write G90 before it"
-            )
+            raise block.fault("G53 is allowed only with absolute distances (G90)", "write G90 before it", machine)
 
     def _check_feed(self, block: ProgramBlock, column: int) -> None:
         if self._unsure_feed is not None:
             raise self._unsure_feed
         if self._speed.mm_min <= 0.0:
-            raise block.place.fault(
-                column, f"{name('G', self._motion or 0.0)} without a feed", "give F in this line or before"
+            raise block.fault(
+                f"{name('G', self._motion or 0.0)} without a feed", "give F in this line or before", column
             )
 
     def _target(self, block: ProgramBlock, *, in_machine: bool = False, through: bool = False) -> Floats:
@@ -251,7 +249,7 @@ class Moves(Modes):
             or max((abs(value) for value in target[3:] if not math.isnan(value)), default=0.0) > FARTHEST_DEG
         ):
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
-            raise block.place.fault(block.first_column, what, "check the numbers, and whether G91 or G20 is in force")
+            raise block.fault(what, "check the numbers, and whether G91 or G20 is in force")
         return np.array(target)
 
     def _cut_somewhere(self, block: ProgramBlock, unknown: list[str]) -> None:
@@ -269,16 +267,14 @@ class Moves(Modes):
         other = self._plane != 0 or ModalGroup.PLANE in block.codes or once in {*TAKES_AXES, MACHINE}
         if other or block.words.keys() & {"X", "Y"} or any(self._state.length[:2]):
             what = "polar coordinates (@, ^) go with moves in G17, without G53, X, Y and a tool length in these"
-            raise block.place.fault(block.first_column, what, "write X and Y")
+            raise block.fault(what, "write X and Y")
         x, y = (at - zero for at, zero in zip(pose[:2], offset, strict=False))
         radius, angle_deg = math.hypot(x, y), math.degrees(math.atan2(y, x))
         partly = not self._absolute or radius_word is None or angle_word is None
         if partly and math.isnan(radius):
             raise unknown_place(block, ["X", "Y"])
         if partly and radius < LEAST_MM and (radius_word is not None or not self._absolute):
-            raise block.place.fault(
-                block.first_column, "polar coordinates (@, ^) from the origin need an angle", "write X and Y"
-            )
+            raise block.fault("polar coordinates (@, ^) from the origin need an angle", "write X and Y")
         if radius_word is not None:
             radius = radius_word.value * self._state.unit_mm + (0.0 if self._absolute else radius)
         if angle_word is not None:
@@ -291,9 +287,9 @@ class Moves(Modes):
         times = block.words.pop("L", None)
         if self._plane != 0 or self._per_move or {"A", "B", "C"} & set(named):
             what = f"{name('G', code)} with {'another plane than G17' if self._plane else 'G93, or A, B, C'}"
-            raise block.place.fault(column, what, "post cycles as single moves")
+            raise block.fault(what, "post cycles as single moves", column)
         if self._cutter is not None:
-            raise block.place.fault(column, "a cycle beside a contour (G41, G42)", "write G40 before it")
+            raise block.fault("a cycle beside a contour (G41, G42)", "write G40 before it", column)
         depths = self._cycle.depths(code, block, self._state, column, absolute=self._absolute)
         self._check_feed(block, column)
         if code in TAPS:
@@ -329,7 +325,7 @@ class Moves(Modes):
     def _check_tap(self, block: ProgramBlock, code: float) -> None:
         if self._turning != TAPS[code]:
             what = f"{name('G', code)} while the spindle does not turn by {TAPS[code]}"
-            raise block.place.fault(block.first_column, what, f"write {TAPS[code]} before it")
+            raise block.fault(what, f"write {TAPS[code]} before it")
         self.path.notes += (FLOATING,) if FLOATING not in self.path.notes else ()
 
     def _go(self, block: ProgramBlock, *, depth: float, feed: bool = False) -> None:
@@ -350,4 +346,4 @@ def named_axes(block: ProgramBlock) -> list[str]:
 def too_long(block: ProgramBlock) -> BadLine:
     """Return the fault of a program with too many moves."""
     what = f"up to here the program has more than {MOST_ROWS} moves, arcs as chords"
-    return block.place.fault(0, what, "check the turns (P) of its arcs, or compensate it in parts")
+    return block.fault(what, "check the turns (P) of its arcs, or compensate it in parts", 0)

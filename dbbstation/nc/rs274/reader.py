@@ -91,8 +91,7 @@ class _Interpreter(Moves):
             if self._ran_lines(place.line):
                 continue
             block = block_of(line, place, self.flow.value_of)
-            for setting in block.settings:
-                self._set(block, setting.parameter, setting.value, setting.column)
+            self._set(block)
             self.run(block)
             if block.code(ModalGroup.STOP) in ENDS:
                 self.flow.ended()
@@ -132,7 +131,7 @@ class _Interpreter(Moves):
             return
         if level not in self._stored:
             what = f"M{code:g} without modes that were stored"
-            raise block.place.fault(block.codes[ModalGroup.STATE].column, what, "write M70 before it")
+            raise block.fault(what, "write M70 before it", block.codes[ModalGroup.STATE])
         if code == 72.0:  # noqa: PLR2004
             self._bring_back(self._stored[level], block.place)
         else:
@@ -299,7 +298,7 @@ class _Interpreter(Moves):
         elif call is not None:
             which, times = block.words.pop("P", None), block.words.pop("L", None)
             if which is None:
-                raise block.place.fault(block.codes[ModalGroup.CALL].column, "M98 needs P", "give the O number")
+                raise block.fault("M98 needs P", "give the O number", block.codes[ModalGroup.CALL])
             self.flow.call(which.value, 1.0 if times is None else times.value, block.place)
 
     def _said_before(self) -> str:
@@ -313,7 +312,7 @@ class _Interpreter(Moves):
     def _nothing_left(block: ProgramBlock) -> None:
         for letter, word in block.words.items():
             what = f"nothing in this line uses {letter}{word.value:g}"
-            raise block.place.fault(word.column, what, "remove it, or give the code that it belongs to")
+            raise block.fault(what, "remove it, or give the code that it belongs to", word)
 
 
 def _moved(block: ProgramBlock) -> int:

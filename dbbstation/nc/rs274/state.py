@@ -59,7 +59,7 @@ class ControlState:
         turned = self.setup.rotation_deg(system)
         if turned:
             what = f"{system} is turned by {turned:g} degrees about Z in the parameter file"
-            raise block.place.fault(block.codes[ModalGroup.OFFSET].column, what, "set its rotation to zero (G10 L2 R0)")
+            raise block.fault(what, "set its rotation to zero (G10 L2 R0)", block.codes[ModalGroup.OFFSET])
         self.system = SYSTEMS.index(system) + 1
         self._counted()
 
@@ -71,9 +71,9 @@ class ControlState:
         kind, which, turned = (block.words.pop(letter, None) for letter in "LPR")
         if kind is None or kind.value not in {2.0, 20.0} or which is None or which.value not in range(10):
             said = "" if kind is None else f" L{kind.value:g}"
-            raise block.place.fault(word.column, f"G10{said} is not read", "G10 L1, L2 and L20 with P0 to P9 are")
+            raise block.fault(f"G10{said} is not read", "G10 L1, L2 and L20 with P0 to P9 are", word)
         if turned is not None and turned.value != 0.0:
-            raise block.place.fault(turned.column, "G10 with a rotation (R)", "post the program without rotation")
+            raise block.fault("G10 with a rotation (R)", "post the program without rotation", turned)
         system = int(which.value) or self.system
         before, offset = self.offset_of(system), list(self.offset_of(system))
         for axis, letter in enumerate(AXES):
@@ -89,7 +89,7 @@ class ControlState:
     def _set_tool(self, block: ProgramBlock) -> str:
         word, which, radius = block.words.pop("L"), block.words.pop("P", None), block.words.pop("R", None)
         if which is None or which.value < 1.0 or which.value != int(which.value):
-            raise block.place.fault(word.column, "G10 L1 without the number of a tool", "give P, a whole number from 1")
+            raise block.fault("G10 L1 without the number of a tool", "give P, a whole number from 1", word)
         tool, said = int(which.value), f"G10 L1 P{which.value:g}"
         length = list(self.lengths.get(tool, ZERO))
         for axis, letter in enumerate(AXES):
@@ -126,15 +126,14 @@ class ControlState:
             self.length, self.length_said = ZERO, False
             self._counted()
             return 0
-        which = self.tool if tool is None else tool.value
-        column = code.column if tool is None else tool.column
+        which, at = (self.tool, code) if tool is None else (tool.value, tool)
         if which is None or which < 1.0 or which != int(which):
             what = f"{name('G', code.value)} without the number of a tool" if tool is None else f"H{which:g} is no tool"
-            raise block.place.fault(column, what, "give H, a whole number from 1")
+            raise block.fault(what, "give H, a whole number from 1", at)
         if int(which) not in self.lengths:
             what = f"the length of tool {which:g} is not known"
             remedy = f"give it with --tool-lengths-mm {which:g}=MM, or LinuxCNC's tool table with --tools"
-            raise block.place.fault(column, what, remedy)
+            raise block.fault(what, remedy, at)
         self.length, self.length_said = self.lengths[int(which)], True
         self._counted()
         return int(which)
@@ -186,7 +185,7 @@ class ControlState:
             what = (
                 f"{name('G', word.value)} counts from the place of {AXES[axis]}, which the program does not state yet"
             )
-            raise block.place.fault(word.column, what, f"move {AXES[axis]} to a known position first, or give --start")
+            raise block.fault(what, f"move {AXES[axis]} to a known position first, or give --start", word)
         return float(self.pose[axis])
 
 
@@ -198,4 +197,4 @@ def unknown_place(block: ProgramBlock, axes: list[str], when: str = " before thi
         if set(axes) <= set("ABC")
         else "name all axes in rapids before the first cut, absolutely (G90), or say with --start where the machine stands"
     )
-    return block.place.fault(block.first_column, what, remedy)
+    return block.fault(what, remedy)

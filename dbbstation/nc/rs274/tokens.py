@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.errors import Problem
-from dbbstation.nc.rs274.expressions import NUMBER, ValueReader
+from dbbstation.nc.rs274.expressions import NUMBER, ValueReader, closed_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -147,7 +147,7 @@ def _computed(match: re.Match[str], reader: ValueReader, place: Place) -> Word |
 
 def _number(match: re.Match[str], place: Place) -> Word:
     letter, number = match.group("letter", "number")
-    number = number.replace(" ", "").replace("\t", "")
+    number = closed_up(number)
     if letter in "Nn" and not number.isdecimal():
         raise place.fault(match.start("letter") + 1, f"N{number} is not a line number", "write a whole number, or none")
     return _word(letter, float(number), match.start("letter") + 1, place)

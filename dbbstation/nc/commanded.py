@@ -13,6 +13,7 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
+    from dbbstation.machine.rotation import Rotation
     from dbbstation.model.observation import Observation
     from dbbstation.nc.toolpath import Toolpath
     from dbbstation.plan.circle import Circle
@@ -27,17 +28,19 @@ SLACK_DEG = 1.0
 """Largest difference of the arc's ends from the circle's ends: a compensated arc is not exactly as long as the circle."""
 
 
-def commanded_poses(text: str, file: str, observation: Observation) -> Floats:
+def commanded_poses(text: str, file: str, observation: Observation, order: Rotation | None = None) -> Floats:
     """Return the commanded poses of lead-in and samples, shape (n, 6) [mm, deg].
 
     Args:
         file: name with the dialect's extension.
+        order: in which A, B and C of the machine turn; None: as in the program.
 
     Raises:
         InputError: the program cannot be read, or does not run this circle.
         StationError: no dialect has that extension, or several have it.
     """
     toolpath = dialect_of_file(file, text).toolpath(text, file)
+    toolpath = toolpath if order is None else toolpath.in_order(order)
     phi_deg = np.concatenate([observation.lead_in_deg, observation.raw.phi_deg])
     return poses_at_progress(toolpath, observation.raw.circle, phi_deg)
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.machine.rotation import Rotation
     from dbbstation.nc.planner import LookAhead
     from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath
@@ -40,6 +41,12 @@ def already_compensated(name: str, how: str) -> StationError:
     return StationError(f"this program is compensated already, {how}", where=name, remedy=remedy)
 
 
+def says_compensated(path: Toolpath) -> bool:
+    """Return whether a comment has the letters of `COMPENSATED`, whatever alphabet it was written in."""
+    only, letters = re.compile("[^a-z]"), COMPENSATED.replace(",", "").replace(" ", "")
+    return any(only.sub("", text.lower()).startswith(letters) for text in path.text.values())
+
+
 class Dialect(ABC):
     """The language of one control, without state. Each dialect has a file in `dialects/`."""
 
@@ -55,6 +62,8 @@ class Dialect(ABC):
     takes_setup: ClassVar[bool] = False
     decimals: ClassVar[Sequence[int]] = DECIMALS
     """Decimals of X, Y, Z [mm], A, B, C [deg] for the mark and the check of compensated programs."""
+    rotation: ClassVar[Rotation | None] = None
+    """Order in which the control turns by A, B and C; None: the machine's."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
@@ -112,9 +121,9 @@ class Dialect(ABC):
         if declared and not self.takes_setup:
             what = f"the dialect {self.name} takes no offsets, tool lengths or files of the control"
             raise StationError(what, where=name, remedy="leave them out, or post the program in machine coordinates")
-        path = self.read(text, name, start=start, **declared)
+        path = replace(self.read(text, name, start=start, **declared), rotation=self.rotation)
         if not path.is_move.any():
-            if any(said.startswith(COMPENSATED) for said in path.text.values()):
+            if says_compensated(path):
                 raise already_compensated(name, "says its header")
             raise InputError.of(name, "this program moves nothing", "check that it is the file you mean")
         return path

@@ -207,16 +207,21 @@ def _program(
     *,
     split: bool,
 ) -> Program:
-    name = dialect.file_name(stem, path.run)
+    name, own = dialect.file_name(stem, path.run), machine.hexapod.rotation
+    path = replace(path, rotation=path.rotation or own)
     check_reach(machine, path)
     check_feeds(machine, path)
+    order = dialect.rotation or own
+    written = path.in_order(order)
     if inverse is None:
-        return Program(name, dialect.write(path, header), _points(path))
+        return Program(name, dialect.write(written, header), _points(written))
     check_joints(inverse.model.machine)
     asked_um, prefer = 1e3 * chord_mm, inverse.prefer
+    # The same machine, with angles in the order of the program that is written.
+    turned = replace(machine, hexapod=replace(machine.hexapod, rotation=order))
     parts = compensated_parts(
-        path,
-        inverse.model,
+        written,
+        replace(inverse.model, machine=turned),
         chord_mm=chord_mm,
         keep_arcs=not split,
         started_s=inverse.started_s,
@@ -225,7 +230,7 @@ def _program(
         prefer=prefer,
     )
     done = _Finished(machine, dialect)
-    uncertainty = _uncertainty_um(path, inverse)
+    uncertainty = _uncertainty_um(path.in_order(own), inverse)
 
     def head() -> tuple[list[str], tuple[int, ...]]:
         total = done.total

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.nc.dialect import COMPENSATED, already_compensated, plain
+from dbbstation.nc.dialect import already_compensated, plain, says_compensated
 from dbbstation.nc.mark import decimals_of, is_marked
 from dbbstation.nc.toolpath import DECIMALS, RowKind
 
@@ -67,8 +67,7 @@ def check_nominal(toolpath: Toolpath) -> None:
     Raises:
         StationError: it is compensated already.
     """
-    said = any(text.startswith(COMPENSATED) for text in toolpath.text.values())
-    how = "says its header" if said else ""
+    how = "says its header" if says_compensated(toolpath) else ""
     if (
         not how
         and toolpath.numbers

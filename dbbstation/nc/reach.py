@@ -30,7 +30,7 @@ def check_reach(machine: Machine, toolpath: Toolpath) -> None:
     Raises:
         TravelError: names program, line, pose and limit.
     """
-    for part in toolpath.parts():
+    for part in toolpath.in_order(machine.hexapod.rotation).parts():
         pieces = part.pieces(STEP_MM, STEP_DEG)
         block = np.cumsum(pieces) // AT_ONCE
         for rows in np.split(np.arange(len(part)), np.flatnonzero(np.diff(block)) + 1):

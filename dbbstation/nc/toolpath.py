@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from dbbstation.machine.rotation import Frames
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.machine.rotation import Rotation
 
 DECIMALS = (6, 6, 6, 7, 7, 7)
 """Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding shifts the tip, and a point a metre from it, by at most
@@ -32,6 +35,10 @@ RAPID_MM_MIN = 5000.0
 RAPID_DEG_MIN = 2000.0
 """The same for rapids that tilt the platform."""
 
+
+ORDER_DEG = 0.05
+"""Longest piece of a move that turns, in another order of rotation. Its middle leaves the turn by the square of it: at most
+0.02 µm at a point 100 mm from the tip."""
 
 ROWS_AT_ONCE = 8_000
 """Rows that are handled together. A program of 50,000 blocks takes a tenth longer with 20,000 rows, whose arrays leave the
@@ -142,6 +149,7 @@ class Toolpath:
         files: number of lines before each of its files, and the file's name; subprograms of other files follow the program.
         numbers: first and last line number; a compensated program carries its checksum in the first.
         run: number of the program among those written together, from 1.
+        rotation: order in which A, B and C turn; None: the machine's.
     """
 
     name: str
@@ -157,6 +165,7 @@ class Toolpath:
     files: tuple[tuple[int, str], ...] = ()
     numbers: tuple[int, ...] = ()
     run: int = 1
+    rotation: Rotation | None = None
 
     kind: ClassVar[NDArray[np.int8]] = _column("kind", "")
     poses: ClassVar[Floats] = _column("poses", ", shape (n, 6)")
@@ -207,6 +216,15 @@ class Toolpath:
         divided = self.only(row).changed(poses=poses, corners_mm=corners, arc_number=0)
         ends = np.searchsorted(row, list(self.text), side="right") - 1
         return replace(divided, text=dict(zip(ends.tolist(), self.text.values(), strict=True)))
+
+    def in_order(self, order: Rotation) -> Toolpath:
+        """Return the toolpath with A, B and C in another order of rotation; moves that turn become pieces."""
+        if self.rotation is None or self.rotation is order:
+            return self
+        row, share = self.subdivided(np.inf, ORDER_DEG)
+        poses = Frames.from_poses(self.between(row, share), self.rotation).to_poses(order)
+        start = None if self.start is None else Frames.from_poses(self.start[None], self.rotation).to_poses(order)[0]
+        return replace(self.divided(row, poses), start=start, rotation=order)
 
     def part(self, rows: slice) -> Toolpath:
         """Return successive rows as a toolpath."""

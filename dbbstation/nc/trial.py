@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.errors import StationError
+from dbbstation.machine.rotation import Rotation
 from dbbstation.nc.mark import is_marked, marked
 from dbbstation.nc.toolpath import IN_FORCE, MESSAGE, Ending, RowKind, ToolpathBuilder
 from dbbstation.nc.words import WordDialect
@@ -59,7 +60,26 @@ def faults_of(dialect: Dialect) -> list[str]:
     if not faults:
         wrote = _built(has_words)
         faults = _differences(wrote, _read(dialect, wrote), "all in one program")
-    return faults or _faults_of_guard(dialect, moves) or _faults_of_mark(dialect)
+    return faults or _faults_of_guard(dialect, moves) or _faults_of_table(dialect, moves) or _faults_of_mark(dialect)
+
+
+def _faults_of_table(dialect: Dialect, moves: Toolpath) -> list[str]:
+    """Check TCP, the order of rotation and the alphabet of comments."""
+    file, letters = "trial" + dialect.extension, [chr(letter) for letter in range(32, 127)]
+    text, tcp = dialect.write(moves, letters), getattr(dialect, "words", {}).get("tcp on", "")
+    if not isinstance(dialect.rotation, Rotation | None):
+        return ["its `rotation` is no Rotation"]
+    try:
+        faults = _differences(moves, dialect.read(text, file), "comments of every letter")
+    except StationError as error:
+        faults = [f"it does not read its own comments: {str(error).splitlines()[0]}"]
+    if faults or not tcp:
+        return faults
+    try:
+        dialect.read("".join(line for line in text.splitlines(keepends=True) if tcp not in line), file)
+    except StationError:
+        return []
+    return [f"it reads X, Y and Z as the tool tip without `{tcp}`"]
 
 
 def _faults_of_guard(dialect: Dialect, moves: Toolpath) -> list[str]:

@@ -63,7 +63,7 @@ class WordDialect(Dialect):
     """A dialect with lines of words; axes and F are written when they change."""
 
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """Text of `begin`, `rapid` and `feed` ({words}), `in machine` ({move}), `exact`, `exact stop`, `continuous`, `within` ({mm}),
+    """Text of `tcp on` and `tcp off`, which no dialect with plain axes has, of `begin`, `rapid` and `feed` ({words}), `in machine` ({move}), `exact`, `exact stop`, `continuous`, `within` ({mm}),
     `dwell` ({seconds}), `pause`, `pause with text` and `comment` and `message` ({text}), `optional stop`, and the ends `M2`, `M30`, `%`."""
 
     functions: ClassVar[str] = ""
@@ -71,6 +71,9 @@ class WordDialect(Dialect):
 
     systems: ClassVar[str] = ""
     """Pattern of work systems and tool lengths."""
+
+    comment_letters: ClassVar[str] = " -~"
+    """Letters that a comment may have, as in brackets of a regular expression; others become capitals or blanks."""
 
     instead: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Letters that would end a message, and their replacements."""
@@ -103,7 +106,10 @@ class WordDialect(Dialect):
             raise ValueError("a program needs a part")
         header, numbers = head()
         texts[0] = self._checked(self._head(replace(first, numbers=numbers), header))
-        return "".join([*texts, self._checked(self.end(first))])
+        return "".join([*texts, self._checked([*self._tcp("tcp off"), *self.end(first)])])
+
+    def _tcp(self, what: str) -> list[str]:
+        return [self.words[what]] if what in self.words else []
 
     def _checked(self, lines: Iterable[str]) -> str:
         """Return lines as one text, each with a line feed."""
@@ -121,7 +127,7 @@ class WordDialect(Dialect):
         if toolpath.holds is not None:
             yield from self.guard(toolpath.holds)
         corner_mm = toolpath.corner_mm
-        around = [*self.begin(toolpath), *([] if corner_mm is None else [self.corner(corner_mm)])]
+        around = [*self.begin(toolpath), *self._tcp("tcp on"), *([] if corner_mm is None else [self.corner(corner_mm)])]
         if toolpath.numbers and around:
             around[0] = f"{self.line_number(toolpath.numbers[0])}{around[0]}"
         yield from around
@@ -178,7 +184,10 @@ class WordDialect(Dialect):
 
     def comment(self, text: str) -> str:
         """Return a comment without effect."""
-        return self._from_table("comment", "a comment", text=plain(text)).rstrip()
+        allowed = re.compile(f"[{self.comment_letters}]")
+        tried = ((letter, letter.upper(), " ") for letter in plain(text))
+        text = "".join(next(filter(allowed.match, each), "") for each in tried)
+        return self._from_table("comment", "a comment", text=text).rstrip()
 
     def message(self, text: str) -> str:
         """Return text that the control shows or logs: keyword, comma, text, as in `MSG, hello`."""

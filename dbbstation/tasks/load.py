@@ -188,7 +188,8 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
-    return replace(observation, commanded=commanded_poses(text, str(path), observation))
+    poses = commanded_poses(text, str(path), observation, session.machine.hexapod.rotation)
+    return replace(observation, commanded=poses)
 
 
 def _under(machine: Machine | None, observation: Observation) -> Observation:

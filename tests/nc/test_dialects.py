@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import importlib.metadata
+import re
 import textwrap
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation as Turn
 
 import dbbstation.nc.dialects
 from dbbstation.errors import InputError, StationError
 from dbbstation.files.own_dialects import dialect_given
+from dbbstation.machine.rotation import Rotation
+from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
@@ -215,6 +220,7 @@ SABOTAGE = {
         r"it cannot be marked: what it writes with 3 3 3 3 3 3 decimals is read otherwise",
     ),
     "no exact stop": (editing("text.replace('G61\\n', '')"), r"path control"),
+    "its comments": ("words = {**LinuxCNC.words, 'comment': '({text})'}", r"it does not read its own comments"),
     "no guard": ("def guard(self, holds):\n    return ()", r"it loses the check of offsets"),
     "M2 for M30": (editing("text.replace('M30', 'M2')"), r"wrote `end by M30` and reads `end by M2`"),
     "stops before dwells": (
@@ -350,3 +356,103 @@ def test_840d_commands_what_linuxcnc_does(linuxcnc, crooked, table2):
         assert mine.ending == yours.ending
     with pytest.raises(CannotSayError, match="no words for G59"):
         dialect.write(read_program(part.replace("G54", "G59"), "part.ngc"))
+
+
+WITH_TCP = """
+from types import MappingProxyType
+
+from dbbstation.errors import InputError
+from dbbstation.machine.rotation import Rotation
+from dbbstation.nc.dialects.sinumerik840d import Sinumerik840D
+
+
+class Tip(Sinumerik840D):
+    name = "tip"
+    what = "a control with TCP"
+    rotation = Rotation.ZYX
+    comment_letters = "A-Z0-9 .:"
+    words = MappingProxyType({**Sinumerik840D.words, "tcp on": "TRAORI", "tcp off": "TRAFOOF"})
+
+    def read(self, text, name, *, start=None):
+        lines = text.splitlines()
+        if "TRAORI" not in lines:
+            raise InputError.of(name, "TCP is off", "write TRAORI")
+        return super().read("\\n".join("" if line.startswith("TRA") else line for line in lines), name, start=start)
+"""
+
+
+@pytest.fixture
+def tip(tmp_path):
+    (tmp_path / "tip.py").write_text(WITH_TCP.replace("\\\\", "\\"))
+    return dialect_given(str(tmp_path / "tip.py"))
+
+
+def turned(poses, order):
+    """Return orientations by SciPy, which names turns about fixed axes in small letters, and about carried ones in capitals."""
+    return Turn.from_euler(order, poses[:, 3:] if order == "XYZ" else poses[:, :2:-1], degrees=True)
+
+
+TILTING = "G21 G90\n(part: flansch, 7)\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X50 A12 B-10 C3 F500\nY30\nM2\n"
+
+
+def test_angles_are_written_in_the_order_of_the_control(tip, linuxcnc, crooked):
+    """The same tips and orientations as in LinuxCNC's program, which has the machine's order."""
+    path = read_program(TILTING, "part.ngc")
+    assert crooked.machine.hexapod.rotation is Rotation.XYZ
+    programs = [compensated_program(path, each, Inverse(crooked)) for each in (linuxcnc, tip)]
+    here, there = (one.toolpath(each.text, each.name) for one, each in zip((linuxcnc, tip), programs, strict=True))
+    assert there.rotation is Rotation.ZYX
+    one, other = (each.poses[each.is_move & (each.line > 0)] for each in (here, there))
+    ends = [
+        np.flatnonzero(np.hypot(each[:, 0] - 50.0, each[:, 1] - y) < 2.0)[-1]
+        for y in (0.0, 30.0)
+        for each in (one, other)
+    ]
+    for mine, yours in (ends[:2], ends[2:]):
+        np.testing.assert_allclose(one[mine, :3], other[yours, :3], atol=3e-6)
+        assert np.abs(one[mine, 3:] - other[yours, 3:]).max() > 1.0
+        off = turned(one[[mine]], "XYZ") * turned(other[[yours]], "ZYX").inv()
+        assert np.degrees(off.magnitude()[0]) < 1e-6
+    again = there.in_order(Rotation.XYZ)
+    np.testing.assert_allclose(again.poses[-1], here.poses[-1], atol=3e-6)
+
+
+def test_the_whole_path_has_the_orientations_that_the_program_wants(tip, reference):
+    """A machine without errors: along the straight turn of the nominal program, at every end of a piece."""
+    path = read_program(TILTING, "part.ngc")
+    machine = replace(reference, acceleration_mm_s2=5e4)
+    there = tip.toolpath(compensated_program(path, tip, Inverse(MachineModel(machine))).text, "part.mpf")
+    poses = there.poses[there.is_move]
+    poses = poses[(poses[:, 1] < 1e-9) & (poses[:, 0] > 0.1)]
+    assert len(poses) > 10
+    wanted = np.column_stack([poses[:, :3], poses[:, :1] / 50.0 * np.array([[12.0, -10.0, 3.0]])])
+    off = turned(wanted, "XYZ") * turned(poses, "ZYX").inv()
+    assert 1e5 * off.magnitude().max() < 0.15  # µm at 100 mm from the tip
+
+
+def test_tcp_is_turned_on_and_off_and_comments_keep_to_the_alphabet(tip, crooked):
+    program = compensated_program(read_program(TILTING, "part.ngc"), tip, Inverse(crooked))
+    lines = program.text.splitlines()
+    assert lines[-2:] == ["TRAFOOF", "M2"]
+    first = next(at for at, line in enumerate(lines) if line.startswith("G0"))
+    assert "TRAORI" in lines[:first]
+    comments = [line[2:] for line in lines if line.startswith("; ")]
+    assert "PART: FLANSCH  7" in comments
+    assert all(re.fullmatch("[A-Z0-9 .:]*", each) for each in comments)
+    with pytest.raises(StationError, match="compensated already, says its header"):
+        compensated_program(tip.toolpath(program.text, program.name), tip, Inverse(crooked))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('"TRAORI" not in lines', "False", "reads X, Y and Z as the tool tip without `TRAORI`"),
+        ("Rotation.ZYX", "'ZYX'", "its `rotation` is no Rotation"),
+    ],
+)
+def test_what_does_not_come_back_is_refused(tmp_path, old, new, why):
+    text = WITH_TCP.replace("\\\\", "\\")
+    assert old in text
+    (tmp_path / "tip.py").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=why):
+        dialect_given(str(tmp_path / "tip.py"))

@@ -14,12 +14,16 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource, Motion
 
-UNLIKE = 2.0
-"""Ratio of a strut's length to the common length, one standard deviation: preload, wear and grease differ between drives."""
+OTHERS = (0.5, 0.71, 1.41, 2.0)
+"""Ratios of a strut's length to the common length: preload, wear and grease differ between drives. Halves of an octave
+leave 3e-4 of a turn-round between them."""
 
 
 def of_own_lengths(source: ErrorSource, motion: Motion, machine: Machine, values: Floats) -> Effect:
-    """Return changes of a source's effect if each strut's length differs from the common one.
+    """Return changes of a source's effect if each strut has its own length, or several at once.
+
+    Friction whose parts give way after different travels is a sum over lengths [Prandtl and Ishlinskii; Visintin,
+    Differential Models of Hysteresis (1994), sec. III.2].
 
     Args:
         values: one per strut, then the common length, shape (7,).
@@ -30,4 +34,6 @@ def of_own_lengths(source: ErrorSource, motion: Motion, machine: Machine, values
         other[STRUTS] *= times
         return np.asarray(source.effect(motion, machine, other).strut_mm, dtype=np.float64)
 
-    return Effect(strut_mm=0.5 * (of_times(UNLIKE) - of_times(1.0 / UNLIKE))[:, :, None] * np.eye(STRUTS))
+    common = of_times(1.0)
+    changes = [(of_times(times) - common)[:, :, None] * np.eye(STRUTS) for times in OTHERS]
+    return Effect(strut_mm=np.concatenate(changes, axis=2))

@@ -164,7 +164,7 @@ class CircleChannel:
             amplitudes = self._amplitudes_in(fit, key)
             if amplitudes is not None:
                 target = target + self.columns.samples[:, variants[0].columns] @ amplitudes
-        return np.asarray(target, dtype=np.float64)
+        return target
 
     def noise(self, target: Floats, others: Sequence[Cause], noise_mm: float) -> Spectrum:
         """Estimate noise from the residual of base and all causes."""
@@ -192,7 +192,7 @@ class CircleChannel:
 
     def unconcealed(self, effect: Floats) -> Floats:
         """Return the part of an effect that identifiable machine parameters do not absorb, unweighted, shape (n,)."""
-        return np.asarray(effect - self._of_parameters @ (self._of_parameters.T @ effect))
+        return effect - self._of_parameters @ (self._of_parameters.T @ effect)
 
     @cached_property
     def _of_parameters(self) -> Floats:

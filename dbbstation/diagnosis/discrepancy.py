@@ -118,7 +118,7 @@ def _strut_contributions(
     if effect.strut_mm is None or any(other is not None for other in others):
         return None
     lengths = np.broadcast_to(np.asarray(effect.strut_mm), (len(motion), STRUTS))
-    return np.asarray((reading.sensitivity.response.per_strut * lengths)[motion.kept], dtype=np.float64)
+    return (reading.sensitivity.response.per_strut * lengths)[motion.kept]
 
 
 def _followed_by_strut(
@@ -145,7 +145,7 @@ def _swing_rad(motion: Motion, machine: Machine) -> Floats:
     unit, at_rest = motion.struts(machine).unit, inverse(machine.hexapod, rest).unit
     in_platform = np.einsum("nji,nkj->nki", motion.frames(machine).rotation, unit)
     cosine = np.einsum("nki,ki->nk", in_platform, np.einsum("ji,kj->ki", rest.rotation[0], at_rest[0]))
-    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)), dtype=np.float64)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
 def _followed(source: ErrorSource, known: Mapping[str, Floats], motion: Motion) -> Floats:

@@ -190,7 +190,7 @@ def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
 
 
 def _without(ball: Floats, rows: Floats) -> Floats:
-    return np.asarray(rows - ball @ (ball.T @ rows), dtype=np.float64)
+    return rows - ball @ (ball.T @ rows)
 
 
 def _reachable(machine: Machine, circle: Circle) -> bool:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def uncertainties(calibration: Calibration, held: Floats) -> Floats:
     """Return every column's standard uncertainty, shape (k,), including `held_variance`."""
     seen = np.maximum(calibration.solution.variance, 0.0)
-    return np.asarray(np.sqrt(seen + held_variance(calibration, held)), dtype=np.float64)
+    return np.sqrt(seen + held_variance(calibration, held))
 
 
 def held_variance(calibration: Calibration, held: Floats) -> Floats:

@@ -130,7 +130,7 @@ def _told(covariance: Floats, rows: Floats, noise_mm: float, own: slice) -> Floa
     seen = np.flatnonzero(rows.any(axis=0))
     gain = rows[:, seen] @ covariance[seen, own]
     answer = rows[:, seen] @ covariance[np.ix_(seen, seen)] @ rows[:, seen].T + noise_mm**2 * np.eye(len(rows))
-    return np.asarray(covariance[own, own] - gain.T @ np.linalg.solve(answer, gain), dtype=np.float64)
+    return covariance[own, own] - gain.T @ np.linalg.solve(answer, gain)
 
 
 def _size(covariance: Floats, variant: Variant) -> float:

@@ -162,7 +162,7 @@ class TemplateScan:
         def added(samples: NDArray[np.floating], times: Floats | None = None) -> Floats:
             """Return sums over bins of samples times factors."""
             weights = np.ones(many) if times is None else times[rows]
-            return np.asarray(csr_array((weights, rows, ends), shape=(len(number), many)) @ samples, dtype=np.float64)
+            return csr_array((weights, rows, ends), shape=(len(number), many)) @ samples
 
         at = added(values.reshape(many, -1)) / number[:, None]
         products = (gain[:, :, None] * gain[:, None, :]).reshape(many, -1)
@@ -258,7 +258,7 @@ def _since(values: Floats) -> Integers:
 
 def _place(values: Floats) -> Integers:
     x, y = np.floor(values / PLACE_MM).astype(np.int64).T
-    return np.asarray(x * 100_000 + y, dtype=np.int64)
+    return x * 100_000 + y
 
 
 def _lines(places: Floats) -> list[Form]:

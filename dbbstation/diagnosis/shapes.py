@@ -176,7 +176,7 @@ class Shape:
         values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
             curve = self.form.columns(values)
-            return np.asarray((gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1))
+            return (gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1)
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
     def by_strut(self, samples: Samples, amplitudes: Floats) -> tuple[Floats, int]:
@@ -321,7 +321,7 @@ def _hoses(frames: Frames, machine: Machine) -> Floats:
     angles = np.radians(WAYS_DEG)
     places = AWAY_MM * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
     places[:, 2] = middle[:, 2].mean()
-    return np.asarray(places - middle[:, None, :], dtype=np.float64)
+    return places - middle[:, None, :]
 
 
 def _pulled_towards(motion: Motion, machine: Machine) -> Floats:

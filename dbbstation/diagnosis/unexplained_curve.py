@@ -197,7 +197,7 @@ def _line(at: Floats, weights: Floats, order: int) -> Floats:
     """Return the projection on polynomials, shape (p, p)."""
     basis = np.vander(at, order + 1)
     weighted = basis.T * weights
-    return np.asarray(basis @ np.linalg.solve(weighted @ basis, weighted), dtype=np.float64)
+    return basis @ np.linalg.solve(weighted @ basis, weighted)
 
 
 def _values(shape: Shape, run: Samples) -> Floats:
@@ -205,9 +205,7 @@ def _values(shape: Shape, run: Samples) -> Floats:
 
 
 def _weights(runs: Sequence[Samples], shape: Shape) -> Floats:
-    return np.asarray(
-        sum(shape.form.columns(_values(shape, run)).reshape(-1, shape.form.count).sum(axis=0) for run in runs)
-    )
+    return sum(shape.form.columns(_values(shape, run)).reshape(-1, shape.form.count).sum(axis=0) for run in runs)
 
 
 def _extent(runs: Sequence[Samples], shape: Shape, flat: Floats | None) -> tuple[float, float]:

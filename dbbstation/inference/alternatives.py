@@ -184,4 +184,4 @@ def _inclusions(posterior: Posterior) -> tuple[Flags, Floats, dict[str, int]]:
 def _inverse_root(products: Floats) -> Floats:
     value, axes = np.linalg.eigh(products)
     usable = value > RANK * max(float(value[-1]), 1e-300)
-    return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)
+    return (axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T

@@ -153,7 +153,7 @@ class Bank:
 
     def fitted(self, columns: Integers) -> Floats:
         """Return whitened columns over kept rows, shape (m, p)."""
-        return np.asarray(self._columns.of(columns), dtype=np.float64)
+        return self._columns.of(columns)
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
         """Return causes with the base projected out; `but_for` marks rows to ignore, shape (m,), whose target must be zero.
@@ -452,7 +452,7 @@ class Bank:
 
 def _whitened(kept: Flags, whitening: csr_array | None, rows: Floats) -> Floats:
     own = rows if kept.all() else rows[kept]  # selecting all rows would copy all columns
-    return own if whitening is None else np.asarray(whitening @ own)
+    return own if whitening is None else whitening @ own
 
 
 def _forms(

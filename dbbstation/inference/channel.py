@@ -124,7 +124,7 @@ class Law:
         """Return prior standard deviations of amplitudes, shape (p,), for columns, shape (n, p)."""
         if self.reach is None:
             return self.plausible
-        return np.asarray(self.reach / np.maximum(np.abs(samples).max(axis=0), 1e-300))
+        return self.reach / np.maximum(np.abs(samples).max(axis=0), 1e-300)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,7 @@ class Channel:
         """Return the base's ordinary least-squares values, shape (k,)."""
         rows = self.base.samples[self.kept]
         scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
-        return np.asarray(np.linalg.lstsq(rows / scale, self.target, rcond=None)[0] / scale)
+        return np.linalg.lstsq(rows / scale, self.target, rcond=None)[0] / scale
 
     @property
     def kept_blocks(self) -> list[slice]:

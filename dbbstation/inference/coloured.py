@@ -146,7 +146,7 @@ class Coloured:
         taps = self.filter
         phase = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(taps))))
         gain = np.abs(phase @ taps) ** 2
-        return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
+        return 2.0 * np.log(self.innovation) - np.log(gain)
 
     def independent_samples(self, stretches: Sequence[slice]) -> float:
         """Return how many independent samples give as precise a mean square as these stretches."""

@@ -41,7 +41,7 @@ class Spline(Form):
         knots = np.concatenate([np.zeros(CUBIC), inner, np.ones(CUBIC)])
         share = np.clip((np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low), 0.0, 1.0)
         flat = BSpline.design_matrix(share.ravel(), knots, CUBIC).toarray()
-        return np.asarray(flat.reshape(*share.shape, self.functions)[..., : self.count], dtype=np.float64)
+        return flat.reshape(*share.shape, self.functions)[..., : self.count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,4 +96,4 @@ class Stretches(Form):
     def columns(self, values: Floats) -> Floats:
         """Return each stretch's curve at values, shape (n, p)."""
         begun, ended = (self.response(values[..., None] - np.array(edges)) for edges in (self.first, self.last))
-        return np.asarray(begun - ended, dtype=np.float64)
+        return begun - ended

@@ -322,7 +322,7 @@ def left_without(one: Settled, names: Collection[str], unseen: Collection[str] =
     rest = one.best.without(*names)
     effect = one.effect(members=rest)
     shown = one.effect({m.cause.name for m in rest} - set(unseen), rest) if unseen else effect
-    return np.asarray(one.channel.residual - shown - one.channel.base.samples @ one.base_values(effect))
+    return one.channel.residual - shown - one.channel.base.samples @ one.base_values(effect)
 
 
 def log_density(one: Settled, rows: Flags, left: Floats) -> float:

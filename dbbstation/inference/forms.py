@@ -278,7 +278,7 @@ class PlaneStep(Form):
 
     def along(self, values: Floats) -> Floats:
         """Return the coordinate perpendicular to the line, shape (n,)."""
-        return np.asarray(values @ self.across, dtype=np.float64)
+        return values @ self.across
 
     def columns(self, values: Floats) -> Floats:
         """Return the step from minus to plus a half, at values of shape (n, 2)."""

@@ -79,7 +79,7 @@ def coefficients(residual: Floats, phase_rad: Floats, highest: int) -> Floats:
     columns = residual.reshape(len(residual), -1)
     found = np.column_stack(_sums(list(columns.T), phase_rad, highest))
     both = np.vstack([found[:1].real, np.sqrt(2.0) * found[1:].real, np.sqrt(2.0) * found[1:].imag])
-    return np.asarray(both.reshape(2 * highest + 1, *residual.shape[1:]) / np.sqrt(len(residual)))
+    return both.reshape(2 * highest + 1, *residual.shape[1:]) / np.sqrt(len(residual))
 
 
 def basis(phase_rad: Floats, highest: int) -> Floats:
@@ -344,7 +344,7 @@ def continuations(
 
 def first_order(harmonic: Floats, corners: Floats) -> Floats:
     """Return the power of unit first-order processes with each corner, shape (processes, h)."""
-    return np.asarray(1.0 / (1.0 + (harmonic / corners[:, None]) ** 2))
+    return 1.0 / (1.0 + (harmonic / corners[:, None]) ** 2)
 
 
 def _on_a_floor(power: Floats) -> Floats:

@@ -37,7 +37,7 @@ def weighted_jackknife(
     # (1986) 1261, eq. 5.1, by value].
     with np.errstate(all="ignore"):
         squares = variances / variances_without * np.square(without - values)
-    return np.asarray(np.sqrt(np.sum(np.where(np.isfinite(squares), squares, 0.0), axis=0)))
+    return np.sqrt(np.sum(np.where(np.isfinite(squares), squares, 0.0), axis=0))
 
 
 def widening(variances: Floats, moved: Floats, variances_without: Floats) -> Floats:

@@ -88,7 +88,7 @@ def _sums(left: Left, values: Floats, pieces: int, size: float) -> Sums:
     starts = np.concatenate([[0], np.cumsum(count)[:-1]])
 
     def added(rows: Floats) -> Floats:
-        return np.asarray(np.add.reduceat(rows[order], starts, axis=0), dtype=np.float64)
+        return np.add.reduceat(rows[order], starts, axis=0)
 
     squares, base = np.asarray(count * size**2, dtype=np.float64), size * added(left.beside)
     if left.whitening is not None:

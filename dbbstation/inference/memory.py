@@ -139,4 +139,4 @@ def lagging(values: Floats, time: Floats, constant: float) -> Floats:
     fades = np.exp(-steps / constant)
     falls = np.diff(values) * (constant / steps) * -np.expm1(-steps / constant)
     recursion = np.vstack([np.ones(len(values)), np.append(-fades, 0.0)])
-    return np.asarray(solve_banded((1, 0), recursion, np.append(0.0, -falls)))
+    return solve_banded((1, 0), recursion, np.append(0.0, -falls))

@@ -304,7 +304,7 @@ class ModelComparison:
         """Return posterior means of amplitudes and slack, shape (p,)."""
         lower, z, _ = self._eliminated(members)
         _, sd = _stacked(members)
-        return np.asarray(sd * _solved(lower, z, transposed=True), dtype=np.float64)
+        return sd * _solved(lower, z, transposed=True)
 
     def estimates(self, members: Sequence[Member]) -> Estimates:
         """Return posterior means and covariance of members' amplitudes and slack."""
@@ -323,7 +323,7 @@ class ModelComparison:
             return own
         lower, _, _ = self._eliminated(members)
         across = self._across(members, lower, columns)
-        return np.asarray(own - across.T @ across, dtype=np.float64)
+        return own - across.T @ across
 
     def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> tuple[Integers, Floats]:
         """Return every pair of causes, shape (c, 2), and the members' log marginal likelihood with it, without its slack."""
@@ -514,7 +514,7 @@ def _solved(lower: Floats, right: Floats, *, transposed: bool = False) -> Floats
     found, info = dtrtrs(np.asarray(lower, order="C").T, right, lower=0, trans=0 if transposed else 1)
     if info:
         raise np.linalg.LinAlgError("singular triangle")
-    return np.asarray(found, dtype=np.float64)
+    return found
 
 
 def _factors(information: Floats) -> Floats:
@@ -535,7 +535,7 @@ def cholesky(information: Floats) -> Floats:
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(information)
         upper = np.linalg.qr((vectors * np.sqrt(np.maximum(values, 1.0))).T, mode="r")
-        return np.asarray((upper * np.sign(np.diag(upper))[:, None]).T, dtype=np.float64)
+        return (upper * np.sign(np.diag(upper))[:, None]).T
 
 
 def with_slack_of(member: Member, values: Floats) -> Member:
@@ -554,9 +554,7 @@ def amplitude_size(member: Member, values: Floats) -> float:
 def _log_factors(seen: Floats, along: Floats) -> Floats:
     squares = SCALES[:, None] ** 2
     information = 1.0 + squares * seen[:, None, :]
-    return np.asarray(
-        0.5 * np.sum(squares * along[:, None, :] / information - np.log(information), axis=2), dtype=np.float64
-    )
+    return 0.5 * np.sum(squares * along[:, None, :] / information - np.log(information), axis=2)
 
 
 def slices_of(members: Sequence[Member], first: int = 0) -> list[slice]:

@@ -26,7 +26,7 @@ def bernstein(values: Floats, low: float, high: float, degree: int = DEGREE) -> 
     """Return Bernstein polynomials over a range, shape (..., degree + 1), summing to one [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]."""
     share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
     k = np.arange(degree + 1)
-    return np.asarray(comb(degree, k) * share**k * (1.0 - share) ** (degree - k), dtype=np.float64)
+    return comb(degree, k) * share**k * (1.0 - share) ** (degree - k)
 
 
 def modulated(

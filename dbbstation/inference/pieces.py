@@ -60,7 +60,7 @@ class Left:
 
     def whitened(self, rows: Floats) -> Floats:
         """Return whitened rows."""
-        return rows if self.whitening is None else np.asarray(self.whitening @ rows)
+        return rows if self.whitening is None else self.whitening @ rows
 
     def whitened_part(self, rows: Floats, here: slice, there: slice) -> Floats:
         """Return part of the whitened rows, for rows that are zero outside a slice."""
@@ -82,7 +82,7 @@ class Left:
 
     def transposed(self, rows: Floats) -> Floats:
         """Return the transposed whitening times rows."""
-        return rows if self.whitening is None else np.asarray(self.whitening.T @ rows)
+        return rows if self.whitening is None else self.whitening.T @ rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -290,5 +290,5 @@ class BesideBase:
         towards = size[:, None] * (columns.T @ targets)[own] - of_base.T @ (self._taken @ (axes.T @ targets))
         values = np.zeros((columns.shape[1], targets.shape[1]))
         values[own] = size[:, None] * cho_solve((cholesky(products), True), towards, check_finite=False)
-        left = np.asarray(targets - columns @ values, dtype=np.float64)
+        left = targets - columns @ values
         return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))

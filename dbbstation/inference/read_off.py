@@ -373,7 +373,7 @@ def concealed(effect: Floats, rest: Floats) -> tuple[float, float, float]:
 
 def _at_half(effect: Floats) -> Flags:
     away = np.abs(effect - np.median(effect))
-    return np.asarray(away >= HALF * away.max())
+    return away >= HALF * away.max()
 
 
 def _span(values: Floats, name: str, unit: str) -> Span:

@@ -78,7 +78,7 @@ class Settled:
     def predicted(self) -> Floats:
         """Return the sum of base and members over all rows, shape (n,)."""
         effect = self.effect()
-        return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
+        return effect + self.channel.base.samples @ self.base_values(effect)
 
     def averaged(self, probability: float, names: Collection[str]) -> float:
         """Return the probability of causes, averaged over initial noise models.

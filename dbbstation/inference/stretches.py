@@ -206,7 +206,7 @@ class _Look:
         for many in range(0, len(starts), BOUNDS.stretches_at_once):
             rows = slice(many, many + BOUNDS.stretches_at_once)
             own[rows] -= _squares(along[ends[rows]] - along[starts[rows]])
-        return np.asarray(own)
+        return own
 
     def best(self) -> _Window | None:
         """Return the best window with refined ends."""
@@ -243,7 +243,7 @@ class _Look:
     def _worth(self, along: Floats, own: Floats) -> Floats:
         information = np.maximum(own, 0.0) + 1.0 / self._size**2
         occam = 0.5 * np.log(information * self._size**2)
-        return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
+        return 0.5 * along**2 / information - occam - np.log(self.tried)
 
     def edges_of(self, window: _Window) -> tuple[float, float]:
         """Return a stretch's edges in rows."""
@@ -335,7 +335,7 @@ ALIKE = 1e-12
 
 
 def _squares(rows: Floats) -> Floats:
-    return np.asarray(np.einsum("wk,wk->w", rows, rows), dtype=np.float64)
+    return np.einsum("wk,wk->w", rows, rows)
 
 
 def _cumulative(rows: Floats) -> Floats:
@@ -352,4 +352,4 @@ def _squares_of_edges(noise: Coloured, longest: int) -> Floats:
     reach = min(len(taps), longest)  # constant for longer stretches
     near = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(reach + 1)]
     behind = np.pad(near, (0, longest - reach), mode="edge")
-    return np.asarray(inside + behind, dtype=np.float64)
+    return inside + behind

@@ -52,7 +52,7 @@ class Sums:
         """Return the polynomials that are one at one of `NODES` and zero at the others, shape (24, b)."""
         at_nodes, at_bins = (np.polynomial.chebyshev.chebvander(x, len(NODES) - 1) for x in (NODES, self.scaled[0]))
         at_nodes[:, 1:] *= 2.0
-        return np.asarray(at_nodes @ at_bins.T / len(NODES))
+        return at_nodes @ at_bins.T / len(NODES)
 
     def explained(self, curves: Floats) -> Floats:
         """Return the squares, shape (m,), that curves, shape (b, m, p), explain given the base."""
@@ -76,7 +76,7 @@ class Sums:
         def transformed(values: Floats, step: int) -> NDArray[np.complex128]:
             wide = np.zeros((length, values.shape[1]))
             wide[self.place] = values
-            return np.asarray(rfft(wide, axis=0)[step * first : step * last : step])
+            return rfft(wide, axis=0)[step * first : step * last : step]
 
         of_base = np.zeros((last - first, 2 * directions, 2 * directions))
         for column in range(0, width, BOUNDS.sums_at_once):
@@ -117,7 +117,7 @@ def peaks(explained: Floats, most: int) -> Integers:
     """Return local maxima, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     found = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
-    return np.asarray(found[np.argsort(-explained[found])][:most])
+    return found[np.argsort(-explained[found])][:most]
 
 
 def bumps(low: float, high: float, widths: Iterable[float]) -> list[Form]:
@@ -181,7 +181,7 @@ def squares(mean: Floats, twice: NDArray[np.complex128]) -> Floats:
 def taken(base: Floats) -> Floats:
     """Return the base's part of curve products, (m, p d, p d), from sums of shape (m, p, d, k)."""
     side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
-    return np.asarray(side @ side.transpose(0, 2, 1))
+    return side @ side.transpose(0, 2, 1)
 
 
 def solved(rest: Floats, of_base: Floats, gains: Floats) -> Floats:
@@ -189,4 +189,4 @@ def solved(rest: Floats, of_base: Floats, gains: Floats) -> Floats:
     many, size = len(rest), rest.shape[1] * rest.shape[2]
     normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - of_base + np.eye(size)
     right = rest.reshape(many, size, 1)
-    return np.asarray((right * np.linalg.solve(normal, right)).sum(axis=(1, 2)))
+    return (right * np.linalg.solve(normal, right)).sum(axis=(1, 2))

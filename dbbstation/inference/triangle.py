@@ -38,13 +38,13 @@ def axes_of(columns: Floats, least: float = RANK) -> Floats:
         least: rank tolerance, relative to the largest singular value of scaled columns.
     """
     u, s, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
-    return np.asarray(u[:, s > least * s[:1]], dtype=np.float64)
+    return u[:, s > least * s[:1]]
 
 
 def left_by(columns: Floats, values: Floats) -> Floats:
     """Return the residual of values, shape (n,), after a least-squares fit of columns, shape (n, k)."""
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    return np.asarray(values - scaled @ np.linalg.lstsq(scaled, values, rcond=RANK)[0])
+    return values - scaled @ np.linalg.lstsq(scaled, values, rcond=RANK)[0]
 
 
 def rms(values: Floats) -> float:

@@ -36,7 +36,7 @@ def spread_by_kind(powers: Floats, kinds: Integers) -> Floats:
     count = np.maximum(np.bincount(kinds), 1)
     mean = np.bincount(kinds, powers) / count
     own = np.maximum(mean, QUIET**2 * float(mean.max(initial=0.0)))[kinds]
-    return np.asarray(np.sqrt(own / max(float(np.mean(own)), 1e-300)))
+    return np.sqrt(own / max(float(np.mean(own)), 1e-300))
 
 
 QUIET = 1e-4
@@ -93,4 +93,4 @@ def has_long_tails(new: Floats) -> bool:
 def log_student(new: Floats, tails: float) -> Floats:
     """Return the log density of Student's t, relative to the normal density's height, shape (m,)."""
     height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
-    return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))
+    return height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails)

@@ -85,7 +85,7 @@ class Variable:
     @property
     def scaled(self) -> Floats:
         """Return values scaled to -1..1, shape (n,)."""
-        return np.asarray((self.values - 0.5 * (self.low + self.high)) / (0.5 * self.extent), dtype=np.float64)
+        return (self.values - 0.5 * (self.low + self.high)) / (0.5 * self.extent)
 
     @property
     def half_range(self) -> float:
@@ -97,7 +97,7 @@ class Variable:
         own = self.values[rows]
         if self.period is None or self.extent > self.period:
             return own
-        return np.asarray(np.unwrap(own, period=self.period), dtype=np.float64)
+        return np.unwrap(own, period=self.period)
 
     def is_path(self, blocks: Sequence[slice]) -> bool:
         """Return whether the variable changes continuously, as along a path."""

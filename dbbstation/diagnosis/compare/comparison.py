@@ -201,7 +201,7 @@ def _run(pair: Pair, settled: Settled, rows: slice, order: Integers, found: Floa
     sigma = np.sqrt(_stated(settled, rows, order, columns[:, first]) + noise**2)
     # A raised bar measures a radius change times the cosine of its elevation.
     per_mm = np.sqrt(count / 2.0) * float(np.cos(np.radians(pair.circle.elevation_deg)))
-    smooth = np.asarray(columns @ row, dtype=np.float64)
+    smooth = columns @ row
     at = int(np.argmax(np.abs(smooth)))
     return RunDifference(
         test=pair.test,
@@ -233,7 +233,7 @@ def _stated(settled: Settled, rows: slice, order: Integers, columns: Floats) -> 
     base = settled.channel.base
     by_angle = np.empty((len(columns), len(base.prior)))
     by_angle[order] = base.samples[rows] * base.prior
-    return np.asarray(np.sum((columns.T @ by_angle) ** 2, axis=1), dtype=np.float64)
+    return np.sum((columns.T @ by_angle) ** 2, axis=1)
 
 
 def _by_angle_um(theta_deg: Floats, smooth_mm: Floats) -> tuple[float, ...]:

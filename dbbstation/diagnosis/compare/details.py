@@ -79,7 +79,7 @@ def _kinematic(sides: Sides) -> Floats:
         for reading in sides.readings[1]
     ]
     axes, sizes, _ = np.linalg.svd(sides.averaged(1, columns), full_matrices=False)
-    return np.asarray(axes[:, sizes > RANK * sizes[0]], dtype=np.float64)
+    return axes[:, sizes > RANK * sizes[0]]
 
 
 def noticed_mm(settled: Settled) -> float:

@@ -185,7 +185,7 @@ def at_common_angles(raw: RawCircle, sectors: int) -> Floats:
 
 
 def _mean(runs: Sequence[Observation], sectors: int) -> Floats:
-    return np.asarray(np.mean([at_common_angles(run.raw, sectors) for run in runs], axis=0), dtype=np.float64)
+    return np.mean([at_common_angles(run.raw, sectors) for run in runs], axis=0)
 
 
 def _by_run(runs: Sequence[Observation]) -> dict[tuple[str, str], list[Observation]]:

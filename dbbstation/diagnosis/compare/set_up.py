@@ -72,7 +72,7 @@ def _per_degree(pair: Pair) -> Floats:
     found, *_ = np.linalg.lstsq(basis(theta[there], low), pair.a_mm[there], rcond=None)
     order = np.arange(1, low + 1)
     by_angle = np.concatenate([[0.0], order * found[low + 1 :], -order * found[1 : low + 1]])
-    return np.asarray(np.radians(1.0) * (basis(theta, low) @ by_angle), dtype=np.float64)
+    return np.radians(1.0) * (basis(theta, low) @ by_angle)
 
 
 def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, Floats, Floats]]:

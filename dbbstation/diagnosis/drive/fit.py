@@ -102,7 +102,7 @@ class DriveFit:
             if names is None or member.cause.name in names:
                 own = self.columns_of(member.cause.name)
                 used[own.start : own.start + len(member.columns)] = True
-        return np.asarray(self.samples[:, used] @ self.values[used], dtype=np.float64)
+        return self.samples[:, used] @ self.values[used]
 
     def weighted(self, weights: Floats, unit: str) -> Value:
         """Return a weighted sum of values, weights of shape (k,)."""
@@ -203,8 +203,8 @@ def _information(settled: Settled, samples: Floats, sd: Floats, counted: float) 
     taken = samples
     if bank.whitening is not None:
         # Noise is the innovation times the inverse whitening; this is its transpose.
-        taken = np.asarray(spsolve_triangular(bank.whitening.T.tocsr(), samples, lower=False))
-    return np.asarray((settled.noise.innovation / counted**2) ** 2 * taken.T @ taken + np.diag(1.0 / sd**2))
+        taken = spsolve_triangular(bank.whitening.T.tocsr(), samples, lower=False)
+    return (settled.noise.innovation / counted**2) ** 2 * taken.T @ taken + np.diag(1.0 / sd**2)
 
 
 def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:

@@ -35,7 +35,7 @@ def low_passed(columns: Floats, rate_hz: float, cutoff_hz: float) -> Floats:
     bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
     sos = np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
     beyond = min(_reach(rate_hz, cutoff_hz), len(columns) - 1)
-    return np.asarray(sosfiltfilt(sos, columns, axis=0, padtype="constant", padlen=beyond), dtype=np.float64)
+    return sosfiltfilt(sos, columns, axis=0, padtype="constant", padlen=beyond)
 
 
 def impulse_response(rate_hz: float, cutoff_hz: float) -> Floats:
@@ -64,15 +64,15 @@ def within(marked: Flags, by: int) -> Flags:
     """Mark samples within `by` samples of marked ones, shape (n,)."""
     count = np.concatenate([[0], np.cumsum(marked)])
     at = np.arange(len(marked))
-    return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
+    return count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)]
 
 
 def weights(unknown: Flags, rise: int) -> Floats:
     """Return weights, shape (n,): zero for unknown forces, with gradual rise to one."""
     if not unknown.any():
         return np.ones(len(unknown))
-    away = np.asarray(distance_transform_edt(~unknown), dtype=np.float64)
-    return np.asarray(np.sin(0.5 * np.pi * np.minimum(away / (rise + 1), 1.0)) ** 2)
+    away = distance_transform_edt(~unknown)
+    return np.sin(0.5 * np.pi * np.minimum(away / (rise + 1), 1.0)) ** 2
 
 
 def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
@@ -103,7 +103,7 @@ def edge_noise_m_s2(weight: Floats, kept: Integers, noise_m: float, rate_hz: flo
         near = around[first : first + len(response)]
         if near.min() < 1.0:
             more[row] = _of_second_difference(response * near / float(response @ near)) - own
-    return np.asarray(noise_m * rate_hz**2 * np.sqrt(np.maximum(more, 0.0)))
+    return noise_m * rate_hz**2 * np.sqrt(np.maximum(more, 0.0))
 
 
 def _of_second_difference(row: Floats) -> float:

@@ -75,7 +75,7 @@ class Recordings:
         """Return the excess force noise at edges of weights, shape (m,) [N]: acceleration noise times estimated mass."""
         direction = self.compared(lambda s: s.direction)
         mass = np.linalg.lstsq(np.column_stack([self.motion, direction]), self.force_n, rcond=None)[0][0]
-        return np.asarray(abs(float(mass)) * np.concatenate([one.edge_noise_m_s2 for one in self.signals]))
+        return abs(float(mass)) * np.concatenate([one.edge_noise_m_s2 for one in self.signals])
 
     @cached_property
     def time_s(self) -> Floats:

@@ -269,7 +269,7 @@ def _noise_floor(position_m: Floats, rate_hz: float) -> float:
 
 def _spectrum(position_m: Floats, rate_hz: float) -> tuple[Floats, Floats]:
     frequency, power = welch(position_m, rate_hz, "hann", min(len(position_m), 4096))
-    return np.asarray(frequency), np.asarray(power)
+    return frequency, power
 
 
 def _acceleration_noise(floor: float, cutoff_hz: float | Floats) -> float | Floats:

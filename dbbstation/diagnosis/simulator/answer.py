@@ -308,4 +308,4 @@ def _uncertainties(rows: Floats, known: Floats) -> Floats:
     normal = rows.T @ rows + np.diag(known)
     norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-14, hermitian=True)
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / norm)
+    return np.sqrt(np.maximum(np.diag(inverse), 0.0)) / norm

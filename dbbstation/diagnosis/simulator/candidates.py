@@ -230,4 +230,4 @@ def basis(term: Term, values: Floats) -> Floats:
     """Return a curve's basis functions at signal values, shape (n, p)."""
     inside = np.clip(values, term.fixed[0], term.fixed[-1])
     splines = BSpline.design_matrix(inside, np.array(term.fixed), DEGREE).toarray()
-    return np.asarray(splines @ bends(term.fixed))
+    return splines @ bends(term.fixed)

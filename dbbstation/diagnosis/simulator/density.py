@@ -37,7 +37,7 @@ def log_density(
 
     def white(values: Floats) -> Floats:
         even = (values[rows].T / spread).T
-        return np.asarray(even if whitening is None else whitening @ even) / noise.innovation
+        return (even if whitening is None else whitening @ even) / noise.innovation
 
     level = 0.0 if whitening is None else float(np.log(whitening.diagonal()).sum())
     level -= float(np.log(np.sqrt(2.0 * np.pi) * noise.innovation * spread).sum())

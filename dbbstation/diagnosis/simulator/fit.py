@@ -161,7 +161,7 @@ def _from(
         gtol=1e-12,
         max_nfev=most_steps,
     )
-    numbers = np.asarray(ended.x, dtype=np.float64)
+    numbers = ended.x
     return start.with_numbers(numbers), residual(numbers)
 
 

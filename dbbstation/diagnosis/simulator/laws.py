@@ -98,7 +98,7 @@ def of_unit_size(parts: Sequence[Floats]) -> Floats:
     """Return columns of one form, shape (n, p) each, scaled to rms one."""
     columns = np.hstack(parts)
     rms = np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)
-    return np.asarray(columns / (rms * np.sqrt(len(parts))))
+    return columns / (rms * np.sqrt(len(parts)))
 
 
 EVERY = 2
@@ -124,7 +124,7 @@ def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
     columns = np.hstack(own)
 
     def beside(effect: Floats, _nonlinear: tuple[float, ...], _amplitudes: Floats) -> Floats:
-        return np.asarray(columns * float(np.sqrt(np.mean(np.square(effect)))))
+        return columns * float(np.sqrt(np.mean(np.square(effect))))
 
     return beside
 
@@ -219,7 +219,7 @@ def _between(grids: tuple[tuple[float, ...], ...], columns: Floats) -> Callable[
             k = int(np.clip(np.searchsorted(grid, value) - 1, 0, len(grid) - 2))
             share = float(np.clip((value - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0))
             found = (1.0 - share) * found[k] + share * found[k + 1]
-        return np.asarray(found)
+        return found
 
     if not grids:
         alone = columns[0]

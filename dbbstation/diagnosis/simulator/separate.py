@@ -124,4 +124,4 @@ def _column(found: SearchOutcome, name: str) -> Floats:
     cause = next(cause for cause in settled.causes if cause.name == name)
     member = settled.comparison.scan((), [cause]).best[0]
     values = settled.comparison.estimates([member]).values
-    return np.asarray(settled.bank.samples(member.columns) @ values)
+    return settled.bank.samples(member.columns) @ values

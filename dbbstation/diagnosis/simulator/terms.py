@@ -191,7 +191,7 @@ def bends(knots: Sequence[float]) -> Floats:
     """Return spline coefficients without straight lines, orthonormal, shape (k, k - 2) [Greville abscissae; de Boor, ch. IX]."""
     count = len(knots) - DEGREE - 1
     means = np.array([np.mean(knots[k + 1 : k + 1 + DEGREE]) for k in range(count)])
-    return np.asarray(null_space(np.vstack([np.ones(count), means - means.mean()])))
+    return null_space(np.vstack([np.ones(count), means - means.mean()]))
 
 
 def _remembering(term: Term) -> Evaluate:

@@ -42,7 +42,7 @@ def trial_inputs(model: Model) -> list[TrialInput]:
         return TrialInput(run, about, {**recorded.inputs, **{name: of(values) for name, values in own.items()}})
 
     def between(values: Floats, height: Floats) -> Floats:
-        return np.asarray(values.min() + np.ptp(values) * height)
+        return values.min() + np.ptp(values) * height
 
     found = [made("the inputs as recorded", lambda values: values)]
     for factor in FACTORS:
@@ -98,4 +98,4 @@ def beside(columns: Floats, wanted: Floats) -> Floats:
     """Return the residual of rows, shape (n,), after fitting columns, shape (n, p)."""
     norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     values = np.linalg.lstsq(columns / norm, wanted, rcond=1e-10)[0]
-    return np.asarray(wanted - (columns / norm) @ values)
+    return wanted - (columns / norm) @ values

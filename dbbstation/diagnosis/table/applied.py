@@ -99,7 +99,7 @@ def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) 
 
 
 def _variances(rows: Floats, covariance: Floats) -> Floats:
-    return np.asarray(np.maximum(np.sum(rows @ covariance * rows, axis=1), 0.0))
+    return np.maximum(np.sum(rows @ covariance * rows, axis=1), 0.0)
 
 
 FORMED = frozenset({Family.LINEAR, Family.ONCE, Family.TWICE, Family.CURVE, Family.WAVE, Family.BUMP, Family.STEP})

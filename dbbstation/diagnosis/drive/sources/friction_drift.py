@@ -55,4 +55,4 @@ class FrictionDrift(DriveSource):
 def _growth(signals: Signals, time_constant_s: float) -> Floats:
     since = signals.t_s - signals.t_s[0]
     done = -np.expm1(-since / time_constant_s)
-    return np.asarray(done / done[-1] - np.mean(done / done[-1]))
+    return done / done[-1] - np.mean(done / done[-1])

@@ -60,4 +60,4 @@ def _columns(signals: Signals, shape: tuple[float, ...]) -> Floats:
     gap_mm, rise = shape
     since = 1e3 * signals.since_reversal_m
     missing = np.clip((gap_mm * (1.0 + rise) - since) / (gap_mm * rise), 0.0, 1.0)
-    return np.asarray(-(signals.direction * missing)[:, None], dtype=np.float64)
+    return -(signals.direction * missing)[:, None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,14 +15,14 @@ from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import parts_of
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.bank import spacing_of
-from dbbstation.inference.blocks import Block, compress, with_random
+from dbbstation.inference.blocks import Block, compress, slices, with_random
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.triangle import axes_of
+from dbbstation.inference.triangle import axes_of, rms
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -62,8 +62,7 @@ class CircleChannel:
         self.machine: Machine = calibration.layout.machine
         self.motions = [observation.motion() for observation in calibration.observations]
         self.readings = [calibration.model.bar(motion) for motion in self.motions]
-        ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
-        self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self.runs = slices(len(reading.length_mm) for reading in self.readings)
         self.columns = CauseColumns(self._base(), room=BOUNDS.room)
         self.sources = {(source.name, source.law): source for source in sources}
         self.set_up = self._outsize()
@@ -103,13 +102,9 @@ class CircleChannel:
             found.append(Cause(name, tuple(variants), NAMED_ODDS))
         return tuple(found)
 
-    def columns_of(self, variants: Sequence[Variant]) -> Integers:
-        """Return the columns of several forms' amplitudes."""
-        return np.concatenate([np.zeros(0, dtype=np.int64), *(variant.columns for variant in variants)])
-
     def known_with(self, variants: Sequence[Variant]) -> Columns:
         """Return priors and scales of the base, then of amplitudes of forms."""
-        return with_random(self.base, np.concatenate([np.zeros(0), *(variant.plausible for variant in variants)]))
+        return with_random(self.base, [variant.plausible for variant in variants])
 
     def whole(self, name: str, variant: Variant) -> Variant:
         """Return a cause's form with all amplitudes at the same nonlinear parameters, without slack."""
@@ -226,7 +221,7 @@ class CircleChannel:
         slack = self.columns.add(np.hstack([tangents, discrepancy]))
         sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1], source.form_uncertainty)])
         size = [values[own][amplitudes] / np.array([parameters[k].plausible for k in amplitudes]) for own in values]
-        at = max(float(np.sqrt(np.mean(np.square(size)))), 1e-12)
+        at = max(rms(np.array(size)), 1e-12)
         # A tangent covers about 2.5 grid points of a nonlinear parameter.
         covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))

@@ -23,6 +23,7 @@ from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.hypotheses import CLOSE
 from dbbstation.inference.jackknife import widening
+from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
     groups = in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR)
     variants = [member.variant for member in settled.members]
     known = channel.known_with(variants)
-    blocks = channel.blocks(channel.columns_of(variants), channel.target(settled.after))
+    blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
     every = np.arange(len(known.prior))
     without, having = (
         held_out(blocks, groups, known, active, noise_mm, channel.held, single)
@@ -59,7 +60,7 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
     members = [m for m in settled.best.members if not m.cause.setup]
     variants = [member.variant for member in members]
     known = channel.known_with(variants)
-    blocks = channel.blocks(channel.columns_of(variants), channel.target(settled.after))
+    blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
     owner = np.repeat(np.arange(len(members)), [len(variant.columns) for variant in variants])
     groups, base = (
         in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR),

@@ -40,12 +40,10 @@ def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, le
 def _with_unmodelled(settled: SettledCircles, struts: list[Floats | None]) -> list[Floats | None]:
     """Add struts' unmodelled contributions to readings, shape (n, 6) [mm] per run."""
     unmodelled, members = settled.unmodelled, settled.best.members
-    values = settled.comparison.estimates(members).values if members else np.zeros(0)
-    for member in members:
-        own, values = values[: len(member.variant.columns)], values[len(member.columns) :]
+    for member, own, _ in settled.comparison.estimated(members):
         shapes = [one for one in unmodelled.of(member) if one.follows.moves_struts]
         for k, run in enumerate(unmodelled.runs):
-            rest = own
+            rest = own[: len(member.variant.columns)]
             for shape in shapes:
                 effect, count = shape.by_strut(run, rest)
                 rest, before = rest[count:], struts[k]

@@ -12,6 +12,7 @@ from dbbstation.diagnosis.findings import NextTest, Verdict
 from dbbstation.diagnosis.foreseen import ForeseenTests
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.verdict import OUT
 from dbbstation.plan.circle import Direction
@@ -89,7 +90,7 @@ def propose(
     first = len(channel.base.prior)
     variants = [variant for _, variant in asked]
     known = channel.known_with(variants)
-    blocks = channel.blocks(channel.columns_of(variants), np.zeros(channel.runs[-1].stop))
+    blocks = channel.blocks(all_columns(variants), np.zeros(channel.runs[-1].stop))
     noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
     covariance = solve(blocks, known, noise_mm, channel.held).covariance
     own = slice(first, first + len(variant.columns))

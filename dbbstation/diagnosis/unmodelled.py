@@ -12,7 +12,7 @@ from dbbstation.diagnosis.parts import ALIKE
 from dbbstation.diagnosis.shape_look import TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Follows, Samples, Shape, ranges, samples_of, shapes, wander
 from dbbstation.inference.blocks import with_random
-from dbbstation.inference.model_comparison import Cause, Variant
+from dbbstation.inference.model_comparison import Cause, Variant, all_columns
 from dbbstation.inference.patterns import FAMILY_ODDS
 from dbbstation.machine.geometry import STRUTS
 
@@ -56,10 +56,9 @@ class Unmodelled:
         """
         members = [member for member in best if member.cause.named]
         channel = self.channel
-        taken = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
-        known = with_random(channel.base, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
+        known = with_random(channel.base, [member.sd for member in members])
         own = channel.columns
-        base = (np.hstack([own.base[rows], own.samples[rows][:, taken]]) for rows in channel.runs)
+        base = (np.hstack([own.base[rows], own.samples[rows][:, all_columns(members)]]) for rows in channel.runs)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
         look = TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
         found = looked_for(look, ranges(self.runs))
@@ -73,8 +72,8 @@ class Unmodelled:
         return self.shapes.get((member.cause.name, member.variant.label), ())
 
     def _forget(self, names: set[str]) -> None:
-        gone = [variant.columns for cause in self.causes if cause.name in names for variant in cause.variants]
-        self.channel.columns.give_back(np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *gone])))
+        gone = [variant for cause in self.causes if cause.name in names for variant in cause.variants]
+        self.channel.columns.give_back(np.unique(all_columns(gone)))
         self.causes = [cause for cause in self.causes if cause.name not in names]
         self.follows = {name: follows for name, follows in self.follows.items() if name not in names}
         self._looked_for -= names

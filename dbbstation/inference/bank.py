@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import diags_array
 from scipy.special import chdtri
 
-from dbbstation.inference.blocks import compress
+from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.coloured import (
     FEWEST_INDEPENDENT,
@@ -30,7 +30,7 @@ from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, ZERO_SD, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import solve
-from dbbstation.inference.triangle import RANK
+from dbbstation.inference.triangle import RANK, rms
 from dbbstation.inference.uneven import (
     has_long_tails,
     log_student,
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.inference.blocks import Columns
     from dbbstation.inference.channel import Channel, Law
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.patterns import Pattern
@@ -154,6 +155,11 @@ class Bank:
     def fitted(self, columns: Integers) -> Floats:
         """Return whitened columns over kept rows, shape (m, p)."""
         return self._columns.of(columns)
+
+    def jointly(self, members: Sequence[Member]) -> tuple[Floats, Columns]:
+        """Return whitened columns of base and members over kept rows, shape (m, k), with their priors."""
+        columns = np.hstack([self.base, *(self.fitted(member.columns) for member in members)])
+        return columns, with_random(self.channel.known, [member.sd for member in members])
 
     def beside(self, but_for: Flags | None = None, only: Integers | None = None) -> BesideBase:
         """Return causes with the base projected out; `but_for` marks rows to ignore, shape (m,), whose target must be zero.
@@ -377,7 +383,7 @@ class Bank:
         width = exact.shape[1]
         sd = np.concatenate([spacings, np.full(slack.shape[1] - len(tangents), law.form_uncertainty)])
         used, plausible = amplitudes != 0.0, law.plausible_of(exact)
-        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / plausible[used])))), 1e-12)
+        at = max(rms(amplitudes[used] / plausible[used]), 1e-12)
         points = float(np.prod([len(grid) for grid in law.grids]))
         # A tangent covers about 2.5 grid points of a nonlinear parameter.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from dbbstation.inference.triangle import triangle_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
 
@@ -32,6 +33,11 @@ class Block:
     count: int
     square: float
     noise: float | None = None
+
+
+def slices(lengths: Iterable[int], first: int = 0) -> list[slice]:
+    """Return consecutive slices of given lengths, the first of which starts at `first`."""
+    return [slice(*pair) for pair in pairwise(np.cumsum([first, *lengths]).tolist())]
 
 
 def compress(columns: Integers, jacobian: Floats, target: Floats) -> Block:
@@ -96,8 +102,9 @@ class Columns:
     random: Flags
 
 
-def with_random(known: Columns, sd: Floats) -> Columns:
+def with_random(known: Columns, sds: Iterable[Floats]) -> Columns:
     """Append random effects with these standard deviations to columns."""
+    sd = np.concatenate([np.zeros(0), *sds])
     return Columns(
         np.concatenate([known.prior, sd]),
         np.concatenate([known.scale, sd]),

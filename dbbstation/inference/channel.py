@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dbbstation.inference.blocks import Block, Columns, compress
+from dbbstation.inference.blocks import Block, Columns, compress, slices
 from dbbstation.inference.square_root import lost_directions, solve
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -209,7 +210,7 @@ class Channel:
         """Return the residual's rms after the base fit, an upper bound of effects."""
         left = self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x
         return max(
-            float(np.sqrt(np.mean(left**2))),
+            rms(left),
             self.least_noise,
             1e-12 * float(np.abs(self.target).max(initial=0.0)),
             1e-300,
@@ -241,8 +242,8 @@ class Channel:
     @property
     def kept_blocks(self) -> list[slice]:
         """Return blocks as slices of kept rows, without empty ones."""
-        counts = np.cumsum([0, *(int(self.kept[rows].sum()) for rows in self.blocks)])
-        return [slice(int(a), int(b)) for a, b in pairwise(counts) if b > a]
+        every = slices(int(self.kept[rows].sum()) for rows in self.blocks)
+        return [rows for rows in every if rows.stop > rows.start]
 
     @property
     def stretches(self) -> list[slice]:

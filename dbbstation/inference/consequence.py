@@ -9,7 +9,7 @@ from scipy.special import fdtrc
 
 from dbbstation.inference.detectable import ENTIRELY
 from dbbstation.inference.left_over import SIGNIFICANT
-from dbbstation.inference.triangle import left_by
+from dbbstation.inference.triangle import left_by, squares
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,8 +37,8 @@ def may_result(variable: Variable, channel: Channel) -> bool:
         _with_derivatives(values, channel.time, channel.blocks)[kept]
         for values in (channel.simulated.values, channel.residual)
     )
-    whole = float(np.sum(np.square(values - values.mean())))
-    left, both = (float(np.sum(np.square(left_by(by, values)))) for by in (simulated, np.hstack([simulated, carried])))
+    whole = squares(values - values.mean())
+    left, both = (squares(left_by(by, values)) for by in (simulated, np.hstack([simulated, carried])))
     if not ENTIRELY * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
         return False
     free = len(values) - simulated.shape[1] - carried.shape[1]

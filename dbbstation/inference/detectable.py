@@ -12,6 +12,7 @@ from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import Detectable
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.patterns import CURVES, Family
+from dbbstation.inference.triangle import squares
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
     for cause in (c for c in settled.causes if c.name in laws and laws[c.name].confirm):
         variant = max(cause.variants, key=lambda one: len(one.columns))
         samples, white = settled.bank.samples(variant.columns), settled.bank.fitted(variant.columns)
-        whole = float(np.sum(np.square(white * variant.plausible)))
+        whole = squares(white * variant.plausible)
         if whole < (NOTHING * settled.noise.innovation) ** 2 * len(white):
             continue
         shown = np.diag(settled.comparison.beside((), variant.columns)) * settled.noise.innovation**2

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.inference.followed import left_without
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import rms, squares
 from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
@@ -139,11 +139,11 @@ def held_out_error(
 
 
 def _gains(settled: Settled, rows: Flags) -> dict[Kind, float]:
-    with_all = float(np.sum(np.square(left_without(settled, ())[rows])))
+    with_all = squares(left_without(settled, ())[rows])
     found: dict[Kind, float] = {}
     for member in settled.best.members:
         kind, error = settled.bank.kind_of(member.cause.name), left_without(settled, [member.cause.name])
-        found[kind] = found.get(kind, 0.0) + float(np.sum(np.square(error[rows]))) - with_all
+        found[kind] = found.get(kind, 0.0) + squares(error[rows]) - with_all
     return found
 
 

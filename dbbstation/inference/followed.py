@@ -12,9 +12,10 @@ from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.levels import RUN, TIME
-from dbbstation.inference.model_comparison import FLEXIBLE, slices_of
+from dbbstation.inference.model_comparison import FLEXIBLE, all_columns
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
+from dbbstation.inference.triangle import rms, squares
 from dbbstation.inference.uneven import log_student
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE, DensityGains
@@ -76,10 +77,8 @@ def only_begun(settled: Settled) -> frozenset[str]:
     remembering = {name for name, law in bank.laws.items() if law.family is Family.MEMORY}
     if not remembering.intersection(settled.best.names):
         return frozenset()
-    values = settled.comparison.estimates(members).values
     axes = np.linalg.qr(channel.base.samples[channel.kept])[0]
-    for member, place in zip(members, slices_of(members), strict=True):
-        own = values[place]
+    for member, own, _ in settled.comparison.estimated(members):
         count = len(member.variant.columns)
         if member.cause.name not in remembering or count < 2:  # noqa: PLR2004 - its gain and its initial states
             continue
@@ -219,8 +218,7 @@ def estimated(settled: Settled, names: Collection[str]) -> tuple[Integers, Float
     members = settled.best.members
     every = settled.comparison.estimates(members)
     inside = np.concatenate([np.full(len(m.columns), m.cause.name in names) for m in members])
-    columns = np.concatenate([m.columns for m in members])[inside]
-    return columns, every.values[inside], every.covariance[np.ix_(inside, inside)]
+    return all_columns(members)[inside], every.values[inside], every.covariance[np.ix_(inside, inside)]
 
 
 def share_made(products: Floats, values: Floats) -> float:
@@ -283,7 +281,7 @@ class ChosenWithoutParts:
         # Effects in time may be the drift that belongs to a law over a variable.
         also = {TIME, RUN} if wanted and self.of({TIME, RUN}).predicts else set[str]()
         left = [left_with(part.settled, {*wanted, *also})[part.rows] for part in self.parts]
-        return [float(np.sqrt(np.mean(np.square(rows)))) for rows in left]
+        return [rms(rows) for rows in left]
 
 
 def left_with(one: Settled, wanted: Collection[str]) -> Floats:
@@ -305,8 +303,8 @@ def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignore
         names = [n for n in one.best.names if n not in out and (wanted is None or follow(n) & set(wanted))]
         with_all = left_without(one, out)
         without = left_without(one, [*out, *names]) if names else with_all
-        after += float(np.sum(np.square(with_all[rows])))
-        before += float(np.sum(np.square(without[rows])))
+        after += squares(with_all[rows])
+        before += squares(without[rows])
         brought.append(log_density(one, rows, with_all) - log_density(one, rows, without) if names else 0.0)
     counts = tuple(int(part.rows.sum()) for part in parts)
     mean = float(sum(counts))

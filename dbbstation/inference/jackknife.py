@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.blocks import compress, with_random
+from dbbstation.inference.blocks import compress
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
@@ -56,9 +56,8 @@ def widening(variances: Floats, moved: Floats, variances_without: Floats) -> Flo
 
 def refits_without(settled: Settled, parts: Sequence[Flags]) -> tuple[Solution, ...]:
     """Refit base and best members without each part, with unchanged selection."""
-    bank, channel, members = settled.bank, settled.channel, settled.best.members
-    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
-    known = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
+    bank, channel = settled.bank, settled.channel
+    columns, known = bank.jointly(settled.best.members)
     numbers, target = np.arange(columns.shape[1]), bank.target
     blocks = [compress(numbers, columns[rows[channel.kept]], target[rows[channel.kept]]) for rows in parts]
     with np.errstate(all="ignore"):

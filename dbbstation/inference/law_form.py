@@ -13,7 +13,8 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.followed import followed_by
 from dbbstation.inference.impossible import impossible
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
-from dbbstation.inference.triangle import left_by, triangle_of
+from dbbstation.inference.model_comparison import all_columns
+from dbbstation.inference.triangle import left_by, squares, triangle_of
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -130,9 +131,8 @@ def _candidates(
 def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> bool:
     if not any(member.variant.positive):
         return True
-    found, width = settled.comparison.estimates([member, *others]), len(member.variant.columns)
-    law = settled.bank.laws[member.cause.name]
-    return not impossible(law, found.values[:width], np.diag(found.covariance)[:width])
+    _, values, covariance = settled.comparison.estimated([member, *others])[0]
+    return not impossible(settled.bank.laws[member.cause.name], values, np.diag(covariance))
 
 
 def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:
@@ -163,24 +163,22 @@ def _scores(
 
 def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], others: Sequence[Member]) -> bool:
     bank = settled.bank
-    own = np.concatenate([m.columns for m in other])
+    own = all_columns(other)
     effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]
     law = bank.laws.get(one[0].cause.name) if len(one) == 1 else None
     corners = product(*((grid[0], grid[-1]) for grid in law.grids)) if law is not None and law.grids else ()
     parts = [
         bank.base,
-        bank.fitted(np.concatenate([m.columns for m in (*others, *one)])),
+        bank.fitted(all_columns((*others, *one))),
         *(bank.whitened(law.columns(point)) for point in corners if law is not None),
     ]
     widths = [part.shape[1] for part in parts]
-    beside = widths[0] + sum(len(m.columns) for m in others)
+    beside = widths[0] + len(all_columns(others))
     # An orthogonal transform keeps what each fit leaves: the triangle has as many rows as columns.
     rows = triangle_of(np.hstack([*parts, effect[:, None]]))
     always, *each = np.split(rows[:, :-1], [beside, *np.cumsum(widths)[1:-1]], axis=1)
-    left, *alone = (
-        float(np.sum(np.square(left_by(columns, rows[:, -1]))))
-        for columns in (always, *(np.hstack([always, form]) for form in each))
-    )
+    columns = (always, *(np.hstack([always, form]) for form in each))
+    left, *alone = (squares(left_by(some, rows[:, -1])) for some in columns)
     return min(alone) <= (1.0 - EQUIVALENT**2) * left
 
 

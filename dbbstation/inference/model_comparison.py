@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from operator import is_
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.linalg import cho_solve
 from scipy.linalg.lapack import dtrtrs
+
+from dbbstation.inference.blocks import slices
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -315,6 +317,12 @@ class ModelComparison:
         inverse = cho_solve((factor, True), np.eye(len(sd)))
         return Estimates(sd * values, sd[:, None] * inverse * sd)
 
+    def estimated(self, members: Sequence[Member]) -> list[tuple[Member, Floats, Floats]]:
+        """Return each member with the posterior means and covariance of its columns, fitted together."""
+        found = self.estimates(members)
+        every = zip(members, slices_of(members), strict=True)
+        return [(member, found.values[own], found.covariance[own, own]) for member, own in every]
+
     def beside(self, members: Sequence[Member], columns: Integers) -> Floats:
         """Return products of columns with base and members projected out, shape (p, p)."""
         columns = self._at(columns)
@@ -328,8 +336,8 @@ class ModelComparison:
     def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> tuple[Integers, Floats]:
         """Return every pair of causes, shape (c, 2), and the members' log marginal likelihood with it, without its slack."""
         lower, z, evidence = self._eliminated(members)
-        columns = self._at(np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)]))
-        sd = np.concatenate([np.zeros(0), *(m.variant.plausible * m.scale for m in more)])
+        columns = self._at(all_columns(m.variant for m in more))
+        sd = np.concatenate([NO_SLACK, *(m.variant.plausible * m.scale for m in more)])
         towards = self._towards[columns]
         gram = self._gram[np.ix_(columns, columns)]
         if members:
@@ -485,8 +493,8 @@ class Around:
         self._rows = _solved(lower, across, transposed=True)
         self._values = _solved(lower, z, transposed=True)
         self._inverse = _solved(lower, np.eye(len(z)))
-        ends = np.cumsum([0, *(len(member.columns) for member in members)])
-        self._places = {m.cause.name: np.arange(a, b) for m, a, b in zip(members, ends[:-1], ends[1:], strict=True)}
+        own = zip(members, slices_of(members), strict=True)
+        self._places = {m.cause.name: np.arange(place.start, place.stop) for m, place in own}
 
     def without(self, names: Collection[str]) -> tuple[Scan, float]:
         """Return the scan given all members but some, and the remaining members' log evidence."""
@@ -548,7 +556,7 @@ def with_slack_of(member: Member, values: Floats) -> Member:
 
 def amplitude_size(member: Member, values: Floats) -> float:
     """Return a member's rms amplitude in plausible sizes."""
-    return float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
+    return rms(values / member.variant.plausible)
 
 
 def _log_factors(seen: Floats, along: Floats) -> Floats:
@@ -559,9 +567,13 @@ def _log_factors(seen: Floats, along: Floats) -> Floats:
 
 def slices_of(members: Sequence[Member], first: int = 0) -> list[slice]:
     """Return each member's place among the columns of all, which begin at `first`."""
-    ends = np.cumsum([first, *(len(member.columns) for member in members)]).tolist()
-    return [slice(*pair) for pair in pairwise(ends)]
+    return slices((len(member.columns) for member in members), first)
+
+
+def all_columns(each: Iterable[Member | Variant]) -> Integers:
+    """Return the columns of members, or of forms without slack, shape (p,)."""
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(one.columns for one in each)])
 
 
 def _stacked(members: Sequence[Member]) -> tuple[Integers, Floats]:
-    return np.concatenate([m.columns for m in members]), np.concatenate([m.sd for m in members])
+    return all_columns(members), np.concatenate([NO_SLACK, *(m.sd for m in members)])

@@ -11,7 +11,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
-from dbbstation.inference.model_comparison import amplitude_size, slices_of
+from dbbstation.inference.model_comparison import amplitude_size
 from dbbstation.inference.patterns import ZEROS, covers_turns, zeros_text
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
@@ -107,10 +107,7 @@ def label_of(settled: Settled, member: Member, values: Floats) -> str:
 
 def values_of_members(settled: Settled, members: Sequence[Member]) -> dict[str, dict[str, Value]]:
     """Return values of members that are fitted together, by name."""
-    if not members:
-        return {}
-    found, every = settled.comparison.estimates(members), zip(members, slices_of(members), strict=True)
-    return {m.cause.name: named_values(settled, m, found.values[own], found.covariance[own, own]) for m, own in every}
+    return {one[0].cause.name: named_values(settled, *one) for one in settled.comparison.estimated(members)}
 
 
 def with_jackknife(

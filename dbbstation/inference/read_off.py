@@ -153,12 +153,8 @@ class CauseJudge:
             [m for m in self._best.members if m.cause.name not in settled.bank.nameless],
         )
         self._classes = self._alternatives.classes
-        estimates = settled.comparison.estimates(self._best.members) if self._members else None
-        self._values: dict[str, tuple[Floats, Floats]] = {}
+        self._values = {m.cause.name: (v, c) for m, v, c in settled.comparison.estimated(self._best.members)}
         self._own = dict(zip(self._members, slices_of(self._best.members), strict=True))
-        for name, own in self._own.items():
-            if estimates is not None:
-                self._values[name] = (estimates.values[own], estimates.covariance[own, own])
         worse = trial is not None and trial.is_worse
         self._levels = VerdictsByLevel(settled, levels, self._pushes(), worse=worse)
         absent = [cause for cause in settled.causes if cause.name not in self._members]
@@ -185,9 +181,8 @@ class CauseJudge:
         if member is None:
             # The prior must not limit the size that could be hidden.
             shown = replace(shown, scale=float(SCALES[-1]))
-            found = self._settled.comparison.estimates([shown, *self._best.without(*self._instead_of(cause.name))])
-            own = len(shown.columns)
-            values, covariance = found.values[:own], found.covariance[:own, :own]
+            beside = self._best.without(*self._instead_of(cause.name))
+            _, values, covariance = self._settled.comparison.estimated([shown, *beside])[0]
         else:
             values, covariance = self._values[cause.name]
         sigmas = self._sigmas(shown, values, covariance)
@@ -311,9 +306,7 @@ class CauseJudge:
         alike = [name for name, equal in self._classes.items() if cause.name in equal]
         if not alike and not any(shown.variant.positive):
             return ""
-        found = self._settled.comparison.estimates([shown, *self._best.without(*alike)])
-        width = len(shown.columns)
-        return self._impossible(shown, found.values[:width], found.covariance[:width, :width])
+        return self._impossible(*self._settled.comparison.estimated([shown, *self._best.without(*alike)])[0])
 
     def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:
         law = self._settled.bank.laws.get(shown.cause.name)

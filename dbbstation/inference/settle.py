@@ -12,11 +12,12 @@ from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
 from dbbstation.inference.impossible import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
-from dbbstation.inference.model_comparison import slices_of
+from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.named_values import moved, values_of_law
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import Beginning, Settled
+from dbbstation.inference.triangle import rms, squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -126,7 +127,7 @@ def _meets(one: Settled, other: Settled) -> bool:
     if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
         return False
     apart = one.predicted() - other.predicted()
-    return float(np.sqrt(np.mean(np.square(apart)))) < SETTLED * other.noise.sigma
+    return rms(apart) < SETTLED * other.noise.sigma
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -280,8 +281,7 @@ def _looked_about(
 def log_probability(bank: Bank, members: Sequence[Member]) -> float:
     """Return the log probability of noise and members, up to a constant."""
     odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-    own = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
-    evidence = bank.beside().comparison(bank.target, np.unique(own)).log_evidence(members)
+    evidence = bank.beside().comparison(bank.target, np.unique(all_columns(members))).log_evidence(members)
     return bank.log_likelihood() + evidence + bank.tails_beyond(members) + odds
 
 
@@ -361,16 +361,14 @@ def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Membe
 
 def _values(beside: BesideBase, target: Floats, members: Sequence[Member]) -> Floats:
     """Return members' values, computed from their columns alone."""
-    own = np.unique(np.concatenate([member.columns for member in members]))
-    return beside.comparison(target, own).values(members)
+    return beside.comparison(target, np.unique(all_columns(members))).values(members)
 
 
 def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], member: Member) -> tuple[float, ...]:
     law, target = bank.laws[member.cause.name], bank.target
     if others:
-        columns = np.concatenate([one.columns for one in others])
         values = _values(beside, target, (member, *others))[len(member.columns) :]
-        target = target - bank.fitted(columns) @ values
+        target = target - bank.fitted(all_columns(others)) @ values
     axes = bank.axes
     target = target - axes @ (axes.T @ target)
     used = amplitudes_of(member.variant)
@@ -378,7 +376,7 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
     def explained(value: float) -> float:
         columns = bank.whitened(law.columns((value,))[:, used])
         columns = columns - axes @ (axes.T @ columns)
-        return float(np.sum(np.square(columns @ np.linalg.lstsq(columns, target, rcond=None)[0])))
+        return squares(columns @ np.linalg.lstsq(columns, target, rcond=None)[0])
 
     (grid,), (value,) = law.grids, member.variant.nonlinear
     at = int(np.argmin(np.abs(np.subtract(grid, value))))
@@ -393,20 +391,12 @@ def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], me
 
 def _impossible(settled: Settled) -> dict[str, str]:
     members, laws = settled.best.members, settled.bank.laws
-    if not members:
-        return {}
-    estimates = settled.comparison.estimates(members)
     found: dict[str, str] = {}
     own: dict[str, dict[str, Value]] = {}
-    for member, part in zip(members, slices_of(members), strict=True):
-        name = member.cause.name
+    for member, values, covariance in settled.comparison.estimated(members):
+        name, width = member.cause.name, len(member.variant.columns)
         if name not in laws:
             continue
-        width, values, covariance = (
-            len(member.variant.columns),
-            estimates.values[part],
-            estimates.covariance[part, part],
-        )
         effect = settled.bank.samples(member.variant.columns) @ values[:width]
         # What is there by one amplitude is not there by less than nothing: its shape would be moved until it is another law.
         least = 0.0 if width == 1 else NEGATIVE_SIGMA

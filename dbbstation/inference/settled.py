@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.model_comparison import slices_of
-
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
@@ -65,10 +63,9 @@ class Settled:
             members: members to fit together; None for the best ones.
         """
         total, members = np.zeros(len(self.channel.residual)), self.best.members if members is None else members
-        values = self.comparison.estimates(members).values if members else np.zeros(0)
-        for member, own in zip(members, slices_of(members), strict=True):
+        for member, values, _ in self.comparison.estimated(members):
             if names is None or member.cause.name in names:
-                total += self.bank.samples(member.columns) @ values[own]
+                total += self.bank.samples(member.columns) @ values
         return total
 
     def base_values(self, effect: Floats | None = None) -> Floats:

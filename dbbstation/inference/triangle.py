@@ -47,6 +47,11 @@ def left_by(columns: Floats, values: Floats) -> Floats:
     return values - scaled @ np.linalg.lstsq(scaled, values, rcond=RANK)[0]
 
 
+def squares(values: Floats) -> float:
+    """Return the sum of squares."""
+    return float(np.sum(np.square(values)))
+
+
 def rms(values: Floats) -> float:
     """Return the root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

@@ -23,6 +23,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
@@ -172,13 +173,8 @@ def compare(
 
 def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
     members = settled.best.members
-    columns = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
-    samples = settled.bank.samples(columns)
-    values: Floats = np.zeros(0)
-    covariance: Floats = np.zeros((0, 0))
-    if members:
-        estimates = settled.comparison.estimates(members)
-        values, covariance = estimates.values, estimates.covariance
+    samples, estimates = settled.bank.samples(all_columns(members)), settled.comparison.estimates(members)
+    values, covariance = estimates.values, estimates.covariance
     found = sides.by_angle(samples @ values)
     out = []
     for pair, rows, order, own in zip(sides.pairs, sides.blocks, sides.orders, found, strict=True):

@@ -44,13 +44,12 @@ def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[Flags]) -> Know
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:
     """Return prediction errors of held-out tests with stated set-ups and some causes."""
     bank = settled.bank
-    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
-    base = settled.channel.known
-    prior = np.concatenate([base.prior, *(member.sd for member in members)])
+    columns, both = bank.jointly(members)
+    prior, base = both.prior, len(settled.channel.base.prior)
     # Kept tests give the amplitudes of causes; only the set-up of a held-out test is fitted to it.
-    known = Columns(prior, prior, np.arange(len(prior)) < len(base.prior))
+    known = Columns(prior, prior, np.arange(len(prior)) < base)
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS_OF_AN_ERROR)
     every = np.arange(len(prior))
     blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
     noise = settled.noise.innovation
-    return held_out(blocks, groups, known, every, noise, np.zeros((0, len(prior) - len(base.prior))))
+    return held_out(blocks, groups, known, every, noise, np.zeros((0, len(prior) - base)))

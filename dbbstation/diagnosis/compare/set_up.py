@@ -12,6 +12,7 @@ from dbbstation.diagnosis.shapes import LEVER_MM, TABLE
 from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.harmonics import bands, basis
 from dbbstation.inference.levels import BALL, BAR
+from dbbstation.inference.triangle import squares
 from dbbstation.sources.registry import sources_named
 
 if TYPE_CHECKING:
@@ -177,8 +178,8 @@ def alike_in_all(one: Followed, sides: Sides, settled: Settled) -> bool:
     if not several or not OF_THE_READING.issuperset(name for names in one.variables for name in names):
         return False
     by_run = np.array(sides.by_angle(settled.effect(one.members)))
-    whole = len(by_run) * float(np.sum(np.square(by_run.mean(axis=0))))
-    return whole >= settled.channel.interchangeable * float(np.sum(np.square(by_run))) > 0.0
+    whole = len(by_run) * squares(by_run.mean(axis=0))
+    return whole >= settled.channel.interchangeable * squares(by_run) > 0.0
 
 
 def with_set_up(follows: Sequence[Followed], sides: Sides, settled: Settled) -> tuple[Followed, ...]:

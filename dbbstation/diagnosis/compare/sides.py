@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.compare.pairs import Sectors
+from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.circle import averaged
@@ -65,8 +65,7 @@ class Sides:
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
         """Return rows of each pair."""
-        ends = np.cumsum([0, *(len(order) for order in self.orders)])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return tuple(slices(map(len, self.orders)))
 
     def rows(self, values_of: Callable[[Pair], Floats]) -> Floats:
         """Return values at common angles as rows, shape (n,)."""

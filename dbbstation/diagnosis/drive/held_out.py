@@ -13,6 +13,7 @@ from dbbstation.diagnosis.drive.moving import within
 from dbbstation.inference.folds import parts_of
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_without
 from dbbstation.inference.settle import settle
+from dbbstation.inference.triangle import squares
 from dbbstation.inference.verdict import Gains, is_worse
 
 if TYPE_CHECKING:
@@ -59,4 +60,4 @@ GAP_PERIODS = 0.5
 
 
 def _error(settled: Settled, rows: Flags, in_time: Collection[str], without: Collection[str]) -> float:
-    return float(np.sum(np.square(left_without(settled, without, in_time)[rows])))
+    return squares(left_without(settled, without, in_time)[rows])

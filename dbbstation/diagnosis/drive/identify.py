@@ -35,6 +35,7 @@ from dbbstation.inference.detectable import detectable_causes
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
 from dbbstation.inference.levels_of import levels_of
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def identify(
         noise_n=noise.sigma,
         noise_correlation_samples=noise.correlation_samples,
         misfit_rms_n=_beyond(force - base_n, noise.sigma),
-        residual_rms_n=ForceErrors(*(float(np.sqrt(np.mean((force - one) ** 2))) for one in (base_n, model_n))),
+        residual_rms_n=ForceErrors(*(rms(force - one) for one in (base_n, model_n))),
         held_back=HeldBack(
             (float(ends[0]), float(ends[1])),
             ForceErrors(steps[0].relative_force_error, steps[-1].relative_force_error),

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS
 from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
 from dbbstation.facts.value import Value
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def limits_of(explained: ExplainedDrive) -> DriveLimits:
     seen = COULOMB_SHARE * recordings.scale.force_n * rest / explained.settled.noise.innovation
     noise = float(np.sqrt(np.mean([one.acceleration_noise_m_s2**2 for one in recordings.signals])))
     return DriveLimits(
-        accelerates=float(np.sqrt(np.mean(acceleration**2))) > ACCELERATES * noise,
+        accelerates=rms(acceleration) > ACCELERATES * noise,
         several_speeds=bool(seen >= OUT),
         reverses=recordings.scale.both_ways,
     )

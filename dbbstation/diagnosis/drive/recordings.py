@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,9 @@ from dbbstation.diagnosis.drive.contract import Scale
 from dbbstation.diagnosis.drive.moving import impulse_response
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -50,8 +51,7 @@ class Recordings:
     @cached_property
     def blocks(self) -> tuple[slice, ...]:
         """Return rows of each recording."""
-        ends = np.cumsum([0, *(len(one.kept) for one in self.signals)])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return tuple(slices(len(one.kept) for one in self.signals))
 
     @cached_property
     def force_n(self) -> Floats:
@@ -90,7 +90,7 @@ class Recordings:
     def scale(self) -> Scale:
         """Return sizes over all recordings."""
         return Scale(
-            force_n=float(np.sqrt(np.mean(self.force_n**2))),
+            force_n=rms(self.force_n),
             speed_m_s=float(np.abs(self.at(lambda s: s.speed_m_s)).max()),
             low_m=min(float(s.position_m.min()) for s in self.signals),
             high_m=max(float(s.position_m.max()) for s in self.signals),

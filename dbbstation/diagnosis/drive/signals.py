@@ -32,6 +32,7 @@ from dbbstation.diagnosis.drive.moving import (
 from dbbstation.diagnosis.drive.sampling import evenly_sampled, stuck_samples
 from dbbstation.diagnosis.drive.travel import resolution_of, retreat_m, turning_points, ways
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats, Integers
@@ -191,7 +192,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     half = half_window(noise_m, rate, standing_m_s / SURE_SIGMA, max(step // 2, 1))
     standing_m_s = max(standing_m_s, SURE_SIGMA * speed_noise_m_s(noise_m, rate, half))
     place, speed = (savgol_filter(position, 2 * half + 1, 2, deriv=k, delta=1.0 / rate) for k in (0, 1))
-    wobble_m = float(np.sqrt(np.mean((position - smooth) ** 2)))
+    wobble_m = rms(position - smooth)
     retreat = retreat_m(max(noise_m, wobble_m), 1e-3 * resolution_of(recording.position_mm))
     way = ways(place, turning_points(place, retreat))
     standing = speed * way <= standing_m_s
@@ -201,7 +202,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     standing[1:] |= turned
     standing[:-1] |= turned
     # Near standstill, the smoothed speed is not the speed of a moving drive.
-    allowed = NOISE_SHARE * float(np.sqrt(np.mean(acceleration**2)))
+    allowed = NOISE_SHARE * rms(acceleration)
     weight = weights(within(standing, half) | stuck, rise_of_weights(noise_m, rate, cutoff, allowed, step))
     kept = np.arange(edge, len(position) - edge, step)
     kept = kept[low_passed(weight, rate, cutoff)[kept] >= LEAST_SHARE]

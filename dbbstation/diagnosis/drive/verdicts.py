@@ -16,6 +16,7 @@ from dbbstation.inference.patterns import Family
 from dbbstation.inference.pushes import MOST_PUSHES
 from dbbstation.inference.read_off import CauseJudge
 from dbbstation.inference.stretches import SHORTEST
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict
 
 if TYPE_CHECKING:
@@ -293,7 +294,7 @@ class Verdicts(CauseJudge):
     def _beyond_band_n(self) -> float:
         """Return the rms force above the cut-off [N]."""
         recordings = self._drive.recordings
-        return float(np.sqrt(np.mean((recordings.at(lambda s: s.force_n) - recordings.force_n) ** 2)))
+        return rms(recordings.at(lambda s: s.force_n) - recordings.force_n)
 
     def _no_transient(self) -> tuple[Verdict, str]:
         settled, scale = self._settled, self._drive.scale

@@ -111,7 +111,7 @@ class SimulatorComparison:
     def rms(self) -> tuple[float, float, float]:
         """Return rms errors as simulated, refitted and corrected."""
         every = (self.as_simulated, self.base.fitted.residual, self.found.residual)
-        return tuple(float(np.sqrt(np.mean(rows**2))) for rows in every)  # type: ignore[return-value]  # three of them
+        return tuple(rms(rows) for rows in every)  # type: ignore[return-value]  # three of them
 
 
 def find(

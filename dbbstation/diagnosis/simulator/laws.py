@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.terms import MEMORIES, TermForm
 from dbbstation.diagnosis.simulator.work import PerturbedParameter
 from dbbstation.inference.channel import Law
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -124,7 +125,7 @@ def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
     columns = np.hstack(own)
 
     def beside(effect: Floats, _nonlinear: tuple[float, ...], _amplitudes: Floats) -> Floats:
-        return columns * float(np.sqrt(np.mean(np.square(effect))))
+        return columns * rms(effect)
 
     return beside
 

@@ -28,6 +28,7 @@ from dbbstation.inference.bank import alike
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.named_values import named_values
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -162,9 +163,7 @@ class Node:
         if member is None:
             cause = next(cause for cause in settled.causes if cause.name == one.name)
             member = settled.comparison.scan(others, [cause]).best[0]
-        found = settled.comparison.estimates([member, *others])
-        own = len(member.columns)
-        values = named_values(settled, member, found.values[:own], found.covariance[:own, :own])
+        values = named_values(settled, *settled.comparison.estimated([member, *others])[0])
         if one.tried:
             share = float(np.clip(values[SHARE].value, 0.0, MOST_SHARE))
             return (values[one.names[0]].value * share,)
@@ -218,7 +217,7 @@ class Nodes:
         """Return the refitted simulator without terms."""
         self.progress("refit")
         fitted = fit(self.work, start, several=True)
-        size = float(np.sqrt(np.mean(np.square(fitted.residual)))) or 1.0
+        size = rms(fitted.residual) or 1.0
         node = Node(self.work, fitted, (), size, self.own)
         self.known[node.names] = node
         return node
@@ -323,7 +322,7 @@ def _left(node: Node) -> float:
 
 def _rms(values: Floats) -> float:
     with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.sqrt(np.mean(np.square(values))))
+        return rms(values)
 
 
 def _inside(one: Candidate, numbers: Sequence[float]) -> list[float]:

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.fit import directions_of
 from dbbstation.diagnosis.simulator.model import TrialInput
 from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
+from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,7 +89,7 @@ def apart(work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Seq
         return 0.0
     weight = 1.0 / noise[one.output]
     effects = [weight * (rows[0] - row) for row in rows[1:]]
-    size = float(np.sqrt(np.mean(np.square(rows[0] - rows[1])))) or 1.0
+    size = rms(rows[0] - rows[1]) or 1.0
     found = one.answers(base, directions_of(one, base), size)
     columns = np.column_stack([weight[:, None] * found.columns, effects[1]])
     return float(np.linalg.norm(beside(columns, effects[0])))

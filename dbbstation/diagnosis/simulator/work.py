@@ -7,13 +7,13 @@ Doses are chosen for an effect of a hundredth of the residual, or less if both r
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.triangle import rms
 
@@ -107,8 +107,7 @@ class SimulationRuns:
     trial: TrialInput | None = None
 
     def __post_init__(self) -> None:
-        ends = np.cumsum([0, *(len(run) for run in self.model.runs for _ in self.model.outputs)])
-        self.blocks = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self.blocks = slices(len(run) for run in self.model.runs for _ in self.model.outputs)
         self.time = np.concatenate([run.inputs["t"] for run in self.model.runs for _ in self.model.outputs])
         outputs = [o.name for o in self.model.outputs]
         self.measured = np.concatenate([run.measured[name] for run in self.model.runs for name in outputs])

@@ -11,6 +11,7 @@ from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.bent import bent_laws, grows_with, is_same
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.memory import memory_laws
+from dbbstation.inference.triangle import rms
 from dbbstation.inference.variables import STILL, Kind, Variable
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class Table:
         if name in self.known:
             return self.known[name]
         # A change far above the original error is no plausible correction of a parameter.
-        moves = float(np.sqrt(np.mean(np.square(self.derivatives[name]))))
+        moves = rms(self.derivatives[name])
         off = float(np.std(self.measured - self.simulated))
         return REFITTED * off / moves if moves > 0.0 and off > 0.0 else np.inf
 

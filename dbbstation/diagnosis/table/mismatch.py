@@ -11,7 +11,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.facts.value import Value
-from dbbstation.inference.blocks import compress, with_random
+from dbbstation.inference.blocks import compress
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling_of
 from dbbstation.inference.folds import held_out_error, parts_of
@@ -257,11 +257,9 @@ def choose_without(channel: Channel, rows: Flags, *, beginning: Beginning = Begi
 
 def fitted_together(settled: Settled) -> Solution:
     """Return the fit of base, then best members, to all kept rows."""
-    channel, bank, members = settled.channel, settled.bank, settled.best.members
-    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
-    both = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
-    block = compress(np.arange(columns.shape[1]), columns, bank.target)
-    return solve([block], both, settled.noise.innovation, channel.held)
+    columns, both = settled.bank.jointly(settled.best.members)
+    block = compress(np.arange(columns.shape[1]), columns, settled.bank.target)
+    return solve([block], both, settled.noise.innovation, settled.channel.held)
 
 
 def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[RefittedParameter, ...]:

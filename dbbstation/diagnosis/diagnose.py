@@ -113,7 +113,7 @@ def _answered(explained: Explained, progress: Callable[[str], None], *, hold_out
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
         second_start_agrees=None if stopped else settled.second_start_agrees(),
-        cancelling=cancelling({m.cause.name: outcome.effect([m.cause.name]) for m in members}, "µm", 1e3),
+        cancelling=cancelling({m.name: outcome.effect([m.name]) for m in members}, "µm", 1e3),
         next_tests=() if stopped else next_tests(explained, findings, elsewhere),
         limits=limits_of(settled),
     )
@@ -164,14 +164,14 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
             )
         rms_um, where = where_left(settled.after.observations, found)
         return Unexplained(max(1e3 * left.rms, rms_um), None, None, 0.0, f"{text} {where}")
-    member = max(effects, key=lambda m: settled.best.log_factor(m.cause.name))
+    member = max(effects, key=lambda m: settled.best.log_factor(m.name))
     curve = curve_of(explained.channel, settled, member)
     where = "no single strut" if curve.strut is None else f"strut {curve.strut}"
     if len(unmodelled.of(member)) > 1:
         where = f"each strut by its own curve, strut {curve.strut} most"
     text = f"An unmodelled effect, organised by {curve.variable}, {where}."
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
-    gain = settled.best.log_factor(member.cause.name)
+    gain = settled.best.log_factor(member.name)
     return Unexplained(rms_um, curve.strut, curve.follows, gain, text, curve)
 
 
@@ -189,7 +189,7 @@ def rough_formulas(settled: SettledCircles) -> list[str]:
     for member in settled.members:
         firm = [replace(m, slack_scale=0.0) if m is member else m for m in settled.best.members]
         if len(member.variant.slack) and evidence - settled.comparison.log_evidence(firm) > BETTER:
-            found.append(member.cause.name)
+            found.append(member.name)
     return found
 
 

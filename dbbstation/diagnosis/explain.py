@@ -90,11 +90,11 @@ def _with_set_up(
         channel, settled = settle(before)
         explained = Explained(before, outliers, channel, misfit_of(before, settled.noise), settled)
         off = [m for m in settled.best.members if m.cause.setup]
-        off = [m for m in off if settled.posterior.probability([m.cause.name]) >= SURE]
+        off = [m for m in off if settled.posterior.probability([m.name]) >= SURE]
         if not off or len(outliers) >= MOST or settled.stopped:
             return explained
-        worst = max(off, key=lambda m: settled.best.log_factor(m.cause.name))
-        step = set_free(fit, before, worst.cause.name, worst.variant.label)
+        worst = max(off, key=lambda m: settled.best.log_factor(m.name))
+        step = set_free(fit, before, worst.name, worst.variant.label)
         if step is None:
             return explained
         outliers, before = (*outliers, step[0]), step[2]
@@ -165,7 +165,7 @@ class _Settling:
     def _is_done(self, settled: SettledCircles) -> bool:
         if self._is_laid_out_better(settled):
             return False
-        named = frozenset((m.cause.name, m.variant.law) for m in settled.members)
+        named = frozenset((m.name, m.variant.law) for m in settled.members)
         if named == self._fitted or named in self._tried:
             done, self._likely = self._likely == LIKELY, LIKELY
             return done
@@ -185,11 +185,11 @@ class _Settling:
 
     def _is_laid_out_better(self, settled: SettledCircles) -> bool:
         usual = _usual_scatter(self._fit) if any(m.cause.setup for m in settled.best.members) else self._scatter
-        rough = [(m, r) for m, r in _with_rivals(settled) if (r.cause.name, r.variant.law) not in self._laid_out]
+        rough = [(m, r) for m, r in _with_rivals(settled) if (r.name, r.variant.law) not in self._laid_out]
         if rough:
             target = self._channel.target(self._fit)
             for member, rival in rough:
-                self._laid_out.add((rival.cause.name, rival.variant.law))
+                self._laid_out.add((rival.name, rival.variant.law))
                 _lay_out(self._channel, self._beside, settled.best, member, rival, self._fit, target)
         wider = usual > self._scatter
         self._scatter = max(usual, self._scatter)
@@ -203,13 +203,13 @@ def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
     return pairs + [
         (member, rival)
         for member in settled.members
-        for rival in in_place_of(member.cause.name, settled.comparison, named, best)
+        for rival in in_place_of(member.name, settled.comparison, named, best)
     ]
 
 
 def _by_other_laws(settled: SettledCircles, member: Member) -> list[Member]:
     """Return a member once with each other law of its cause, because a law on its grid cannot compete with a refined one."""
-    scan = settled.comparison.scan(_lawful(settled.best, member.cause.name), other_laws(member))
+    scan = settled.comparison.scan(_lawful(settled.best, member.name), other_laws(member))
     return [replace(one, cause=member.cause) for one in scan.best]
 
 
@@ -263,12 +263,12 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
     """Return the result with a joint fit of exactly its named causes, if rounds alternated."""
     base = {term.source.name for term in channel.calibration.layout.terms}
     fitted = {term.source.name for term in settled.after.layout.terms} - base
-    if fitted == {m.cause.name for m in settled.members}:
+    if fitted == {m.name for m in settled.members}:
         return settled
     joint = _joint(channel, settled.comparison, settled.best)
     if joint is not None:
         return replace(settled, after=joint, left=misfit_of(joint, settled.noise))
-    named = [h for h in settled.posterior.hypotheses if {m.cause.name for m in h.members if m.cause.named} == fitted]
+    named = [h for h in settled.posterior.hypotheses if {m.name for m in h.members if m.cause.named} == fitted]
     return (
         replace(settled, best=named[0])
         if named
@@ -286,7 +286,7 @@ def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothe
     for hypothesis in posterior.hypotheses:
         if hypothesis.log_posterior < top - CLOSE:  # exact fits would not change the decision
             break
-        if frozenset((m.cause.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
+        if frozenset((m.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
             return hypothesis
     return posterior.best
 
@@ -297,11 +297,11 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
         return channel.calibration
     lawful = replace(best, members=_lawful(best))
     start = {
-        m.cause.name: values
+        m.name: values
         for m, values in zip(lawful.members, _estimated(channel, comparison, lawful), strict=True)
         if values is not None
     }
-    every = [*default_sources(), *(channel.source_of(m.cause.name, m.variant) for m in members)]
+    every = [*default_sources(), *(channel.source_of(m.name, m.variant) for m in members)]
     for within in (None, GRID):
         # A hardly determined shape, such as a decay shorter than the sampling, diverges together with its amplitude.
         try:
@@ -328,13 +328,13 @@ def _estimated(channel: CircleChannel, comparison: ModelComparison, hypothesis: 
         if not member.cause.named:
             found.append(None)
             continue
-        source = channel.source_of(member.cause.name, member.variant)
+        source = channel.source_of(member.name, member.variant)
         parameters = source.parameters(channel.machine)
         shaped = np.array([bool(p.grid) for p in parameters])
-        whole = channel.to_whole(member.variant) @ own[: len(member.variant.columns)]
+        whole = channel.to_whole(member.variant) @ own[: member.width]
         full = np.empty(len(parameters))
         full[~shaped] = whole[: int((~shaped).sum())]
-        tangents = own[len(member.variant.columns) :][: int(shaped.sum())] if len(member.variant.slack) else 0.0
+        tangents = own[member.width :][: int(shaped.sum())] if len(member.variant.slack) else 0.0
         full[shaped] = np.array(member.variant.nonlinear) + tangents
         for k in np.flatnonzero(shaped):
             full[k] = np.clip(full[k], min(parameters[k].grid), max(parameters[k].grid))
@@ -360,8 +360,8 @@ def _lay_out(
     fit: Calibration,
     target: Floats,
 ) -> None:
-    others = _lawful(best, member.cause.name)
-    name, law = rival.cause.name, rival.variant.law
+    others = _lawful(best, member.name)
+    name, law = rival.name, rival.variant.law
     sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
     for _ in range(BOUNDS.steps_of_rivals if rival.variant.nonlinear else 1):
         hypothesis = Hypothesis((*others, rival), 0.0)

@@ -68,7 +68,7 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
     )
     found = []
     for names in left_out:
-        kept = np.array([m.cause.name not in names for m in members], dtype=bool)[owner]
+        kept = np.array([m.name not in names for m in members], dtype=bool)[owner]
         active = np.concatenate([base, len(base) + np.flatnonzero(kept)])
         found.append(
             held_out(blocks, groups, known, active, max(settled.noise_mm, SMALLEST_NOISE_MM), channel.held).rms

@@ -81,7 +81,7 @@ def outcome_of(explained: Explained) -> Settled:
 
 def _law(explained: Explained, cause: Cause) -> Law:
     settled, circles, variant = explained.settled, explained.channel, cause.variants[0]
-    member = next((m for m in settled.best.members if m.cause.name == cause.name), None)
+    member = next((m for m in settled.best.members if m.name == cause.name), None)
     variant = variant if member is None else member.variant
     source = circles.sources.get((cause.name, variant.law))
     follows = settled.unmodelled.follows.get(cause.name)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, levels: Levels) -> tuple[Location, ...]:
     """Return the largest misfits of the base, the variable of the largest class, and the struts of all classes."""
-    names = {member.cause.name for member in settled.members}
+    names = {member.name for member in settled.members}
     fitted = [f for f in settled.after.model.sources if f.source.name in names]
     largest = max(levels.follows, key=lambda one: one.rms, default=None)
     variable = "" if largest is None or largest.in_time else largest.variables[0][0]
@@ -43,7 +43,7 @@ def _with_unmodelled(settled: SettledCircles, struts: list[Floats | None]) -> li
     for member, own, _ in settled.comparison.estimated(members):
         shapes = [one for one in unmodelled.of(member) if one.follows.moves_struts]
         for k, run in enumerate(unmodelled.runs):
-            rest = own[: len(member.variant.columns)]
+            rest = own[: member.width]
             for shape in shapes:
                 effect, count = shape.by_strut(run, rest)
                 rest, before = rest[count:], struts[k]

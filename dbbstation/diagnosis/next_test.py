@@ -51,7 +51,7 @@ def next_tests(
         elsewhere.uncertainty_rms_um is not None and elsewhere.uncertainty_rms_um < elsewhere.error_rms_um
     )
     causes = {cause.name: cause for cause in settled.causes if cause.named}
-    found = {m.cause.name: channel.whole(m.cause.name, m.variant) for m in settled.members}
+    found = {m.name: channel.whole(m.name, m.variant) for m in settled.members}
     for finding in findings:
         one_number = finding.name in found and len(found[finding.name].columns) == 1
         if finding.verdict is Verdict.RULED_OUT or (finding.verdict is Verdict.IDENTIFIED and (known or one_number)):
@@ -59,7 +59,7 @@ def next_tests(
         asked = [finding.name, *(name for name in (*finding.ambiguous_with, *found) if name in causes)]
         others = [causes[name] for name in dict.fromkeys(asked) if name not in found]
         scan = settled.comparison.scan(settled.best.members, others)
-        forms = found | {m.cause.name: channel.whole(m.cause.name, m.variant) for m in scan.best}
+        forms = found | {m.name: channel.whole(m.name, m.variant) for m in scan.best}
         # Future temperatures are unknown, so effects by thermometers are assumed known.
         beside = [(channel.source_of(name, forms[name]), forms[name]) for name in dict.fromkeys(asked)]
         foreseen = [(source, variant) for source, variant in beside if Need.TEMPERATURE not in source.needs]

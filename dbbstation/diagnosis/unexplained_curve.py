@@ -94,8 +94,8 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
 
 def _largest(settled: SettledCircles, member: Member) -> Shape:
     shapes = settled.unmodelled.of(member)
-    found = settled.comparison.estimates([member, *settled.best.without(member.cause.name)])
-    parts = _parts(shapes, found.values[: len(member.variant.columns)])
+    found = settled.comparison.estimates([member, *settled.best.without(member.name)])
+    parts = _parts(shapes, found.values[: member.width])
     return max(zip(shapes, parts, strict=True), key=lambda one: float(one[1] @ one[1]))[0]
 
 
@@ -118,7 +118,7 @@ def _summed(runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_
 
 def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
     unmodelled, comparison = settled.unmodelled, settled.comparison
-    names = {m.cause.name for m in together}
+    names = {m.name for m in together}
     others = settled.best.without(*names)
     scale = max(m.scale for m in together)
     # Forms picked from many also fit noise, by more than one for each amplitude.
@@ -131,7 +131,7 @@ def _not_followed(settled: SettledCircles, together: Sequence[Member]) -> float:
     ]
     without = comparison.explained(others)
     own = comparison.explained([*together, *others]) - without
-    more = comparison.explained([*every, *others]) - without - sum(len(one.variant.columns) for one in every) - own
+    more = comparison.explained([*every, *others]) - without - sum(one.width for one in every) - own
     return max(more, 0.0) / max(own, 1e-300)
 
 

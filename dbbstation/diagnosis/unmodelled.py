@@ -62,14 +62,14 @@ class Unmodelled:
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
         look = TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
         found = looked_for(look, ranges(self.runs))
-        self._forget(self._looked_for - {member.cause.name for member in best})
+        self._forget(self._looked_for - {member.name for member in best})
         before = set(self.follows)
         self._add(found)
         self._looked_for |= set(self.follows) - before
 
     def of(self, member: Member) -> tuple[Shape, ...]:
         """Return shapes of an effect's form; empty for named causes."""
-        return self.shapes.get((member.cause.name, member.variant.label), ())
+        return self.shapes.get((member.name, member.variant.label), ())
 
     def _forget(self, names: set[str]) -> None:
         gone = [variant for cause in self.causes if cause.name in names for variant in cause.variants]

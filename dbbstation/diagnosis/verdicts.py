@@ -112,7 +112,7 @@ class _CircleJudge(CauseJudge):
     def _concealed(self, shown: Member, effect: Floats, values: Floats) -> tuple[float, float, float]:
         """Return an effect's found or plausible rms, the rms not absorbed [mm], and the absorbed share."""
         columns = shown.variant.columns
-        amplitudes = values[: len(columns)] if shown.cause.name in self._members else shown.variant.plausible
+        amplitudes = values[: len(columns)] if shown.name in self._members else shown.variant.plausible
         effect = self._circles.columns.of(columns) @ amplitudes
         return concealed(effect, self._circles.unconcealed(effect))
 
@@ -145,10 +145,10 @@ class _CircleJudge(CauseJudge):
 
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
         """Return the finding's `parameters`."""
-        if member.cause.name in self._members:
-            return self._fitted(member.cause.name)
-        source = self._circles.source_of(member.cause.name, member.variant)
-        own, spread = len(member.variant.columns), self._circles.to_whole(member.variant)
+        if member.name in self._members:
+            return self._fitted(member.name)
+        source = self._circles.source_of(member.name, member.variant)
+        own, spread = member.width, self._circles.to_whole(member.variant)
         amplitudes = [p for p in source.parameters(self._circles.machine) if not p.grid]
         whole, variance = spread @ values[:own], np.diag(spread @ covariance[:own, :own] @ spread.T)
         return {
@@ -158,7 +158,7 @@ class _CircleJudge(CauseJudge):
 
     def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:
         source, found = (
-            self._circles.source_of(shown.cause.name, shown.variant),
+            self._circles.source_of(shown.name, shown.variant),
             self._values_of(shown, values, covariance),
         )
         positive = {p.name: found[p.name] for p in source.parameters(self._circles.machine) if p.positive}
@@ -187,10 +187,8 @@ class _CircleJudge(CauseJudge):
         amplitudes = self._joint.after.layout.columns_of(name)[0]
         if self._best.members == self._joint.members:
             return amplitudes[:0], np.zeros(0), np.zeros(0)
-        first = sum(
-            len(m.columns) for m in self._joint.members[: [m.cause.name for m in self._joint.members].index(name)]
-        )
-        width, spread = len(self._members[name].variant.columns), self._circles.to_whole(self._members[name].variant)
+        first = sum(len(m.columns) for m in self._joint.members[: [m.name for m in self._joint.members].index(name)])
+        width, spread = self._members[name].width, self._circles.to_whole(self._members[name].variant)
         alone = self._settled.comparison.estimates(self._joint.members).values[first : first + width]
         values, covariance = self._values[name]
         variances = np.diag(spread @ covariance[:width, :width] @ spread.T)
@@ -199,5 +197,5 @@ class _CircleJudge(CauseJudge):
 
 def form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
     """Return the relative inaccuracy of a cause's formula; zero for unmodelled causes."""
-    source = sources.get((member.cause.name, member.variant.law))
+    source = sources.get((member.name, member.variant.law))
     return 0.0 if source is None else source.form_uncertainty

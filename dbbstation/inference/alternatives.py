@@ -49,7 +49,7 @@ class Alternatives:
         self._comparison, self._causes, self._best = comparison, causes, best
         self._form_uncertainty = form_uncertainty
         self._inside, self._weights, self._place = _inclusions(posterior)
-        self.classes = {member.cause.name: self._class(member) for member in of}
+        self.classes = {member.name: self._class(member) for member in of}
         self.ambiguities = {
             name: self.ambiguity(name) for name, equal in self.classes.items() if self.probability(equal) < SURE
         }
@@ -79,9 +79,9 @@ class Alternatives:
         return tuple(other for other in chosen if other != name) if self.probability(chosen) >= SURE else ()
 
     def _class(self, member: Member) -> tuple[str, ...]:
-        others = self._best.without(member.cause.name)
+        others = self._best.without(member.name)
         rivals = [c for c in self._causes if c.name not in self._best.names and not c.setup]
-        return (member.cause.name, *(c.name for c in rivals if self._is_alike(member, c, others)))
+        return (member.name, *(c.name for c in rivals if self._is_alike(member, c, others)))
 
     def _is_alike(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
         own = member.variant.columns
@@ -94,7 +94,7 @@ class Alternatives:
         formulas = np.hypot(self._form_uncertainty(member), self._form_uncertainty(in_place.best[0]))
         if np.sqrt(1.0 - cosine**2) <= formulas:
             return False
-        return self._best.log_factor(member.cause.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
+        return self._best.log_factor(member.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
 
     def _cosine(self, one: Integers, other: Integers, others: tuple[Member, ...]) -> float:
         """Return the least cosine between two causes' spans, given base and other members; 1 means equal effects."""

@@ -119,7 +119,11 @@ class Bank:
         size = self.channel.size / left.noise
         causes = [self._cause(p, np.arange(a, b), size) for p, a, b in zip(found, ends[:-1], ends[1:], strict=True)]
         scan = comparison.scan((), causes)
-        return [p for p, c, worth in zip(found, causes, scan.log_factor, strict=True) if worth + c.log_prior_odds > 0.0]
+        return [p for p, odds in zip(found, scan.log_odds, strict=True) if odds > 0.0]
+
+    def of(self, name: str) -> Pattern | Law | None:
+        """Return a cause's pattern or law; None for others."""
+        return self.patterns.get(name) or self.laws.get(name)
 
     @property
     def count(self) -> int:
@@ -319,7 +323,7 @@ class Bank:
         idle: set[str] = set()
         if found:
             scan = beside.comparison(self.target).scan((), found)
-            idle = {c.name for c, worth in zip(found, scan.log_factor, strict=True) if worth + c.log_prior_odds <= 0.0}
+            idle = {c.name for c, odds in zip(found, scan.log_odds, strict=True) if odds <= 0.0}
         sd = np.zeros(self._columns.count)
         for cause in (one for one in self.causes if one.name not in idle):
             for variant in cause.variants:

@@ -116,7 +116,7 @@ def gains_of_tests(
     follow = follow_of(settled)
     classes = [one.wanted for one in classes_of(settled, VariableProbabilities(settled))]
     anew = chosen_anew(*comparisons, choose, settled.bank.kind_of, asked, (classes, follow))
-    names = [member.cause.name for member in settled.best.members]
+    names = [member.name for member in settled.best.members]
     without = [{name for name in names if follow(name) & wanted} for wanted in classes]
     error, *others = errors([(), *without, names])
     counts = tuple(int(one.sum()) for one in rows)
@@ -181,13 +181,13 @@ def chosen_anew(
     brought, whole, of_classes, follows = [], [], [], classes[1]
     for others in of_others:
         chosen = choose(others)
-        names = [member.cause.name for member in chosen if asked(member.cause)]
+        names = [member.name for member in chosen if asked(member.cause)]
         with_all = _predicted(of_all, others, chosen)
         found: dict[Kind, float] = {}
         for name in names:
-            but_for = _predicted(of_all, others, [m for m in chosen if m.cause.name != name])
+            but_for = _predicted(of_all, others, [m for m in chosen if m.name != name])
             found[kind_of(name)] = found.get(kind_of(name), 0.0) + with_all - but_for
-        rest = {wanted: [m for m in chosen if not follows(m.cause.name) & wanted] for wanted in classes[0]}
+        rest = {wanted: [m for m in chosen if not follows(m.name) & wanted] for wanted in classes[0]}
         of_classes.append(
             {
                 wanted: with_all - _predicted(of_all, others, less) if len(less) < len(chosen) else 0.0

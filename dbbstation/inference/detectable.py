@@ -17,7 +17,6 @@ from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.inference.bank import Bank
     from dbbstation.inference.model_comparison import Cause, Variant
     from dbbstation.inference.settled import Settled
 
@@ -37,9 +36,9 @@ def detectable(settled: Settled) -> tuple[Detectable, ...]:
     """Return detectable sizes of effects over variables and of the user's causes, before absorption by the base; the least detectable first."""
     asked: dict[str, Cause] = {}
     for cause in settled.causes:
-        family = _family(settled.bank, cause.name)
+        of = settled.bank.of(cause.name)
         bends = len(cause.variants[0].columns)
-        if family not in (Family.CURVE, Family.LINEAR, Family.DRIFT, None) or bends > CURVES:
+        if (of is not None and of.family not in FORMS) or bends > CURVES:
             continue
         key = ", ".join(sorted(followed_by(settled.bank, cause.name)))
         if key not in asked or bends > len(asked[key].variants[0].columns):
@@ -67,9 +66,8 @@ NOTHING = 1e-3
 """Least whitened rms of an effect, relative to the noise: with less, a million rows show it by one standard deviation."""
 
 
-def _family(bank: Bank, name: str) -> Family | None:
-    of = bank.patterns.get(name) or bank.laws.get(name)
-    return None if of is None else of.family
+FORMS = (Family.CURVE, Family.LINEAR, Family.DRIFT, None)
+"""Families of effects with a detectable size; laws of the user have none."""
 
 
 def _over_variables(settled: Settled, follows: str, cause: Cause) -> Detectable:

@@ -142,7 +142,7 @@ def _gains(settled: Settled, rows: Flags) -> dict[Kind, float]:
     with_all = squares(left_without(settled, ())[rows])
     found: dict[Kind, float] = {}
     for member in settled.best.members:
-        kind, error = settled.bank.kind_of(member.cause.name), left_without(settled, [member.cause.name])
+        kind, error = settled.bank.kind_of(member.name), left_without(settled, [member.name])
         found[kind] = found.get(kind, 0.0) + squares(error[rows]) - with_all
     return found
 

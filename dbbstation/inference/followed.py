@@ -12,7 +12,7 @@ from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.levels import RUN, TIME
-from dbbstation.inference.model_comparison import FLEXIBLE, all_columns
+from dbbstation.inference.model_comparison import FLEXIBLE, all_columns, belong_to
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.triangle import rms, squares
@@ -50,7 +50,7 @@ class WithoutPart:
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:
     """Return variables that a cause follows; for a user's law without variables, its name."""
-    of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
+    of, law = bank.of(name), bank.laws.get(name)
     if of is None:
         return frozenset({name})
     if law is not None and law.followed:
@@ -64,7 +64,7 @@ def followed_by(bank: Bank, name: str) -> frozenset[str]:
 
 def way_of(bank: Bank, name: str) -> str:
     """Return how a cause follows its variables: by value, direction or delay."""
-    of, law = bank.patterns.get(name) or bank.laws.get(name), bank.laws.get(name)
+    of, law = bank.of(name), bank.laws.get(name)
     if law is not None and law.way:
         return law.way
     return VALUE if of is None or of.family is None else WAYS.get(of.family, VALUE)
@@ -79,14 +79,14 @@ def only_begun(settled: Settled) -> frozenset[str]:
         return frozenset()
     axes = np.linalg.qr(channel.base.samples[channel.kept])[0]
     for member, own, _ in settled.comparison.estimated(members):
-        count = len(member.variant.columns)
-        if member.cause.name not in remembering or count < 2:  # noqa: PLR2004 - its gain and its initial states
+        count = member.width
+        if member.name not in remembering or count < 2:  # noqa: PLR2004 - its gain and its initial states
             continue
         samples = bank.samples(member.variant.columns)[channel.kept]
         samples = samples - axes @ (axes.T @ samples)
         begun = np.sum(np.square(samples[:, 1:] @ own[1:count]))
         if begun > np.sum(np.square(samples[:, 0] * own[0])):
-            found.add(member.cause.name)
+            found.add(member.name)
     return frozenset(name for name in found if settled.posterior.probability([name]) < SURE)
 
 
@@ -158,7 +158,7 @@ class VariableClass:
 def classes_of(settled: Settled, probabilities: VariableProbabilities) -> list[VariableClass]:
     """Return classes of variables that the best set follows, most probable first."""
     follow = follow_of(settled)
-    of = {member.cause.name: follow(member.cause.name) for member in settled.best.members}
+    of = {member.name: follow(member.name) for member in settled.best.members}
     there = sorted(frozenset[str]().union(*of.values()), key=lambda v: (-probabilities.of([v]), v))
     found: list[VariableClass] = []
     for variable in there:
@@ -200,7 +200,7 @@ def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause
     if not causes:
         return {}
     columns, values, _ = estimated(settled, members)
-    others = [m for m in settled.best.members if m.cause.name not in members]
+    others = [m for m in settled.best.members if m.name not in members]
     found = {}
     for cause in causes:
         stiff = [one for one in cause.variants if len(one.columns) < FLEXIBLE] or cause.variants
@@ -217,7 +217,7 @@ def estimated(settled: Settled, names: Collection[str]) -> tuple[Integers, Float
     """Return some members' columns, their values, shape (p,), and covariance."""
     members = settled.best.members
     every = settled.comparison.estimates(members)
-    inside = np.concatenate([np.full(len(m.columns), m.cause.name in names) for m in members])
+    inside = belong_to(members, names)
     return all_columns(members)[inside], every.values[inside], every.covariance[np.ix_(inside, inside)]
 
 
@@ -319,7 +319,7 @@ def left_without(one: Settled, names: Collection[str], unseen: Collection[str] =
     """
     rest = one.best.without(*names)
     effect = one.effect(members=rest)
-    shown = one.effect({m.cause.name for m in rest} - set(unseen), rest) if unseen else effect
+    shown = one.effect({m.name for m in rest} - set(unseen), rest) if unseen else effect
     return one.channel.residual - shown - one.channel.base.samples @ one.base_values(effect)
 
 

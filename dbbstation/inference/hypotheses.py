@@ -96,20 +96,25 @@ class Hypothesis:
     @property
     def names(self) -> frozenset[str]:
         """Return names of its causes."""
-        return frozenset(member.cause.name for member in self.members)
+        return frozenset(member.name for member in self.members)
 
     @property
     def lean(self) -> bool:
         """Return whether every member's Bayes factor outweighs its prior odds."""
-        return all(f + m.cause.log_prior_odds > 0.0 for m, f in zip(self.members, self.log_factors, strict=True))
+        return all(odds > 0.0 for odds in self.log_odds)
+
+    @property
+    def log_odds(self) -> list[float]:
+        """Return each member's log odds, given the others."""
+        return [f + m.cause.log_prior_odds for m, f in zip(self.members, self.log_factors, strict=True)]
 
     def without(self, *names: str) -> tuple[Member, ...]:
         """Return the members without the named ones."""
-        return tuple(member for member in self.members if member.cause.name not in names)
+        return tuple(member for member in self.members if member.name not in names)
 
     def log_factor(self, name: str) -> float:
         """Return a member's log Bayes factor, given the others."""
-        return next(f for m, f in zip(self.members, self.log_factors, strict=True) if m.cause.name == name)
+        return next(f for m, f in zip(self.members, self.log_factors, strict=True) if m.name == name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +210,7 @@ class _Search:
     def _grow(self, seeds: Iterable[Sequence[Member]]) -> None:
         self._look_at(())
         for members in seeds:
-            self._look_at([self._anew(member) for member in members if member.cause.name in self._causes])
+            self._look_at([self._anew(member) for member in members if member.name in self._causes])
         self._begun = True
         self._pairs((), self._comparison.scan((), self._causes.values()))
         expanded: set[frozenset[str]] = set()
@@ -231,26 +236,25 @@ class _Search:
         around = self._around(hypothesis)
         self._try_more(hypothesis.members, hypothesis.log_posterior, around.without(())[0])
         for member, factor in zip(hypothesis.members, hypothesis.log_factors, strict=True):
-            others = hypothesis.without(member.cause.name)
+            others = hypothesis.without(member.name)
             without = hypothesis.log_posterior - factor - member.cause.log_prior_odds
             self._score(others, without)
-            self._try_more(others, without, around.without([member.cause.name])[0])
+            self._try_more(others, without, around.without([member.name])[0])
 
     def _challenge(self, hypothesis: Hypothesis) -> None:
         around = self._around(hypothesis)
         for pair in self._least_worth(hypothesis):
             others = hypothesis.without(*pair)
             scan, evidence = around.without(pair)
-            worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-            k = int(worth.argmax())
-            if self._may_be_likely(others, evidence, float(worth[k])):
+            k = int(scan.log_odds.argmax())
+            if self._may_be_likely(others, evidence, float(scan.log_odds[k])):
                 self._look_at([*others, scan.best_of(k)])
         for member in hypothesis.members:
-            if not member.cause.named or len(member.variant.columns) >= FLEXIBLE:
-                self._pairs(hypothesis.without(member.cause.name), around.without([member.cause.name])[0])
+            if not member.cause.named or member.width >= FLEXIBLE:
+                self._pairs(hypothesis.without(member.name), around.without([member.name])[0])
 
     def _least_worth(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
-        worth = dict(zip((m.cause.name for m in hypothesis.members), hypothesis.log_factors, strict=True))
+        worth = dict(zip((m.name for m in hypothesis.members), hypothesis.log_factors, strict=True))
         pairs = combinations(sorted(worth), 2)
         return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[: BOUNDS.replaced]
 
@@ -259,7 +263,7 @@ class _Search:
         return self._comparison.around(hypothesis.members, self._causes.values())
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
-        worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+        worth = scan.log_odds
         for k in np.flatnonzero(log_posterior + worth > self._top - NEGLIGIBLE).tolist():
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
@@ -268,7 +272,7 @@ class _Search:
             self._beyond = max(self._beyond, log_posterior)
             return
         if log_posterior > self._top - NEGLIGIBLE:
-            self._scored.setdefault(frozenset(member.cause.name for member in members), log_posterior)
+            self._scored.setdefault(frozenset(member.name for member in members), log_posterior)
             if len(self._scored) > self._room:
                 self._drop_negligible()
         if worth > 0.0 and log_posterior > self._top - self._likely:
@@ -279,18 +283,16 @@ class _Search:
         self._room = max(BOUNDS.scores, 2 * len(self._scored))
 
     def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
-        hidden = {
-            c.name for c, factor in zip(scan.causes, scan.log_factor, strict=True) if factor + c.log_prior_odds <= 0.0
-        }
+        hidden = {c.name for c, odds in zip(scan.causes, scan.log_odds, strict=True) if odds <= 0.0}
         # A hidden cause seems small alone, but may have its plausible size given the cause that hides it.
         named = [
-            replace(member, scale=1.0) if member.cause.name in hidden else member
+            replace(member, scale=1.0) if member.name in hidden else member
             for member in (*scan.best, *scan.narrow)
             if member is not None and member.cause.named
         ]
         if len(named) > BOUNDS.paired:
             worth = dict(zip((c.name for c in scan.causes), scan.log_factor.tolist(), strict=True))
-            named = sorted(named, key=lambda member: -worth[member.cause.name])[: BOUNDS.paired]
+            named = sorted(named, key=lambda member: -worth[member.name])[: BOUNDS.paired]
         pairs, evidence = self._comparison.log_evidence_of_pairs(members, named)
         causes = np.array([id(member.cause) for member in named])
         apart = np.flatnonzero(causes[pairs[:, 0]] != causes[pairs[:, 1]])
@@ -298,7 +300,7 @@ class _Search:
         worth = evidence + odds[pairs].sum(axis=1)
         best = apart[np.argsort(-worth[apart])]
         # A flexible form imitates two causes, so pairs of inflexible causes are examined separately.
-        widths = np.array([len(member.variant.columns) for member in named])
+        widths = np.array([member.width for member in named])
         stiff = best[widths[pairs[best]].max(axis=1) < FLEXIBLE]
         alone = self._comparison.log_evidence(members)
         for some in (best, stiff):
@@ -307,11 +309,10 @@ class _Search:
                     self._look_at([*members, *(named[one] for one in pairs[k])])
 
     def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
-        odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-        return evidence + odds + worth > self._top - NEGLIGIBLE
+        return evidence + sum(member.log_odds for member in members) + worth > self._top - NEGLIGIBLE
 
     def _anew(self, member: Member) -> Member:
-        cause, old = self._causes[member.cause.name], member.variant
+        cause, old = self._causes[member.name], member.variant
         same = [v for v in cause.variants if (v.label, v.law) == (old.label, old.law)] or list(cause.variants)
 
         def away(variant: Variant) -> float:
@@ -320,7 +321,7 @@ class _Search:
         return Member(cause, min(same, key=away), member.scale)
 
     def _look_at(self, members: Sequence[Member]) -> None:
-        key = frozenset(member.cause.name for member in members)
+        key = frozenset(member.name for member in members)
         if key in self._seen or len(key) > self._most_members or (self._begun and self._work.is_spent):
             return
         self._work.examine(members)
@@ -328,8 +329,7 @@ class _Search:
         self._seen[key] = found
         self._top = max(self._top, found.log_posterior)
         if not found.lean:
-            worth = [f + m.cause.log_prior_odds for m, f in zip(found.members, found.log_factors, strict=True)]
-            self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))
+            self._look_at(found.without(found.members[int(np.argmin(found.log_odds))].name))
 
     def _settled(self, members: list[Member]) -> Hypothesis:
         many = len(members) > BOUNDS.many
@@ -403,7 +403,7 @@ class _Search:
         values = comparison.values(members)
         found = []
         for member in members:
-            own = len(member.variant.columns)
+            own = member.width
             found.append(with_slack_of(member, values[:own]))
             values = values[len(member.columns) :]
         return found

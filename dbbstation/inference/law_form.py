@@ -99,16 +99,16 @@ def _place(
 
 def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
     best = settled.best
-    return tuple(m for m in best.without(*names) if best.log_factor(m.cause.name) + m.cause.log_prior_odds >= SURELY)
+    return tuple(m for m in best.without(*names) if best.log_factor(m.name) + m.cause.log_prior_odds >= SURELY)
 
 
 def _candidates(
     settled: Settled, names: Collection[str], wanted: Collection[str], others: Sequence[Member]
 ) -> tuple[dict[str, tuple[Member, ...]], dict[str, float]]:
-    comparison, taken = settled.comparison, {m.cause.name for m in others}
+    comparison, taken = settled.comparison, {m.name for m in others}
     rivals = [c for c in settled.causes if followed_by(settled.bank, c.name) & set(wanted) and c.name not in taken]
     scan = comparison.scan(others, rivals)
-    worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+    worth = scan.log_odds
     possible = [k for k in np.argsort(-worth).tolist() if _is_possible(settled, scan.best[k], others)]
     best = {scan.causes[k].name: k for k in possible[: BOUNDS.candidates]}
     best |= {scan.causes[k].name: k for k in range(len(worth)) if len(names) == 1 and scan.causes[k].name in names}
@@ -117,13 +117,13 @@ def _candidates(
     weights, beside = settled.posterior.weights, frozenset(taken)
     values = {name: weights.get(beside | {name}, np.inf) - weights.get(beside, -np.inf) for name in best}
     values = {name: value if np.isfinite(value) else float(worth[best[name]]) for name, value in values.items()}
-    own = tuple(m for m in settled.best.members if m.cause.name in names)
+    own = tuple(m for m in settled.best.members if m.name in names)
     if len(own) == 1:
-        found[own[0].cause.name] = own
+        found[own[0].name] = own
     else:
         name = JOINED.join(sorted(names))
         found[name] = own
-        odds = sum(m.cause.log_prior_odds + m.variant.log_weight for m in own)
+        odds = sum(m.log_odds for m in own)
         values[name] = comparison.log_evidence((*own, *others)) - comparison.log_evidence(others) + odds
     return found, values
 
@@ -132,7 +132,7 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
     if not any(member.variant.positive):
         return True
     _, values, covariance = settled.comparison.estimated([member, *others])[0]
-    return not impossible(settled.bank.laws[member.cause.name], values, np.diag(covariance))
+    return not impossible(settled.bank.laws[member.name], values, np.diag(covariance))
 
 
 def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:
@@ -165,7 +165,7 @@ def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], 
     bank = settled.bank
     own = all_columns(other)
     effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]
-    law = bank.laws.get(one[0].cause.name) if len(one) == 1 else None
+    law = bank.laws.get(one[0].name) if len(one) == 1 else None
     corners = product(*((grid[0], grid[-1]) for grid in law.grids)) if law is not None and law.grids else ()
     parts = [
         bank.base,
@@ -187,4 +187,4 @@ def _are_the_same(settled: Settled, one: Sequence[Member], other: Sequence[Membe
 
 
 def _count(members: Sequence[Member]) -> int:
-    return sum(len(member.variant.columns) + len(member.variant.nonlinear) for member in members)
+    return sum(member.width + len(member.variant.nonlinear) for member in members)

@@ -66,7 +66,7 @@ def left_over(settled: Settled) -> LeftOver:
     channel, bank = settled.channel, settled.bank
     rows = channel.residual - settled.predicted()
     left = bank.whitened(rows) / settled.noise.innovation
-    used = sum(len(member.variant.columns) for member in settled.best.members) + channel.base.samples.shape[1]
+    used = sum(member.width for member in settled.best.members) + channel.base.samples.shape[1]
     freedom = max(float(len(left) - used), 1.0)
     square = float(left @ left) / freedom
     beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma

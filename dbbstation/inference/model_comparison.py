@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from operator import is_
+from operator import add, is_, sub
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -23,7 +23,7 @@ from dbbstation.inference.triangle import rms
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
-    from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.computing.arrays import Flags, Floats, Integers
 
 SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
 """Prior standard deviations of amplitudes for averaging, in plausible sizes."""
@@ -109,6 +109,21 @@ class Member:
     slack_scale: float = 1.0
     slack_share: float = 1.0
 
+    @property
+    def name(self) -> str:
+        """Return its cause's name."""
+        return self.cause.name
+
+    @property
+    def width(self) -> int:
+        """Return its number of amplitudes."""
+        return len(self.variant.columns)
+
+    @property
+    def log_odds(self) -> float:
+        """Return the log prior odds of its cause, with the weight of its form."""
+        return self.cause.log_prior_odds + self.variant.log_weight
+
     @cached_property
     def columns(self) -> Integers:
         """Return columns of amplitudes, then slack."""
@@ -139,6 +154,11 @@ class Scan:
     first: Integers
     last: Integers
     slim: tuple[list[int], ...]
+
+    @cached_property
+    def log_odds(self) -> Floats:
+        """Return the causes' log odds, shape (c,)."""
+        return self.log_factor + np.array([cause.log_prior_odds for cause in self.causes])
 
     def best_of(self, k: int) -> Member:
         """Return a cause as member with best variant and scale."""
@@ -344,7 +364,7 @@ class ModelComparison:
             across = self._across(members, lower, columns)
             gram, towards = gram - across.T @ across, towards - across.T @ z
         information, along = sd[:, None] * gram * sd + np.eye(len(sd)), sd * towards
-        widths = np.array([len(m.variant.columns) for m in more], dtype=np.int64)
+        widths = np.array([m.width for m in more], dtype=np.int64)
         starts = np.cumsum([0, *widths])
         every = np.column_stack(np.triu_indices(len(more), 1))
         found = np.zeros(len(every))
@@ -361,23 +381,15 @@ class ModelComparison:
 
     def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
         """Scan every cause given members, over variants and sizes."""
-        forms = self._forms_of(tuple(causes))
-        needed = forms.needed
-        lower, z, _ = self._eliminated(members)
-        across = self._across(members, lower, needed)
-        towards = self._towards[needed] - across.T @ z
-        left = [products for _, _, _, products in forms.groups]
-        if members:
-            besides = (across.T[own] for _, own, _, _ in forms.groups)
-            left = [one - beside @ beside.transpose(0, 2, 1) for one, beside in zip(left, besides, strict=True)]
-        return _scanned(forms, towards, left)
+        return self.around(members, causes).scan()
 
     def around(self, members: Sequence[Member], causes: Iterable[Cause]) -> Around:
         """Return scans of every cause given all members but a few, by one elimination."""
         forms = self._forms_of(tuple(causes))
         lower, z, evidence = self._eliminated(members)
         across = self._across(members, lower, forms.needed)
-        return Around(tuple(members), forms, lower, z, evidence, across, self._towards[forms.needed])
+        towards = self._towards[forms.needed] - across.T @ z
+        return Around(tuple(members), forms, lower, z, evidence, across, towards)
 
     def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
         """Scan each member's present variant given the other members, without slack, over all sizes.
@@ -394,7 +406,7 @@ class ModelComparison:
         values = inverse @ (sd * self._towards[self._at(columns)])
         found = []
         for member, every in zip(members, slices_of(members), strict=True):
-            own = slice(every.start, every.start + len(member.variant.columns))
+            own = slice(every.start, every.start + member.width)
             beside = np.linalg.inv(inverse[own, own])
             towards = beside @ values[own] / member.scale
             blocks = (beside - np.eye(len(beside))) / member.scale**2
@@ -463,6 +475,7 @@ def _scanned(forms: _Forms, towards: Floats, left: Sequence[Floats]) -> Scan:
     return Scan(forms.causes, log_factor, factors, weighted, first, last, tuple(forms.slim))
 
 
+@dataclass(frozen=True, eq=False)
 class Around:
     """Scans of causes given a hypothesis without some members.
 
@@ -471,49 +484,58 @@ class Around:
     0.7.3].
     """
 
-    def __init__(
-        self,
-        members: tuple[Member, ...],
-        forms: _Forms,
-        lower: Floats,
-        z: Floats,
-        evidence: float,
-        across: Floats,
-        towards: Floats,
-    ) -> None:
-        self.members, self._forms, self._evidence = members, forms, evidence
-        self._towards = towards - across.T @ z
-        besides = (across.T[own] for _, own, _, _ in forms.groups)
-        self._left = [
-            products - beside @ beside.transpose(0, 2, 1)
-            for (_, _, _, products), beside in zip(forms.groups, besides, strict=True)
-        ]
-        if not members:
-            return
-        self._rows = _solved(lower, across, transposed=True)
-        self._values = _solved(lower, z, transposed=True)
-        self._inverse = _solved(lower, np.eye(len(z)))
-        own = zip(members, slices_of(members), strict=True)
-        self._places = {m.cause.name: np.arange(place.start, place.stop) for m, place in own}
+    members: tuple[Member, ...]
+    forms: _Forms
+    lower: Floats
+    z: Floats
+    evidence: float
+    across: Floats
+    towards: Floats
+
+    @cached_property
+    def _left(self) -> list[Floats]:
+        products = [products for _, _, _, products in self.forms.groups]
+        return _combined(sub, products, self.forms, self.across) if self.members else products
+
+    @cached_property
+    def _turned(self) -> tuple[Floats, Floats, Floats]:
+        rows, values = (_solved(self.lower, right, transposed=True) for right in (self.across, self.z))
+        return rows, values, _solved(self.lower, np.eye(len(self.z)))
+
+    def scan(self) -> Scan:
+        """Return the scan given all members."""
+        return _scanned(self.forms, self.towards, self._left)
 
     def without(self, names: Collection[str]) -> tuple[Scan, float]:
         """Return the scan given all members but some, and the remaining members' log evidence."""
         if not names:
-            return self._of_absent(_scanned(self._forms, self._towards, self._left), names), self._evidence
-        own = np.concatenate([self._places[m.cause.name] for m in self.members if m.cause.name in names])
+            return self._of_absent(self.scan(), names), self.evidence
+        every, towards, inverse = self._turned
+        own = np.flatnonzero(belong_to(self.members, names))
         # A root of P_kk, computed without squaring the information.
-        root = np.asarray(np.linalg.qr(self._inverse[:, own], mode="r"), dtype=np.float64).T
-        rows = _solved(root, self._rows[own])
-        values = _solved(root, self._values[own])
-        more = (rows.T[columns] for _, columns, _, _ in self._forms.groups)
-        left = [one + each @ each.transpose(0, 2, 1) for one, each in zip(self._left, more, strict=True)]
-        scan = _scanned(self._forms, self._towards + rows.T @ values, left)
-        evidence = self._evidence - 0.5 * float(values @ values) - float(np.log(np.abs(np.diag(root))).sum())
+        root = np.asarray(np.linalg.qr(inverse[:, own], mode="r"), dtype=np.float64).T
+        rows, values = _solved(root, every[own]), _solved(root, towards[own])
+        left = _combined(add, self._left, self.forms, rows)
+        scan = _scanned(self.forms, self.towards + rows.T @ values, left)
+        evidence = self.evidence - 0.5 * float(values @ values) - float(np.log(np.abs(np.diag(root))).sum())
         return self._of_absent(scan, names), evidence
 
     def _of_absent(self, scan: Scan, names: Collection[str]) -> Scan:
-        there = {m.cause.name for m in self.members} - set(names)
+        there = {m.name for m in self.members} - set(names)
         return scan.of([k for k, cause in enumerate(scan.causes) if cause.name not in there])
+
+
+def _combined(
+    how: Callable[[Floats, Floats], Floats], products: list[Floats], forms: _Forms, rows: Floats
+) -> list[Floats]:
+    """Return products of each group's forms, plus or minus the products of these rows, shape (p, q)."""
+    own = (rows.T[columns] for _, columns, _, _ in forms.groups)
+    return [how(one, each @ each.transpose(0, 2, 1)) for one, each in zip(products, own, strict=True)]
+
+
+def belong_to(members: Sequence[Member], names: Collection[str]) -> Flags:
+    """Return which columns belong to the named members, shape (p,)."""
+    return np.concatenate([np.full(len(m.columns), m.name in names) for m in members])
 
 
 def _solved(lower: Floats, right: Floats, *, transposed: bool = False) -> Floats:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def named_values(settled: Settled, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
     """Return amplitudes and nonlinear parameters; uncertainties include slack."""
-    law, covariance = settled.bank.laws.get(member.cause.name), widening_of(settled.bank.tails) * covariance
+    law, covariance = settled.bank.laws.get(member.name), widening_of(settled.bank.tails) * covariance
     if law is not None:
         found = values_of_law(law, member, values, covariance, law.form_uncertainty)
         if any(
@@ -37,8 +37,8 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
         ):
             found.pop("zero", None)  # part of it is in the drift
         return found
-    sigma, width = np.sqrt(np.maximum(np.diag(covariance), 0.0)), len(member.variant.columns)
-    pattern = settled.bank.patterns[member.cause.name]
+    sigma, width = np.sqrt(np.maximum(np.diag(covariance), 0.0)), member.width
+    pattern = settled.bank.patterns[member.name]
     unit = settled.channel.unit
     if len(pattern.per) < width:
         return {}
@@ -52,7 +52,7 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
 
 def values_of_law(law: Law, member: Member, values: Floats, covariance: Floats, share: float) -> dict[str, Value]:
     """Return a law's amplitudes and nonlinear parameters; `share` is the least relative uncertainty of amplitudes, and without tangent a parameter's uncertainty is NaN."""
-    sigma, width, every = np.sqrt(np.diag(covariance).clip(0.0)), len(member.variant.columns), len(law.plausible)
+    sigma, width, every = np.sqrt(np.diag(covariance).clip(0.0)), member.width, len(law.plausible)
     found = {
         law.parameters[j]: Value(float(values[k]), float(np.hypot(sigma[k], share * values[k])), law.units[j])
         for k, j in enumerate(amplitudes_of(member.variant).tolist())
@@ -79,7 +79,7 @@ def moved(law: Law, member: Member, values: Floats, per: float = 1.0) -> tuple[f
     nonlinear = list(member.variant.nonlinear)
     if len(member.variant.slack):
         for k, grid in enumerate(law.grids):
-            by = values[len(member.variant.columns) + k] / per
+            by = values[member.width + k] / per
             nonlinear[k] = float(np.clip(nonlinear[k] + by, grid[0], grid[-1]))
     return tuple(nonlinear)
 
@@ -88,7 +88,7 @@ def growth(member: Member, values: Floats) -> float:
     """Return the ratio of a member's amplitudes to the amplitudes of its tangents."""
     if not len(member.variant.slack):
         return 1.0
-    size = amplitude_size(member, values[: len(member.variant.columns)])
+    size = amplitude_size(member, values[: member.width])
     return size / member.variant.slack_at if size > 0.0 else 1.0
 
 
@@ -107,7 +107,7 @@ def label_of(settled: Settled, member: Member, values: Floats) -> str:
 
 def values_of_members(settled: Settled, members: Sequence[Member]) -> dict[str, dict[str, Value]]:
     """Return values of members that are fitted together, by name."""
-    return {one[0].cause.name: named_values(settled, *one) for one in settled.comparison.estimated(members)}
+    return {one[0].name: named_values(settled, *one) for one in settled.comparison.estimated(members)}
 
 
 def with_jackknife(

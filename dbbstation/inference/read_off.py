@@ -141,19 +141,18 @@ class CauseJudge:
     ) -> None:
         self._trial, self._rows = trial, settled.channel.rows_are
         self._settled, self._best, laws = settled, settled.best, settled.bank.laws
-        self._members = {member.cause.name: member for member in self._best.members}
+        self._members = {member.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
         self._alternatives = Alternatives(
             settled.comparison,
             settled.causes,
             settled.posterior,
             self._best,
-            form_uncertainty
-            or (lambda member: laws[member.cause.name].form_uncertainty if member.cause.name in laws else 0.0),
-            [m for m in self._best.members if m.cause.name not in settled.bank.nameless],
+            form_uncertainty or (lambda member: laws[member.name].form_uncertainty if member.name in laws else 0.0),
+            [m for m in self._best.members if m.name not in settled.bank.nameless],
         )
         self._classes = self._alternatives.classes
-        self._values = {m.cause.name: (v, c) for m, v, c in settled.comparison.estimated(self._best.members)}
+        self._values = {m.name: (v, c) for m, v, c in settled.comparison.estimated(self._best.members)}
         self._own = dict(zip(self._members, slices_of(self._best.members), strict=True))
         worse = trial is not None and trial.is_worse
         self._levels = VerdictsByLevel(settled, levels, self._pushes(), worse=worse)
@@ -190,8 +189,8 @@ class CauseJudge:
         whole, beyond, confounded = self._concealed(shown, effect, values)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
         gains = self._gains(cause.name) if member is not None else None
-        law = self._settled.bank.laws.get(cause.name)
-        variables = pattern.variables if pattern else law.variables if law else ()
+        of = self._settled.bank.of(cause.name)
+        variables = of.variables if of else ()
         there = verdict.rank <= Verdict.AMBIGUOUS.rank and (member is not None or verdict is Verdict.IDENTIFIED)
         rows = _stretches(effect) if there and pattern is not None and pattern.family == "pulses" else ()
         happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
@@ -201,7 +200,7 @@ class CauseJudge:
         return CauseFinding(
             name=cause.name,
             verdict=verdict,
-            form=pattern.family if pattern else law.family if law else None,
+            form=of.family if of else None,
             label=label_of(self._settled, shown, values),
             variables=tuple(v.name for v in variables),
             probability=probability,
@@ -256,14 +255,14 @@ class CauseJudge:
 
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
         found = named_values(self._settled, member, values, covariance)
-        own = self._own.get(member.cause.name)
+        own = self._own.get(member.name)
         if own is None or self._trial is None or not self._trial.refits:
             return found
         first = len(self._settled.channel.base.names)
         inside = slice(first + own.start, first + own.stop)
         parts = [(one.x[inside], one.covariance[inside, inside]) for one in self._trial.refits]
         found = with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
-        chosen = [one.get(member.cause.name, {}) for one in self._trial.chosen]
+        chosen = [one.get(member.name, {}) for one in self._trial.chosen]
         return with_jackknife(found, chosen, 1.0 - 1.0 / max(len(chosen), 2))
 
     def _verdict(
@@ -309,7 +308,7 @@ class CauseJudge:
         return self._impossible(*self._settled.comparison.estimated([shown, *self._best.without(*alike)])[0])
 
     def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:
-        law = self._settled.bank.laws.get(shown.cause.name)
+        law = self._settled.bank.laws.get(shown.name)
         if law is None:
             return ""
         own = values_of_law(law, shown, values, covariance, law.form_uncertainty)

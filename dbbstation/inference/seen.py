@@ -62,11 +62,11 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
     channel = bank.channel
     members = list(members)
     for number, member in enumerate(members):
-        pattern = bank.patterns.get(member.cause.name)
+        pattern = bank.patterns.get(member.name)
         if pattern is None or pattern.family not in MOVED or pattern.name not in among:
             continue
         others, sd = _fitted(bank, [*members[:number], *members[number + 1 :]])
-        count = len(member.variant.columns)
+        count = member.width
         size = channel.size / bank.noise.innovation
         if pattern.family in PLACED:
             better = placed_better(pattern, _left(bank, others, sd), channel.kept, size)

@@ -177,7 +177,7 @@ def _settled(
         best = posterior.best.members
         compared = settled if looking else None
         if rough := _rough(settled, laid_out, work):
-            laid_out |= {member.cause.name for member in rough}
+            laid_out |= {member.name for member in rough}
             _lay_out(bank, beside, posterior.best, rough)
             continue
         if cannot := _impossible(settled):
@@ -202,21 +202,21 @@ def _settled(
 
 
 def _rough(settled: Settled, laid_out: Collection[str], work: SearchWork) -> list[Member]:
-    on_grid = {m.cause.name for m in settled.best.members if m.variant.nonlinear and not m.variant.tangents}
+    on_grid = {m.name for m in settled.best.members if m.variant.nonlinear and not m.variant.tangents}
     known = set(laid_out) - on_grid
-    return [] if work.is_spent else [m for m in _laws_of(settled) if m.cause.name not in known]
+    return [] if work.is_spent else [m for m in _laws_of(settled) if m.name not in known]
 
 
 def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
-    named = {member.cause.name for member in members} & bank.looked_for
+    named = {member.name for member in members} & bank.looked_for
     better = places_anew(bank, members, {name for name in named if bank.patterns[name].family in MOVED})
-    return better if [one.cause.name for one in better] != [one.cause.name for one in members] else ()
+    return better if [one.name for one in better] != [one.name for one in members] else ()
 
 
 def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member]) -> bool:
     there = {cause.name: cause.variants for cause in bank.causes}
     before = {cause.name: cause.variants for cause in compared.causes}
-    same = {member.cause.name for member in best} == compared.best.names and there == before
+    same = {member.name for member in best} == compared.best.names and there == before
     return same and alike(bank.noise, compared.noise)
 
 
@@ -244,7 +244,7 @@ def _looked(
         comparison = bank.beside().comparison(bank.target)
         more = places_anew(bank, grown(comparison, bank.causes, members, work), set(new))
         fresh = set(bank.patterns) - known
-        taken = {member.cause.name for member in more}
+        taken = {member.name for member in more}
         # Added causes reduce the noise, and less noise admits more causes, so both together must be more probable than
         # before.
         if bank.measures_beside_members:
@@ -272,7 +272,7 @@ def _looked_about(
         # starts therefore include effects over variables, and sudden effects with laws only.
         begun = grown(bank.beside().comparison(bank.target), bank.causes)
         starts.append(_looked(bank, begun, how, in_time=False))
-        laws = tuple(member for member in begun if member.cause.name in bank.laws)
+        laws = tuple(member for member in begun if member.name in bank.laws)
         starts.append(_looked(bank, laws, how) if laws else ())
     best = _looked(bank, best, how, in_time=how.in_time)
     return best, starts
@@ -280,7 +280,7 @@ def _looked_about(
 
 def log_probability(bank: Bank, members: Sequence[Member]) -> float:
     """Return the log probability of noise and members, up to a constant."""
-    odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
+    odds = sum(member.log_odds for member in members)
     evidence = bank.beside().comparison(bank.target, np.unique(all_columns(members))).log_evidence(members)
     return bank.log_likelihood() + evidence + bank.tails_beyond(members) + odds
 
@@ -299,20 +299,19 @@ def grown(
     """
     there = {cause.name: cause for cause in causes}
     members = [
-        replace(m, cause=there[m.cause.name])
+        replace(m, cause=there[m.name])
         for m in start
-        if m.cause.name in there and any(v is m.variant for v in there[m.cause.name].variants)
+        if m.name in there and any(v is m.variant for v in there[m.name].variants)
     ]
     while len(members) < BOUNDS.grown:
-        taken = {member.cause.name for member in members}
+        taken = {member.name for member in members}
         if work is not None:
             work.scan(causes)
         scan = comparison.scan(members, [cause for cause in causes if cause.name not in taken])
         if not scan.causes:
             break
-        worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
-        k = int(worth.argmax())
-        if worth[k] <= 0.0:
+        k = int(scan.log_odds.argmax())
+        if scan.log_odds[k] <= 0.0:
             break
         members.append(scan.best[k])
     while members:
@@ -327,11 +326,11 @@ def grown(
 
 def _laws_of(settled: Settled) -> list[Member]:
     best, laws = settled.best, settled.bank.laws
-    found = [m for m in best.members if m.cause.name in laws]
+    found = [m for m in best.members if m.name in laws]
     rivals = [cause for cause in settled.causes if cause.name in laws]
     for member in best.members:
-        found += in_place_of(member.cause.name, settled.comparison, rivals, best)
-    return list({m.cause.name: m for m in found}.values())
+        found += in_place_of(member.name, settled.comparison, rivals, best)
+    return list({m.name: m for m in found}.values())
 
 
 def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[Member]) -> None:
@@ -340,14 +339,14 @@ def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[M
 
 
 def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -> None:
-    target, law = bank.target, bank.laws[member.cause.name]
-    others = best.without(member.cause.name)
+    target, law = bank.target, bank.laws[member.name]
+    others = best.without(member.name)
     begun = (
         _between_points(bank, beside, others, member) if len(law.grids) == 1 and not len(member.variant.slack) else None
     )
     for number in range(BOUNDS.steps if law.grids or law.at else 1):
         values = _values(beside, target, (member, *others))[: len(member.columns)]
-        width = len(member.variant.columns)
+        width = member.width
         if not values[:width].any():
             return
         nonlinear = moved(law, member, values) if number or begun is None else begun
@@ -365,7 +364,7 @@ def _values(beside: BesideBase, target: Floats, members: Sequence[Member]) -> Fl
 
 
 def _between_points(bank: Bank, beside: BesideBase, others: Sequence[Member], member: Member) -> tuple[float, ...]:
-    law, target = bank.laws[member.cause.name], bank.target
+    law, target = bank.laws[member.name], bank.target
     if others:
         values = _values(beside, target, (member, *others))[len(member.columns) :]
         target = target - bank.fitted(all_columns(others)) @ values
@@ -394,7 +393,7 @@ def _impossible(settled: Settled) -> dict[str, str]:
     found: dict[str, str] = {}
     own: dict[str, dict[str, Value]] = {}
     for member, values, covariance in settled.comparison.estimated(members):
-        name, width = member.cause.name, len(member.variant.columns)
+        name, width = member.name, member.width
         if name not in laws:
             continue
         effect = settled.bank.samples(member.variant.columns) @ values[:width]

@@ -64,7 +64,7 @@ class Settled:
         """
         total, members = np.zeros(len(self.channel.residual)), self.best.members if members is None else members
         for member, values, _ in self.comparison.estimated(members):
-            if names is None or member.cause.name in names:
+            if names is None or member.name in names:
                 total += self.bank.samples(member.columns) @ values
         return total
 

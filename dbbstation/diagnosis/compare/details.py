@@ -27,8 +27,8 @@ def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
     comparison, best = settled.comparison, settled.best
     kinematic = _kinematic(sides)
     found = {}
-    for member in sorted(best.members, key=lambda m: -best.log_factor(m.cause.name)):
-        name = member.cause.name
+    for member in sorted(best.members, key=lambda m: -best.log_factor(m.name)):
+        name = member.name
         rows = settled.effect([name])
         share = comparison.explained([member]) / comparison.explained(best.members)
         taken_up = float(np.sum((kinematic.T @ rows) ** 2) / max(float(rows @ rows), 1e-300))

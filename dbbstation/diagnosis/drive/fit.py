@@ -59,14 +59,14 @@ class DriveFit:
         """Return a member's amplitude columns."""
         start = len(self.drive.channel.base.names)
         for member in self.members:
-            if member.cause.name == name:
-                return slice(start, start + len(member.variant.columns))
+            if member.name == name:
+                return slice(start, start + member.width)
             start += len(member.columns)
         raise KeyError(name)
 
     def member(self, name: str) -> Member:
         """Return a member by cause."""
-        return next(member for member in self.members if member.cause.name == name)
+        return next(member for member in self.members if member.name == name)
 
     def _law(self, name: str) -> Law:
         return next(law for law in self.drive.channel.laws if law.name == name)
@@ -90,8 +90,8 @@ class DriveFit:
         """Return all parameters of base and laws by name."""
         found = {name: value.value for name, value in self.base.items()}
         for member in self.members:
-            if member.cause.name in self.drive.of_law:
-                found |= {name: value.value for name, value in self.parameters(member.cause.name).items()}
+            if member.name in self.drive.of_law:
+                found |= {name: value.value for name, value in self.parameters(member.name).items()}
         return found
 
     def force_n(self, names: Container[str] | None = None) -> Floats:
@@ -99,8 +99,8 @@ class DriveFit:
         used = np.zeros(len(self.values), dtype=bool)
         used[: len(self.drive.channel.base.names)] = True
         for member in self.members:
-            if names is None or member.cause.name in names:
-                own = self.columns_of(member.cause.name)
+            if names is None or member.name in names:
+                own = self.columns_of(member.name)
                 used[own.start : own.start + len(member.columns)] = True
         return self.samples[:, used] @ self.values[used]
 
@@ -166,8 +166,8 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
     # Its variance is the difference of variances [Hausman 1978, corollary 2.6].
     told = list(range(len(efficient.drive.channel.base.names)))
     for member in efficient.members:
-        if member.cause.name in efficient.drive.of_law:
-            own = efficient.columns_of(member.cause.name)
+        if member.name in efficient.drive.of_law:
+            own = efficient.columns_of(member.name)
             told += range(own.start, own.stop)
     every = np.diag(plain.covariance) - np.diag(efficient.covariance)
     known = [k for k in told if every[k] > RANK * plain.covariance[k, k]]

@@ -237,10 +237,10 @@ def _numbers(
     numbers = {name: _number((nothing | values)[name], is_known=known[name]) for name in (MASS, VISCOUS)}
     after = explained.after
     for member in after.members:
-        if member.cause.name not in explained.drive.of_law:
+        if member.name not in explained.drive.of_law:
             continue
         # Load or asymmetric friction: the additional force in one direction.
-        found = after.parameters(member.cause.name)
+        found = after.parameters(member.name)
         for parameter in OFFSETS & set(found):
             numbers["offset_n"] = _number(found[parameter], is_known=limits.reverses)
     return numbers
@@ -252,10 +252,10 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
         dry, wet = np.zeros(len(fitted.values)), np.zeros(len(fitted.values))
         wet[fitted.drive.channel.base.names.index(VISCOUS)] = 1.0
         for member in fitted.members:
-            if member.cause.name not in fitted.drive.of_law:
+            if member.name not in fitted.drive.of_law:
                 continue
-            first = fitted.columns_of(member.cause.name).start
-            for k, parameter in enumerate(fitted.drive.of_law[member.cause.name][1].amplitudes):
+            first = fitted.columns_of(member.name).start
+            for k, parameter in enumerate(fitted.drive.of_law[member.name][1].amplitudes):
                 if parameter.name == "coulomb_n":
                     dry[first + k] = 1.0
                 elif parameter.name == "coulomb_asymmetry_n":
@@ -273,7 +273,7 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
 
 def _steps(explained: ExplainedDrive, verdicts: Verdicts, held_back: Flags) -> list[ModelStep]:
     drive, settled = explained.drive, explained.settled
-    by_name = {member.cause.name: member for member in settled.best.members}
+    by_name = {member.name: member for member in settled.best.members}
     predicting = verdicts.predicting
     groups = list(dict.fromkeys(verdicts.source_of(name) for name in predicting))
     members, steps = [], []
@@ -332,7 +332,7 @@ def _curve(explained: ExplainedDrive) -> FrictionCurve:
     if VISCOUS in drive.channel.base.names:
         columns[:, drive.channel.base.names.index(VISCOUS)] = speed
     for member in fitted.members:
-        name = member.cause.name
+        name = member.name
         if name in drive.of_law and drive.of_law[name][0].varies_with == "speed":
             shapes = tuple(fitted.parameters(name)[p.name].value for p in drive.of_law[name][1].shapes)
             columns[:, fitted.columns_of(name)] = drive.of_law[name][1].columns(pretended, shapes)

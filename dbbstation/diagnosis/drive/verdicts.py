@@ -114,7 +114,7 @@ class Verdicts(CauseJudge):
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
     def _sigmas(self, member: Member, values: Floats, covariance: Floats) -> float:
-        name, after = member.cause.name, self._explained.after
+        name, after = member.name, self._explained.after
         sigmas = super()._sigmas(member, values, covariance)
         if name not in self._members or name not in self._drive.of_law:
             return sigmas

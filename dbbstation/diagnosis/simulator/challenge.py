@@ -63,17 +63,17 @@ def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
     for one in node.inside:
         if one.term.form is not TermForm.CURVE:
             continue
-        others = [member for member in settled.best.without(one.name) if member.cause.name in node.names]
+        others = [member for member in settled.best.without(one.name) if member.name in node.names]
         outside = {each.name: each for each in node.outside if each.term.form is not TermForm.CURVE}
         named = _best_named(settled, others, outside)
         if not named:
             continue
-        found = nodes.instead(node, [outside[member.cause.name] for member in named], settled, [*others, *named])
+        found = nodes.instead(node, [outside[member.name] for member in named], settled, [*others, *named])
         if found is None:
             continue
         odds = cost(nodes, found, settled) - cost(nodes, node, settled)
         if odds < WORTH:
-            nodes.challenges.append(Challenge(one.name, frozenset(member.cause.name for member in named), odds))
+            nodes.challenges.append(Challenge(one.name, frozenset(member.name for member in named), odds))
             return found
     return None
 
@@ -81,13 +81,12 @@ def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
 def _best_named(settled: Settled, others: list[Member], outside: dict[str, Candidate]) -> list[Member]:
     def scanned(beside: list[Member], causes: list[Cause]) -> list[tuple[float, Member]]:
         scan = settled.comparison.scan(beside, causes)
-        worth = [float(f) + cause.log_prior_odds for f, cause in zip(scan.log_factor, scan.causes, strict=True)]
-        return sorted(zip(worth, scan.best, strict=True), key=lambda pair: -pair[0])
+        return sorted(zip(scan.log_odds.tolist(), scan.best, strict=True), key=lambda pair: -pair[0])
 
     causes = [cause for cause in settled.causes if cause.name in outside]
     best: tuple[float, list[Member]] = (0.0, [])
     for worth, member in scanned(others, causes)[: BOUNDS.challenged]:
-        rest = [cause for cause in causes if cause.name != member.cause.name]
+        rest = [cause for cause in causes if cause.name != member.name]
         more, second = scanned([*others, member], rest)[0] if rest else (-np.inf, member)
         for found in ((worth, [member]), (worth + more, [member, second])):
             if found[0] > best[0]:

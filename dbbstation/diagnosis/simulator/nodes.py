@@ -158,8 +158,8 @@ class Node:
             beside: other members; None for the best hypothesis.
         """
         beside = settled.best.members if beside is None else beside
-        others = [m for m in beside if m.cause.name != one.name]
-        member = next((m for m in beside if m.cause.name == one.name), None)
+        others = [m for m in beside if m.name != one.name]
+        member = next((m for m in beside if m.name == one.name), None)
         if member is None:
             cause = next(cause for cause in settled.causes if cause.name == one.name)
             member = settled.comparison.scan(others, [cause]).best[0]
@@ -227,7 +227,7 @@ class Nodes:
         names = node.names | {one.name}
         if names not in self.known:
             self.progress(f"refit with {one.name}")
-            there = [member for member in settled.best.members if member.cause.name in node.names]
+            there = [member for member in settled.best.members if member.name in node.names]
             numbers = np.array(_inside(one, node.numbers_of(settled, one, there)))
             for state in self._beginnings(node, one, numbers):
                 try:
@@ -256,7 +256,7 @@ class Nodes:
             beside: inserted members; None for the best hypothesis's.
         """
         beside = settled.best.members if beside is None else beside
-        names = frozenset(member.cause.name for member in beside) & node.names | {one.name for one in more}
+        names = frozenset(member.name for member in beside) & node.names | {one.name for one in more}
         terms = zip(node.inside, node.fitted.state.terms, strict=True)
         kept = [(one, term) for one, term in terms if one.name in names]
         new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one, beside))) for one in more]

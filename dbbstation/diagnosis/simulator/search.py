@@ -122,7 +122,7 @@ WITHIN = "it is less than what the terms at its port may be off by"
 
 def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Mapping[str, str]]:
     outside = {one.name: one for one in node.outside}
-    more = [member.cause.name for member in settled.best.members if member.cause.name in outside]
+    more = [member.name for member in settled.best.members if member.name in outside]
     if settled.averaged(settled.posterior.probability(outside), outside) < SURE:
         more = []  # no further term is sure
     small = within_forms(node, settled, more)
@@ -151,7 +151,7 @@ def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str
     # Real objects depart from forms in any shape. Absorbed parts are excluded. Effects are judged jointly, because
     # similar effects may cancel.
     every = {one.name: one for one in (*node.inside, *node.outside)}
-    members = [every[member.cause.name] for member in settled.best.members]
+    members = [every[member.name] for member in settled.best.members]
     channel, bank = settled.channel, settled.bank
     alone = bank.base_values(np.zeros(len(channel.residual)))
 
@@ -189,11 +189,11 @@ def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], 
 
 
 def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidate]:
-    members = [member for member in settled.best.members if member.cause.name in node.names]
+    members = [member for member in settled.best.members if member.name in node.names]
     outside = {one.name: one for one in node.outside}
     causes = [cause for cause in settled.causes if cause.name in outside]
     scan = settled.comparison.scan(members, causes)
-    worth = {c.name: float(f) + c.log_prior_odds for c, f in zip(scan.causes, scan.log_factor, strict=True)}
+    worth = {c.name: float(odds) for c, odds in zip(scan.causes, scan.log_odds, strict=True)}
     order = sorted((name for name in worth if name != first.name), key=lambda name: -worth[name])
     enough = [name for name in order if worth[name] > max(RIVAL_SHARE * worth.get(first.name, 0.0), 0.0)]
     return [first, *(outside[name] for name in enough[: BOUNDS.rivals - 1])]
@@ -211,7 +211,7 @@ def moves(node: Node, settled: Settled) -> dict[str, float]:
 
 
 def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, float]]:
-    members = [member for member in settled.best.members if member.cause.name in node.names]
+    members = [member for member in settled.best.members if member.name in node.names]
     found, said = values_of_members(settled, members), dict[tuple[str, str], tuple[float, float]]()
     terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
     for of, values in found.items():

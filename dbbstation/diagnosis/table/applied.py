@@ -67,9 +67,9 @@ def applied(found: Mismatch, other: Table, sources: Sequence[TableSource] = ()) 
     values, over, left_out = np.zeros(len(other)), set[str](), list[str]()
     members = settled.best.members
     for member, own in zip(members, slices_of(members, channel.base.samples.shape[1]), strict=True):
-        follows = followed_by(bank, member.cause.name)
+        follows = followed_by(bank, member.name)
         if follows <= ONCE or (corrects and not follows & corrects):
-            left_out.append(member.cause.name)
+            left_out.append(member.name)
             columns.append(np.zeros((len(other), len(member.columns))))
             continue
         over |= follows
@@ -108,7 +108,7 @@ FORMED = frozenset({Family.LINEAR, Family.ONCE, Family.TWICE, Family.CURVE, Fami
 
 def _effect(found: Mismatch, channel: Channel, member: Member, values: Floats) -> tuple[Floats, Floats]:
     """Return a member's effect in other rows, shape (n,), and its slopes by amplitudes and slack, shape (n, p)."""
-    name, bank, width = member.cause.name, found.settled.bank, len(member.variant.columns)
+    name, bank, width = member.name, found.settled.bank, member.width
     slopes = np.zeros((len(channel.residual), len(values)))
     if name not in bank.laws:
         slopes[:] = _samples(bank.patterns[name], channel, member.variant.label)

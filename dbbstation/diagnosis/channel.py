@@ -12,7 +12,7 @@ import numpy as np
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
-from dbbstation.diagnosis.parts import parts_of
+from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms, is_shape, parts_of
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.bank import spacing_of
 from dbbstation.inference.blocks import Block, compress, slices, with_random
@@ -63,7 +63,8 @@ class CircleChannel:
         self.motions = [observation.motion() for observation in calibration.observations]
         self.readings = [calibration.model.bar(motion) for motion in self.motions]
         self.runs = slices(len(reading.length_mm) for reading in self.readings)
-        self.columns = CauseColumns(self._base(), room=BOUNDS.room)
+        base = np.vstack([by_terms(reading, calibration.layout, calibration.x) for reading in self.readings])
+        self.columns = CauseColumns(base, room=BOUNDS.room)
         self.sources = {(source.name, source.law): source for source in sources}
         self.set_up = self._outsize()
         self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
@@ -110,7 +111,7 @@ class CircleChannel:
         """Return a cause's form with all amplitudes at the same nonlinear parameters, without slack."""
         if not len(variant.whole):
             return replace(variant, slack=variant.slack[:0], slack_sd=variant.slack_sd[:0])
-        sizes = [p.plausible for p in self.source_of(name, variant).parameters(self.machine) if not p.grid]
+        sizes = [p.plausible for p in amplitudes(self.source_of(name, variant), self.machine)]
         plausible = np.tile(sizes, len(variant.whole) // len(sizes))
         return Variant(variant.whole, plausible, variant.nonlinear, law=variant.law)
 
@@ -199,18 +200,15 @@ class CircleChannel:
         source = self.sources[name, law]
         readings = self._readings_about(fit)
         parameters = source.parameters(self.machine)
-        shaped = [k for k, p in enumerate(parameters) if p.grid]
-        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
+        shaped, shapes = is_shape(source, self.machine), [p for p in parameters if p.grid]
         shared = [source.shared_by(motion) for motion in self.motions]
         derivatives = [
             reading.by_source(source, self.machine, values[own]) for reading, own in zip(readings, shared, strict=True)
         ]
-        first = next(iter(values.values()))
-        variants = self._variants(
-            source, [d[:, amplitudes] for d in derivatives], shared, tuple(first[shaped].tolist())
-        )
+        point = tuple(next(iter(values.values()))[shaped].tolist())
+        variants = self._variants(source, [d[:, ~shaped] for d in derivatives], shared, point)
         tangents = np.vstack([d[:, shaped] for d in derivatives])
-        tangent_sd = np.array([_spacing(parameters[k], float(first[k])) for k in shaped])
+        tangent_sd = np.array([_spacing(p, value) for p, value in zip(shapes, point, strict=True)])
         effects = [
             Effects(motion, reading, values[own], derivative, known)
             for motion, reading, own, derivative, known in zip(
@@ -220,10 +218,10 @@ class CircleChannel:
         discrepancy = discrepancy_of(source, self.machine, effects)
         slack = self.columns.add(np.hstack([tangents, discrepancy]))
         sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1], source.form_uncertainty)])
-        size = [values[own][amplitudes] / np.array([parameters[k].plausible for k in amplitudes]) for own in values]
-        at = max(rms(np.array(size)), 1e-12)
+        plausible = np.array([p.plausible for p in parameters])[~shaped]
+        at = max(rms(np.array([own[~shaped] / plausible for own in values.values()])), 1e-12)
         # A tangent covers about 2.5 grid points of a nonlinear parameter.
-        covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
+        covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in shapes]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
         self._former += self._refined.get((name, law), ())
         self._refined[name, law] = tuple(
@@ -261,17 +259,6 @@ class CircleChannel:
         if not terms or key[0] in base:
             return None
         return fit.x[fit.layout.columns_of(key[0])[0]]
-
-    def _base(self) -> Floats:
-        layout = self.calibration.layout
-        samples = np.zeros((self.runs[-1].stop, len(layout.known.prior)))
-        for rows, motion, reading in zip(self.runs, self.motions, self.readings, strict=True):
-            for term in layout.terms:
-                if term.acts_on(motion):
-                    samples[rows, term.columns] = reading.by_source(
-                        term.source, self.machine, self.calibration.x[term.columns]
-                    )
-        return samples
 
     def _scattering(self, times: float) -> Columns:
         if times == 1.0:
@@ -312,17 +299,12 @@ class CircleChannel:
         )
 
     def _on_a_grid(self, source: ErrorSource) -> tuple[Variant, ...]:
-        parameters = source.parameters(self.machine)
-        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
-        shaped = [k for k, p in enumerate(parameters) if p.grid]
         shared = [source.shared_by(motion) for motion in self.motions]
-        points = list(product(*(parameters[k].grid for k in shaped)))
+        points = list(product(*(p.grid for p in source.parameters(self.machine) if p.grid)))
         points = [point for point in points if source.shows(self.motions, point)] or points[:1]
         found: list[Variant] = []
         for point in points:
-            values = np.zeros(len(parameters))
-            values[shaped] = point
-            derivatives = [reading.by_source(source, self.machine, values)[:, amplitudes] for reading in self.readings]
+            derivatives = [by_amplitudes(reading, source, self.machine, point) for reading in self.readings]
             found += self._variants(source, derivatives, shared, point)
         return tuple(replace(v, log_weight=v.log_weight - float(np.log(len(points)))) for v in found)
 
@@ -333,19 +315,18 @@ class CircleChannel:
         shared: Sequence[str],
         nonlinear: tuple[float, ...],
     ) -> list[Variant]:
-        amplitudes = [p for p in source.parameters(self.machine) if not p.grid]
-        sets = list(dict.fromkeys(shared))
-        count = len(amplitudes)
+        own_amplitudes, sets = amplitudes(source, self.machine), list(dict.fromkeys(shared))
+        count = len(own_amplitudes)
         samples = np.zeros((self.runs[-1].stop, count * len(sets)))
         for rows, derivative, own in zip(self.runs, derivatives, shared, strict=True):
             place = count * sets.index(own)
             samples[rows, place : place + count] = derivative
         columns = self.columns.add(samples)
-        plausible = np.tile([p.plausible for p in amplitudes], len(sets))
-        positive = tuple(p.positive for p in amplitudes) * len(sets)
+        plausible = np.tile([p.plausible for p in own_amplitudes], len(sets))
+        positive = tuple(p.positive for p in own_amplitudes) * len(sets)
         whole = Variant(columns, plausible, nonlinear, law=source.law, positive=positive)
         found = []
-        for part in parts_of(amplitudes, len(sets)):
+        for part in parts_of(own_amplitudes, len(sets)):
             form = replace(whole, label=part.label, log_weight=part.log_weight)
             if part.alike:
                 alike = self.columns.add(samples.sum(axis=1, keepdims=True))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.parts import is_shape
 from dbbstation.inference.model_form import modulated
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
@@ -52,7 +53,7 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     """Return a source's slack columns over all runs, shape (n, q)."""
     if source.form_uncertainty == 0.0:
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
-    amplitude = np.array([not p.grid for p in source.parameters(machine)])
+    amplitude = ~is_shape(source, machine)
     effects: list[Floats] = []
     along: list[list[Floats]] = []
     signs: list[Floats] = []
@@ -86,13 +87,12 @@ def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -
 
 def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return effects of growth with other time constants, shape (n, q)."""
-    parameters = source.parameters(machine)
-    amplitude = np.array([not p.grid for p in parameters])
+    amplitude = ~is_shape(source, machine)
     if source.varies_with != "time" or amplitude.all():
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
     first = int(np.flatnonzero(~amplitude)[0])
     found = []
-    for constant in parameters[first].grid[::STAGES_APART]:
+    for constant in source.parameters(machine)[first].grid[::STAGES_APART]:
         pieces = []
         for run in runs:
             other = run.values.copy()

@@ -17,6 +17,7 @@ from dbbstation.calibration.outliers.strange_runs import in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.explained import Explained, SettledCircles
+from dbbstation.diagnosis.parts import amplitudes, at_point
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
@@ -321,24 +322,18 @@ def _joint(channel: CircleChannel, comparison: ModelComparison, best: Hypothesis
 
 
 def _estimated(channel: CircleChannel, comparison: ModelComparison, hypothesis: Hypothesis) -> list[Floats | None]:
-    values = comparison.estimates(hypothesis.members).values
     found: list[Floats | None] = []
-    for member in hypothesis.members:
-        own, values = values[: len(member.columns)], values[len(member.columns) :]
+    for member, own, _ in comparison.estimated(hypothesis.members):
         if not member.cause.named:
             found.append(None)
             continue
         source = channel.source_of(member.name, member.variant)
-        parameters = source.parameters(channel.machine)
-        shaped = np.array([bool(p.grid) for p in parameters])
+        grids = [p.grid for p in source.parameters(channel.machine) if p.grid]
         whole = channel.to_whole(member.variant) @ own[: member.width]
-        full = np.empty(len(parameters))
-        full[~shaped] = whole[: int((~shaped).sum())]
-        tangents = own[member.width :][: int(shaped.sum())] if len(member.variant.slack) else 0.0
-        full[shaped] = np.array(member.variant.nonlinear) + tangents
-        for k in np.flatnonzero(shaped):
-            full[k] = np.clip(full[k], min(parameters[k].grid), max(parameters[k].grid))
-        found.append(full)
+        tangents = own[member.width :][: len(grids)] if len(member.variant.slack) else 0.0
+        point = np.clip(np.array(member.variant.nonlinear) + tangents, [*map(min, grids)], [*map(max, grids)])
+        sizes = whole[: len(amplitudes(source, channel.machine))]
+        found.append(at_point(source, channel.machine, point, sizes))
     return found
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dbbstation.errors import MachineError
+from dbbstation.diagnosis.parts import by_amplitudes, by_terms
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.machine.travel import check_travel
+from dbbstation.machine.travel import is_within_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Motion, Need, Setup
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.inference.model_comparison import Variant
-    from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -88,7 +88,7 @@ class ForeseenTests:
         self.channel = channel
         self._ends_s = _ends_s(channel)
         self._samples = float(np.mean([len(o.raw) for o in channel.observations]))
-        self._reachable: dict[Circle, bool] = {}
+        self._is_reachable = cache(lambda circle: is_within_travel(channel.machine, circle.envelope(step_deg=15.0)))
         self._runs: dict[tuple[Circle, float, str], _Run] = {}
 
     def that_show(self, needs: Collection[Need]) -> list[Proposal]:
@@ -143,11 +143,6 @@ class ForeseenTests:
         compressed[:, np.concatenate(touched)] = triangle
         return compressed
 
-    def _is_reachable(self, circle: Circle) -> bool:
-        if circle not in self._reachable:
-            self._reachable[circle] = _reachable(self.channel.machine, circle)
-        return self._reachable[circle]
-
     def _run(self, proposal: Proposal, direction: Direction, asked: Sequence[tuple[ErrorSource, Variant]]) -> _Run:
         wait_s = proposal.wait_s if Need.TIME in self.channel.calibration.layout.needs else 0.0
         key = replace(proposal.circle, direction=direction), wait_s, proposal.observation.setup.ball
@@ -158,30 +153,18 @@ class ForeseenTests:
             for source, variant in asked:
                 form = _form(proposal, source, variant)
                 if form not in run.of_sources:
-                    run.of_sources[form] = self._of_source(run, reading, source, variant)
+                    derivative = by_amplitudes(reading, source, self.channel.machine, variant.nonlinear)
+                    run.of_sources[form] = _without(run.ball, derivative) * run.weight
         return run
 
     def _of_base(self, reading: BarReading) -> _Run:
         motion = reading.actual.motion
         ball, _ = np.linalg.qr(reading.sensitivity.direction[motion.kept])
         layout = self.channel.calibration.layout
-        rows = np.zeros((len(reading.length_mm), len(layout.nominal)))
-        for term in layout.terms:
-            if term.acts_on(motion):
-                rows[:, term.columns] = reading.by_source(
-                    term.source, self.channel.machine, layout.nominal[term.columns]
-                )
+        rows = by_terms(reading, layout, layout.nominal)
         touched = np.flatnonzero(np.any(rows != 0.0, axis=0))
         weight = float(np.sqrt(self._samples / len(rows)))
         return _Run(ball, weight, touched, _without(ball, rows[:, touched]) * weight)
-
-    def _of_source(self, run: _Run, reading: BarReading, source: ErrorSource, variant: Variant) -> Floats:
-        parameters = source.parameters(self.channel.machine)
-        amplitudes = [k for k, p in enumerate(parameters) if not p.grid]
-        values = np.zeros(len(parameters))
-        values[[k for k, p in enumerate(parameters) if p.grid]] = variant.nonlinear
-        derivative = reading.by_source(source, self.channel.machine, values)[:, amplitudes]
-        return _without(run.ball, derivative) * run.weight
 
 
 def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
@@ -191,14 +174,6 @@ def _form(proposal: Proposal, source: ErrorSource, variant: Variant) -> _Form:
 
 def _without(ball: Floats, rows: Floats) -> Floats:
     return rows - ball @ (ball.T @ rows)
-
-
-def _reachable(machine: Machine, circle: Circle) -> bool:
-    try:
-        check_travel(machine, circle.envelope(step_deg=15.0), where="proposal")
-    except MachineError:
-        return False
-    return True
 
 
 def _ends_s(channel: CircleChannel) -> float:

@@ -10,6 +10,7 @@ from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.findings import NextTest, Verdict
 from dbbstation.diagnosis.foreseen import ForeseenTests
+from dbbstation.diagnosis.parts import amplitudes
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import all_columns
@@ -151,7 +152,6 @@ def _worth_it(now: Floats, then: Floats) -> bool:
 def _in_words(
     channel: CircleChannel, source: ErrorSource, variant: Variant, proposal: Proposal, before: float, after: float
 ) -> NextTest:
-    parameter = next(p for p in source.parameters(channel.machine) if not p.grid)
     unit = float(variant.plausible[0])
     circle = proposal.circle
     (x, y, z), (a, b, _) = circle.ball_mm, circle.tilt_deg
@@ -168,5 +168,5 @@ def _in_words(
         source=source.name,
         sigma_before=before * unit,
         sigma_after=after * unit,
-        unit=parameter.unit,
+        unit=amplitudes(source, channel.machine)[0].unit,
     )

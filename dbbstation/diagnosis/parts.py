@@ -12,10 +12,49 @@ from dbbstation.machine.geometry import STRUTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.sources.contract import Parameter
+    from dbbstation.calibration.layout import Layout
+    from dbbstation.computing.arrays import Flags, Floats
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading
+    from dbbstation.sources.contract import ErrorSource, Parameter
 
 ALIKE = "all struts alike"
 """Label of the form that has one amplitude for all struts."""
+
+
+def is_shape(source: ErrorSource, machine: Machine) -> Flags:
+    """Return which parameters of a source are nonlinear, shape (p,)."""
+    return np.array([bool(p.grid) for p in source.parameters(machine)])
+
+
+def amplitudes(source: ErrorSource, machine: Machine) -> list[Parameter]:
+    """Return the other parameters."""
+    return [p for p in source.parameters(machine) if not p.grid]
+
+
+def at_point(
+    source: ErrorSource, machine: Machine, point: Sequence[float] | Floats, sizes: Floats | float = 0.0
+) -> Floats:
+    """Return a source's values, shape (p,), from nonlinear parameters and amplitudes."""
+    shaped = is_shape(source, machine)
+    values = np.empty(len(shaped))
+    values[shaped], values[~shaped] = point, sizes
+    return values
+
+
+def by_amplitudes(reading: BarReading, source: ErrorSource, machine: Machine, point: Sequence[float]) -> Floats:
+    """Return a reading's derivative by a source's amplitudes at nonlinear parameters, shape (n, a)."""
+    derivative = reading.by_source(source, machine, at_point(source, machine, point))
+    return derivative[:, ~is_shape(source, machine)]
+
+
+def by_terms(reading: BarReading, layout: Layout, x: Floats) -> Floats:
+    """Return a reading's derivative by all parameters of a fit at values of shape (k,): shape (n, k)."""
+    found = np.zeros((len(reading.length_mm), len(x)))
+    for term in layout.terms:
+        if term.acts_on(reading.actual.motion):
+            found[:, term.columns] = reading.by_source(term.source, layout.machine, x[term.columns])
+    return found
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties, unseen
+from dbbstation.diagnosis.parts import amplitudes
 from dbbstation.inference.alternatives import standing_out
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
@@ -149,11 +150,10 @@ class _CircleJudge(CauseJudge):
             return self._fitted(member.name)
         source = self._circles.source_of(member.name, member.variant)
         own, spread = member.width, self._circles.to_whole(member.variant)
-        amplitudes = [p for p in source.parameters(self._circles.machine) if not p.grid]
         whole, variance = spread @ values[:own], np.diag(spread @ covariance[:own, :own] @ spread.T)
         return {
             p.name: Value(float(whole[k]), float(np.sqrt(max(variance[k], 0.0))), p.unit)
-            for k, p in enumerate(amplitudes)
+            for k, p in enumerate(amplitudes(source, self._circles.machine))
         }
 
     def _impossible(self, shown: Member, values: Floats, covariance: Floats) -> str:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.reporting.identified import identified_model
-from dbbstation.errors import MachineError
 from dbbstation.facts.value import finite
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.machine.travel import check_travel
+from dbbstation.machine.travel import is_within_travel
 from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length
 from dbbstation.sources.contract import Motion
 
@@ -88,12 +87,4 @@ def workspace(machine: Machine) -> Floats:
     tilts = np.array(TILTS_DEG)[tilt.ravel()]
     poses = np.column_stack([x.ravel(), y.ravel(), z.ravel(), tilts, np.zeros(len(tilts))])
     inside = np.hypot(poses[:, 0], poses[:, 1]) <= REACH * travel.xy_radius_mm + 1e-9
-    return poses[[row for row in np.flatnonzero(inside) if _reachable(machine, poses[row : row + 1])]]
-
-
-def _reachable(machine: Machine, pose: Floats) -> bool:
-    try:
-        check_travel(machine, pose, where="workspace")
-    except MachineError:
-        return False
-    return True
+    return poses[[row for row in np.flatnonzero(inside) if is_within_travel(machine, poses[row : row + 1])]]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import TravelError
+from dbbstation.errors import MachineError, TravelError
 from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse, strut_jacobian
@@ -28,6 +28,15 @@ upper limit."""
 
 SMALLER = "move the circle, make it smaller or tilt it less"
 """Remedy for poses outside the travel."""
+
+
+def is_within_travel(machine: Machine, poses: Floats) -> bool:
+    """Return whether all poses, shape (n, 6) [mm, deg], are reachable."""
+    try:
+        check_travel(machine, poses, where="")
+    except MachineError:
+        return False
+    return True
 
 
 def check_travel(machine: Machine, poses: Floats, *, where: str, remedy: str = SMALLER) -> None:

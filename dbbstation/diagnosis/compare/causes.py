@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
-from dbbstation.diagnosis.parts import ALIKE, parts_of
+from dbbstation.diagnosis.parts import ALIKE, amplitudes, at_point, by_amplitudes, parts_of
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.diagnosis.variables import variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
@@ -127,7 +127,7 @@ class Change:
     def _effect(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         pieces, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
-            values = self._values(point, np.split(amplitudes, self._sets)[group])
+            values = self._values(point, amplitudes, group)
             effect = self.source.effect(motion, sides.machine, values)
             pieces.append(reading.by_parameters(_as_derivative(effect))[:, 0])
         return sides.averaged(side, pieces)
@@ -136,11 +136,9 @@ class Change:
     def _proportional(self) -> bool:
         return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
 
-    def _values(self, point: tuple[float, ...], amplitudes: Floats) -> Floats:
-        is_shape = np.array([bool(p.grid) for p in self._parameters])
-        values = np.empty(len(is_shape))
-        values[is_shape], values[~is_shape] = point, amplitudes
-        return values
+    def _values(self, point: tuple[float, ...], sizes: Floats, group: int) -> Floats:
+        own = np.split(sizes, self._sets)[group]
+        return at_point(self.source, self.sides.machine, point, own)
 
     @cached_property
     def _parameters(self) -> tuple[Parameter, ...]:
@@ -148,7 +146,11 @@ class Change:
 
     @cached_property
     def _amplitudes(self) -> list[Parameter]:
-        return [p for p in self._parameters if not p.grid]
+        return amplitudes(self.source, self.sides.machine)
+
+    @cached_property
+    def _middle(self) -> tuple[float, ...]:
+        return tuple(p.grid[len(p.grid) // 2] for p in self._parameters if p.grid)
 
     @cached_property
     def _groups(self) -> Integers:
@@ -164,27 +166,22 @@ class Change:
 
     @cached_property
     def _whens(self) -> tuple[When, ...]:
-        point = tuple(p.grid[len(p.grid) // 2] for p in self._parameters if p.grid)
-        of_a, of_b = self._of(0, point), self._of(1, point)
+        of_a, of_b = self._of(0, self._middle), self._of(1, self._middle)
         size = max(float(np.linalg.norm(of_a)), float(np.linalg.norm(of_b)), 1e-300)
         apart = float(np.linalg.norm(of_b - of_a)) / size
         return (CHANGED,) if apart <= HARDLY_DIFFERENT else (IN_B, IN_A, IN_BOTH)
 
     def _grid(self, k: int, parameter: Parameter) -> tuple[float, ...]:
-        middle = [p.grid[len(p.grid) // 2] for p in self._parameters if p.grid]
-        values = tuple(sorted(parameter.grid))
+        middle, values = self._middle, tuple(sorted(parameter.grid))
         shown = tuple(v for v in values if self.source.shows(self.sides.motions[1], [*middle[:k], v, *middle[k + 1 :]]))
         return shown or values[:1]
 
     def _of(self, side: int, point: tuple[float, ...]) -> Floats:
-        count = len(self._amplitudes)
-        values = self._values(point, np.zeros(count))
-        amplitudes = [k for k, p in enumerate(self._parameters) if not p.grid]
-        pieces = []
+        count, pieces = len(self._amplitudes), []
         for group, reading in zip(self._groups, self.sides.readings[side], strict=True):
-            derivative = reading.by_source(self.source, self.sides.machine, values)
+            derivative = by_amplitudes(reading, self.source, self.sides.machine, point)
             own = np.zeros((len(derivative), count * self._sets))
-            own[:, count * group : count * (group + 1)] = derivative[:, amplitudes]
+            own[:, count * group : count * (group + 1)] = derivative
             pieces.append(own)
         return self.sides.averaged(side, pieces)
 
@@ -202,7 +199,7 @@ class Change:
     def _slack(self, side: int, point: tuple[float, ...], amplitudes: Floats) -> Floats:
         runs, sides = [], self.sides
         for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
-            values = self._values(point, np.split(amplitudes, self._sets)[group])
+            values = self._values(point, amplitudes, group)
             derivative = reading.by_source(self.source, sides.machine, values)
             runs.append(Effects(motion, reading, values, derivative, variables(motion, sides.machine)))
         found = discrepancy_of(self.source, sides.machine, runs)

@@ -49,14 +49,7 @@ def compress(columns: Integers, jacobian: Floats, target: Floats) -> Block:
 
 def spread(blocks: Sequence[Block], columns: int) -> Floats:
     """Return rows of all blocks over all columns, target last, shape (r, columns + 1)."""
-    wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
-    row = 0
-    for block in blocks:
-        rows = wide[row : row + len(block.target)]
-        rows[:, block.columns] = block.triangle
-        rows[:, -1] = block.target
-        row += len(rows)
-    return wide
+    return spread_over(blocks, np.arange(columns))
 
 
 def spread_over(blocks: Sequence[Block], columns: Integers) -> Floats:

@@ -57,9 +57,7 @@ class LinearSplines(Form):
     low: Floats
     high: Floats
 
-    @property
-    def count(self) -> int:
-        return SPLINES
+    count = SPLINES
 
     def columns(self, values: Floats) -> Floats:
         place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (SPLINES - 1)
@@ -134,9 +132,7 @@ class WaveOfTurn(Form):
 
     frequency: float
 
-    @property
-    def count(self) -> int:
-        return 4
+    count = 4
 
     def text(self, unit: str) -> str:
         del unit
@@ -300,9 +296,7 @@ class Spring(Form):
     towards_deg: float
     about: float
 
-    @property
-    def count(self) -> int:
-        return 2
+    count = 2
 
     def text(self, unit: str) -> str:
         del unit
@@ -324,9 +318,7 @@ class Ringing(Form):
     period: float
     decay: float
 
-    @property
-    def count(self) -> int:
-        return 2
+    count = 2
 
     def text(self, unit: str) -> str:
         return f"period {self.period:.3g} {unit}, fading over {self.decay:.3g} {unit}"

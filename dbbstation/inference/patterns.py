@@ -161,7 +161,7 @@ def patterns(
     found += [_drag(v, rate, unit) for v, rate, unit in speeds]
     found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
     if len(blocks) > 1:
-        found.append(_of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
+        found.append(of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
     others = any(v.range is not None for v in variables)
     return [pattern for pattern in found if others or np.ptp(pattern.samples, axis=0).max(initial=0.0) > 0.0]
 
@@ -316,7 +316,8 @@ ZEROS = (-2.0 * ZERO_SD, 0.0, 2.0 * ZERO_SD)
 factor, a separate and more probable cause."""
 
 
-def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:
+def of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:
+    """Return an offset of each run."""
     samples = np.zeros((rows, len(blocks)))
     for k, own in enumerate(blocks):
         samples[own, k] = 1.0

@@ -41,10 +41,10 @@ def axes_of(columns: Floats, least: float = RANK) -> Floats:
     return u[:, s > least * s[:1]]
 
 
-def left_by(columns: Floats, values: Floats) -> Floats:
+def left_by(columns: Floats, values: Floats, rcond: float = RANK) -> Floats:
     """Return the residual of values, shape (n,), after a least-squares fit of columns, shape (n, k)."""
     scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    return values - scaled @ np.linalg.lstsq(scaled, values, rcond=RANK)[0]
+    return values - scaled @ np.linalg.lstsq(scaled, values, rcond=rcond)[0]
 
 
 def squares(values: Floats) -> float:

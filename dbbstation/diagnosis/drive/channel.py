@@ -15,7 +15,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
-from dbbstation.inference.patterns import CURVES, Family, Pattern
+from dbbstation.inference.patterns import CURVES, Family, Pattern, of_blocks
 from dbbstation.inference.triangle import axes_of
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import SURE, Acts
@@ -91,7 +91,7 @@ def drive_channel(
     straight = np.hstack([motion, *(recordings.compared(lambda s, f=form: f.columns(s, ())) for form in simple)])  # type: ignore[misc]
     curves = tuple(_beyond(straight, _curves(recordings)))
     if len(recordings.blocks) > 1:
-        curves = (*curves, _of_files(recordings))
+        curves = (*curves, of_blocks(recordings.blocks, len(recordings.force_n)))
     scale, shortest = _first_look(recordings, np.hstack([straight, *(p.samples for p in curves)]))
     of_law: dict[str, tuple[DriveSource, DriveForm]] = {}
     laws = []
@@ -145,13 +145,6 @@ def _beyond(straight: Floats, patterns: Iterator[Pattern]) -> Iterator[Pattern]:
         parts = ((range(rest.shape[1]), "beside what has a name"), (range(rest.shape[1], every), "whole"))
         choices = tuple((tuple(columns), float(np.log(1.0 / len(parts))), label) for columns, label in parts)
         yield replace(pattern, samples=np.hstack([rest, pattern.samples]), choices=choices)
-
-
-def _of_files(recordings: Recordings) -> Pattern:
-    samples = np.zeros((len(recordings.force_n), len(recordings.blocks)))
-    for k, rows in enumerate(recordings.blocks):
-        samples[rows, k] = 1.0
-    return Pattern(Family.BLOCKS, (), samples)
 
 
 def _variables(recordings: Recordings) -> dict[str, Variable]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.folds import FOLDS
 from dbbstation.inference.impossible import NEGATIVE_SIGMA
+from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.named_values import values_of_law
 from dbbstation.inference.triangle import RANK, triangle_of
 from dbbstation.inference.verdict import OUT
@@ -55,26 +57,28 @@ class DriveFit:
             for k, name in enumerate(self.drive.channel.base.names)
         }
 
+    @cached_property
+    def own(self) -> dict[str, tuple[Member, slice]]:
+        """Return members by name, with their columns."""
+        places = slices_of(self.members, len(self.drive.channel.base.names))
+        return {member.name: (member, place) for member, place in zip(self.members, places, strict=True)}
+
+    @property
+    def laws(self) -> list[str]:
+        """Return the members that are laws."""
+        return [name for name in self.own if name in self.drive.of_law]
+
     def columns_of(self, name: str) -> slice:
         """Return a member's amplitude columns."""
-        start = len(self.drive.channel.base.names)
-        for member in self.members:
-            if member.name == name:
-                return slice(start, start + member.width)
-            start += len(member.columns)
-        raise KeyError(name)
-
-    def member(self, name: str) -> Member:
-        """Return a member by cause."""
-        return next(member for member in self.members if member.name == name)
+        member, own = self.own[name]
+        return slice(own.start, own.start + member.width)
 
     def _law(self, name: str) -> Law:
         return next(law for law in self.drive.channel.laws if law.name == name)
 
     def parameters(self, name: str) -> dict[str, Value]:
         """Return a law's amplitudes and nonlinear parameters; without tangent, a parameter's uncertainty is its grid's last value."""
-        member, law, start = self.member(name), self._law(name), self.columns_of(name).start
-        own = slice(start, start + len(member.columns))
+        law, (member, own) = self._law(name), self.own[name]
         found = values_of_law(law, member, self.values[own], self.covariance[own, own], METHOD_U_SHARE)
         ends = dict(zip(law.parameters[len(law.plausible) :], (grid[-1] for grid in law.grids), strict=True))
         return {n: v if np.isfinite(v.uncertainty) else replace(v, uncertainty=ends[n]) for n, v in found.items()}
@@ -89,19 +93,17 @@ class DriveFit:
     def all_values(self) -> dict[str, float]:
         """Return all parameters of base and laws by name."""
         found = {name: value.value for name, value in self.base.items()}
-        for member in self.members:
-            if member.name in self.drive.of_law:
-                found |= {name: value.value for name, value in self.parameters(member.name).items()}
+        for law in self.laws:
+            found |= {name: value.value for name, value in self.parameters(law).items()}
         return found
 
     def force_n(self, names: Container[str] | None = None) -> Floats:
         """Return the force of base and members at compared samples, shape (m,) [N]; None for all members."""
         used = np.zeros(len(self.values), dtype=bool)
         used[: len(self.drive.channel.base.names)] = True
-        for member in self.members:
-            if names is None or member.name in names:
-                own = self.columns_of(member.name)
-                used[own.start : own.start + len(member.columns)] = True
+        for name, (_, own) in self.own.items():
+            if names is None or name in names:
+                used[own] = True
         return self.samples[:, used] @ self.values[used]
 
     def weighted(self, weights: Floats, unit: str) -> Value:
@@ -165,10 +167,9 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
     """Return the greatest standardised difference between both estimates."""
     # Its variance is the difference of variances [Hausman 1978, corollary 2.6].
     told = list(range(len(efficient.drive.channel.base.names)))
-    for member in efficient.members:
-        if member.name in efficient.drive.of_law:
-            own = efficient.columns_of(member.name)
-            told += range(own.start, own.stop)
+    for law in efficient.laws:
+        own = efficient.columns_of(law)
+        told += range(own.start, own.stop)
     every = np.diag(plain.covariance) - np.diag(efficient.covariance)
     known = [k for k in told if every[k] > RANK * plain.covariance[k, k]]
     apart = np.abs(plain.values - efficient.values)[known] / np.sqrt(every[known])

@@ -236,11 +236,9 @@ def _numbers(
     nothing = {name: Value(float("nan"), float("inf"), unit) for name, unit in BASE_UNITS.items()}
     numbers = {name: _number((nothing | values)[name], is_known=known[name]) for name in (MASS, VISCOUS)}
     after = explained.after
-    for member in after.members:
-        if member.name not in explained.drive.of_law:
-            continue
+    for law in after.laws:
         # Load or asymmetric friction: the additional force in one direction.
-        found = after.parameters(member.name)
+        found = after.parameters(law)
         for parameter in OFFSETS & set(found):
             numbers["offset_n"] = _number(found[parameter], is_known=limits.reverses)
     return numbers
@@ -251,11 +249,9 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
     for side, sign in (("forwards", 1.0), ("backwards", -1.0)):
         dry, wet = np.zeros(len(fitted.values)), np.zeros(len(fitted.values))
         wet[fitted.drive.channel.base.names.index(VISCOUS)] = 1.0
-        for member in fitted.members:
-            if member.name not in fitted.drive.of_law:
-                continue
-            first = fitted.columns_of(member.name).start
-            for k, parameter in enumerate(fitted.drive.of_law[member.name][1].amplitudes):
+        for law in fitted.laws:
+            first = fitted.columns_of(law).start
+            for k, parameter in enumerate(fitted.drive.of_law[law][1].amplitudes):
                 if parameter.name == "coulomb_n":
                     dry[first + k] = 1.0
                 elif parameter.name == "coulomb_asymmetry_n":
@@ -331,9 +327,8 @@ def _curve(explained: ExplainedDrive) -> FrictionCurve:
     columns = np.zeros((len(speed), len(fitted.values)))
     if VISCOUS in drive.channel.base.names:
         columns[:, drive.channel.base.names.index(VISCOUS)] = speed
-    for member in fitted.members:
-        name = member.name
-        if name in drive.of_law and drive.of_law[name][0].varies_with == "speed":
+    for name in fitted.laws:
+        if drive.of_law[name][0].varies_with == "speed":
             shapes = tuple(fitted.parameters(name)[p.name].value for p in drive.of_law[name][1].shapes)
             columns[:, fitted.columns_of(name)] = drive.of_law[name][1].columns(pretended, shapes)
     variance = np.einsum("ij,jk,ik->i", columns, fitted.covariance, columns)

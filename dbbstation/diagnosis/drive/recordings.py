@@ -14,7 +14,7 @@ from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivative
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import left_by, rms
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -162,8 +162,7 @@ def _refuse_wrong_sign(one: Recordings) -> None:
     if not one.scale.reverses:
         return
     conservative = np.column_stack([np.ones(len(force)), one.motion[:, 0], one.at(lambda s: s.position_m)])
-    conservative /= np.maximum(np.linalg.norm(conservative, axis=0), 1e-300)
-    left = force - conservative @ np.linalg.lstsq(conservative, force, rcond=None)[0]
+    left = left_by(conservative, force)
     powers = [float(np.mean(part)) for part in np.array_split(left * speed, BOUNDS.power_stretches)]
     mean, sigma = float(np.mean(powers)), float(np.std(powers)) / np.sqrt(len(powers))
     agreement = float(left @ speed) / max(float(np.linalg.norm(left) * np.linalg.norm(speed)), 1e-300)

@@ -212,13 +212,12 @@ def _judged(
     one: CauseFinding, found: SearchOutcome, nonlinear: Mapping[str, float], open_to: Mapping[str, Challenge]
 ) -> CauseFinding:
     """Return a finding with the term's values; it is not named if nonlinear or worse than a curve."""
-    inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
-    if one.name not in inside:
+    if one.name not in found.node.terms:
         if one.verdict.rank < Verdict.AMBIGUOUS.rank:
             why = NOT_REACHED if found.stopped else CAME_BACK
             return replace(one, verdict=Verdict.AMBIGUOUS, text=f"It was not put in: {why}.")
         return one
-    candidate, term = inside[one.name]
+    candidate, term, _ = found.node.terms[one.name]
     values = dict(one.values)
     for name, number in zip(candidate.names, term.numbers, strict=True):
         if name in values:
@@ -255,18 +254,15 @@ in twenty, the linear responses do not describe the refit, and no other term is 
 
 def _nonlinear(work: SimulationRuns, found: SearchOutcome) -> dict[str, float]:
     weigh, sigma = noise_of(found.settled)
-    fitted, first, apart = found.node.fitted, len(work.model.parameters), {}
-    known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in work.model.parameters])
-    rows = weigh(fitted.columns) / sigma
-    u = _uncertainties(rows, np.concatenate([known, np.zeros(rows.shape[1] - first)]))
-    for term in fitted.state.terms:
+    fitted, apart = found.node.fitted, {}
+    u = _uncertainties(weigh(fitted.columns) / sigma, work.model)
+    for name, (_, term, own) in found.node.terms.items():
         worst = 0.0
-        for k in range(first, first + len(term.amplitudes)):
+        for k in range(own.start, own.start + len(term.amplitudes)):
             true = fitted.residual - work.residuals([fitted.state.moved(k, float(u[k]))], strict=False)[0]
             linear = fitted.columns[:, k] * u[k]
             worst = max(worst, float(np.linalg.norm(true - linear)) / max(float(np.linalg.norm(linear)), 1e-300))
-        apart[term.name] = worst if np.isfinite(worst) else np.inf
-        first += len(term.numbers)
+        apart[name] = worst if np.isfinite(worst) else np.inf
     return apart
 
 
@@ -275,11 +271,9 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[RefittedOfSimulator, 
     model, fitted = base.work.model, found.node.fitted
     count = len(model.parameters)
     rows = weigh(fitted.columns) / sigma
-    known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in model.parameters])
-    alone = _uncertainties(rows[:, :count], known)
-    both = _uncertainties(rows, np.concatenate([known, np.zeros(rows.shape[1] - count)]))[:count]
+    alone, both = _uncertainties(rows[:, :count], model), _uncertainties(rows, model)[:count]
     white = weigh(base.fitted.columns) / sigma
-    before = _uncertainties(white, known) * max(rms(weigh(base.fitted.residual)) / sigma, 1.0)
+    before = _uncertainties(white, model) * max(rms(weigh(base.fitted.residual)) / sigma, 1.0)
     names = [p.name for p in model.parameters]
     alike = dict(not_told_apart(names, white))
     found_parameters = []
@@ -303,9 +297,7 @@ def _parameters(base: Node, found: SearchOutcome) -> tuple[RefittedOfSimulator, 
     return tuple(found_parameters)
 
 
-def _uncertainties(rows: Floats, known: Floats) -> Floats:
+def _uncertainties(rows: Floats, model: Model) -> Floats:
     """Return parameters' standard uncertainties for unit white noise, shape (m,)."""
-    normal = rows.T @ rows + np.diag(known)
-    norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-14, hermitian=True)
+    inverse, norm = model.inverse_information(rows, 1e-14)
     return np.sqrt(np.maximum(np.diag(inverse), 0.0)) / norm

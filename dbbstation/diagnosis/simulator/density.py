@@ -45,10 +45,7 @@ def log_density(
     if np.isfinite(bank.tails):
         return level + float(np.sum(log_student(left, bank.tails)))
     own = bank.whitened(columns) / noise.innovation
-    known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in work.model.parameters])
-    normal = own.T @ own + np.diag(np.concatenate([known, np.zeros(own.shape[1] - len(known))]))
-    norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    open_ = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-10, hermitian=True)
+    open_, norm = work.model.inverse_information(own, 1e-10)
     there = white(columns) / norm
     # The rows' covariance is one plus there @ open_ @ there.T; Woodbury's formula gives inverse and determinant.
     inner = np.eye(len(open_)) + open_ @ (there.T @ there)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from dbbstation.inference.channel import Law
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.candidates import Candidate
@@ -119,7 +119,11 @@ def form_uncertainty(one: Candidate) -> float:
 
 def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
     """Return a form's slack: curves, lags and stick-slip over its port, scaled to the effect's size."""
-    own = [columns for key, columns in off.items() if key[0] == one.term.port and not _is_of(one, key)]
+    own = [
+        columns
+        for key, columns in off.items()
+        if key[0] == one.term.port and (one.term.form not in OFF or key != departing(one))
+    ]
     if not own or not form_uncertainty(one):
         return None
     columns = np.hstack(own)
@@ -128,10 +132,6 @@ def discrepancy(one: Candidate, off: Departures) -> Discrepancy | None:
         return columns * rms(effect)
 
     return beside
-
-
-def _is_of(one: Candidate, key: tuple[str, TermForm, tuple[str, ...]]) -> bool:
-    return one.term.form in OFF and key == departing(one)
 
 
 def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParameter]:
@@ -143,21 +143,17 @@ def _directions(one: Candidate, point: tuple[float, ...]) -> list[PerturbedParam
 
 def _law(one: Candidate, columns: Floats, size: float, off: Departures) -> Law:
     rms = np.sqrt(np.mean(np.square(columns), axis=(0, 1)))
-    return Law(
-        name=one.name,
+    return law_of_term(
+        one,
         columns=_between(one.grids, columns),
         plausible=size / np.maximum(rms, 1e-300),
         parameters=one.names,
         units=one.units,
         grids=one.grids,
         positive=one.positive,
-        log_odds=one.log_odds,
         reach=size if one.grids else None,
-        form_uncertainty=form_uncertainty(one),
         discrepancy=discrepancy(one, off),
-        followed=followed(one),
-        driven=frozenset(f"{signal} at {one.term.port}" for signal in one.driven),
-        way=way(one),
+        driven=frozenset(_at_port(one, one.driven)),
     )
 
 
@@ -171,32 +167,33 @@ def _in_place(work: SimulationRuns, state: FittedState, one: Candidate, size: fl
         return None
     grid = tuple(one.tried[k] for k in usable)
     columns = np.stack([answers[k][:, None] for k in usable])
-    return Law(
-        name=one.name,
+    return law_of_term(
+        one,
         columns=_between((grid,), columns),
         plausible=np.ones(1),
         parameters=(SHARE, one.names[0]),
         units=("", one.units[0]),
         grids=(grid,),
         positive=(True,),
-        log_odds=one.log_odds,
-        form_uncertainty=form_uncertainty(one),
-        followed=followed(one),
-        driven=frozenset(f"{signal} at {one.term.port}" for signal in one.driven),
-        way=way(one),
+        driven=frozenset(_at_port(one, one.driven)),
     )
 
 
-def followed(one: Candidate) -> tuple[str, ...]:
-    """Return a candidate's signals, else its port."""
-    return tuple(f"{signal} at {one.term.port}" for signal in one.term.signals) or (f"port {one.term.port}",)
+def law_of_term(one: Candidate, **further: Any) -> Law:  # noqa: ANN401 - fields of `Law`
+    """Return a candidate's law, which follows its signals, else its port."""
+    turns = one.term.form in {TermForm.SLIP, TermForm.PLAY}
+    return Law(
+        name=one.name,
+        log_odds=one.log_odds,
+        form_uncertainty=form_uncertainty(one),
+        followed=tuple(_at_port(one, one.term.signals)) or (f"port {one.term.port}",),
+        way="direction" if turns else "late" if one.term.form in MEMORIES else "",
+        **further,
+    )
 
 
-def way(one: Candidate) -> str:
-    """Return how a candidate follows its signals; empty for value."""
-    if one.term.form in {TermForm.SLIP, TermForm.PLAY}:
-        return "direction"
-    return "late" if one.term.form in MEMORIES else ""
+def _at_port(one: Candidate, signals: Iterable[str]) -> dict[str, None]:
+    return dict.fromkeys(f"{signal} at {one.term.port}" for signal in signals)
 
 
 SHARE = "share"

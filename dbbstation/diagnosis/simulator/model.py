@@ -96,6 +96,17 @@ class Model:
     outputs: tuple[Output, ...]
     runs: tuple[SimulatorRecording, ...]
 
+    def inverse_information(self, rows: Floats, rcond: float) -> tuple[Floats, Floats]:
+        """Return the pseudo-inverse of columns' information in unit noise, shape (m, m), times these norms, shape (m,).
+
+        Args:
+            rows: effects of parameters, then of terms, shape (n, m); the stated uncertainties add to them.
+        """
+        known = [1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in self.parameters]
+        normal = rows.T @ rows + np.diag([*known, *[0.0] * (rows.shape[1] - len(known))])
+        norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        return np.linalg.pinv(normal / np.outer(norm, norm), rcond=rcond, hermitian=True), norm
+
     def of_run(self, run: int, values: Sequence[float]) -> tuple[tuple[str, float], ...]:
         """Return arguments of `simulate` for one run and parameter values, shape (k,)."""
         pairs = zip(self.parameters, values, strict=True)

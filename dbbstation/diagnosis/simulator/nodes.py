@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,15 +17,15 @@ from dbbstation.diagnosis.simulator.laws import (
     departing,
     departures,
     discrepancy,
-    followed,
     form_uncertainty,
+    law_of_term,
     laws,
     of_unit_size,
-    way,
 )
 from dbbstation.diagnosis.simulator.noise_left import channel_of, noise_left
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
 from dbbstation.inference.bank import alike
+from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.named_values import named_values
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.simulator.fit import Weigh
     from dbbstation.diagnosis.simulator.laws import Departures
+    from dbbstation.diagnosis.simulator.terms import Term
     from dbbstation.diagnosis.simulator.work import SimulationRuns
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.model_comparison import Member
@@ -63,18 +65,21 @@ class Node:
         return frozenset(one.name for one in self.inside)
 
     @cached_property
+    def terms(self) -> dict[str, tuple[Candidate, Term, slice]]:
+        """Return inserted candidates by name, with the fitted term and its columns."""
+        terms, first = self.fitted.state.terms, len(self.work.model.parameters)
+        own = slices((len(term.numbers) for term in terms), first)
+        return {one.name: (one, term, place) for one, term, place in zip(self.inside, terms, own, strict=True)}
+
+    @cached_property
     def outside(self) -> tuple[Candidate, ...]:
         """Return candidates that are not inserted."""
         work = self.work
         longest = max(work.model.runs, key=len).inputs["t"]
         found = candidates(work.model.ports, work.signals(self.fitted.state), self.own, longest)
-        inside = {(one.term.port, one.term.form, one.term.signals, one.term.own) for one in self.inside}
-        taken = {one.name for one in self.inside}
-        return tuple(
-            one
-            for one in found
-            if one.name not in taken and (one.term.port, one.term.form, one.term.signals, one.term.own) not in inside
-        )
+        what = attrgetter("port", "form", "signals", "own")
+        inside = {what(one.term) for one in self.inside}
+        return tuple(one for one in found if one.name not in self.names and what(one.term) not in inside)
 
     @cached_property
     def asked(self) -> tuple[list[Law], dict[str, str]]:
@@ -93,12 +98,8 @@ class Node:
 
     def answers_of(self, name: str) -> Floats:
         """Return responses to a term, shape (n, p)."""
-        first = len(self.work.model.parameters)
-        for one, term in zip(self.inside, self.fitted.state.terms, strict=True):
-            if one.name == name:
-                return self.fitted.columns[:, first : first + len(term.amplitudes)]
-            first += len(term.numbers)
-        raise KeyError(name)
+        _, term, own = self.terms[name]
+        return self.fitted.columns[:, own][:, : len(term.amplitudes)]
 
     @cached_property
     def channel(self) -> Channel:
@@ -119,10 +120,8 @@ class Node:
             if parameter.uncertainty is not None:
                 residual += fitted.columns[:, k] * (values[k] - parameter.value)
         mine = []
-        first = count
-        for one, term in zip(self.inside, fitted.state.terms, strict=True):
-            columns = fitted.columns[:, first : first + len(term.numbers)]
-            first += len(term.numbers)
+        for one, term, own in self.terms.values():
+            columns = fitted.columns[:, own]
             residual += columns[:, : len(term.amplitudes)] @ np.array(term.amplitudes)
             mine.append(self._law(one, columns, term.numbers, off))
         prior = np.array([np.inf if p.uncertainty is None else p.uncertainty for p in parameters])
@@ -138,17 +137,13 @@ class Node:
         amplitudes, rms = len(one.term.amplitudes), np.sqrt(np.mean(np.square(columns), axis=0))
         usual = self.size / np.maximum(rms, 1e-300)
         usual[amplitudes:] = np.abs(numbers[amplitudes:])
-        return Law(
-            name=one.name,
+        return law_of_term(
+            one,
             columns=lambda _point: columns,
             plausible=np.maximum(usual, 1e-300),
             parameters=one.names,
             units=one.units,
-            log_odds=one.log_odds,
-            form_uncertainty=form_uncertainty(one),
             discrepancy=discrepancy(one, off),
-            followed=followed(one),
-            way=way(one),
         )
 
     def numbers_of(self, settled: Settled, one: Candidate, beside: Sequence[Member] | None = None) -> tuple[float, ...]:
@@ -257,16 +252,14 @@ class Nodes:
         """
         beside = settled.best.members if beside is None else beside
         names = frozenset(member.name for member in beside) & node.names | {one.name for one in more}
-        terms = zip(node.inside, node.fitted.state.terms, strict=True)
-        kept = [(one, term) for one, term in terms if one.name in names]
+        kept = [(one, term) for one, term, _ in node.terms.values() if one.name in names]
         new = [one.term.with_numbers(_inside(one, node.numbers_of(settled, one, beside))) for one in more]
         state = FittedState(node.fitted.state.values, (*(term for _, term in kept), *new))
         return self._known_or_begun(node, state, (*(one for one, _ in kept), *more))
 
     def without(self, node: Node, name: str) -> Node:
         """Return a node without a term."""
-        terms = zip(node.inside, node.fitted.state.terms, strict=True)
-        kept = [(one, term) for one, term in terms if one.name != name]
+        kept = [(one, term) for one, term, _ in node.terms.values() if one.name != name]
         state = FittedState(node.fitted.state.values, tuple(term for _, term in kept))
         return self._known_or_begun(node, state, tuple(one for one, _ in kept)) or node
 

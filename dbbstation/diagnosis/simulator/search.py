@@ -164,13 +164,12 @@ def within_forms(node: Node, settled: Settled, names: Sequence[str]) -> list[str
 
 def _within_forms_refitted(node: Node, but_for: Collection[str]) -> list[str]:
     base = node.fitted.columns[:, : len(node.work.model.parameters)]
-    terms = {one.name: term for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
 
     def size(of: Sequence[str]) -> float:
-        effect = np.sum([node.answers_of(name) @ np.array(terms[name].amplitudes) for name in of], axis=0)
+        effect = np.sum([node.answers_of(name) @ np.array(node.terms[name][1].amplitudes) for name in of], axis=0)
         return rms(beside(base, effect))
 
-    return _less(node.inside, size, [name for name in terms if name not in but_for])
+    return _less(node.inside, size, [name for name in node.terms if name not in but_for])
 
 
 def _less(members: Sequence[Candidate], size: Callable[[Sequence[str]], float], names: Sequence[str]) -> list[str]:
@@ -201,10 +200,9 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
 
 def moves(node: Node, settled: Settled) -> dict[str, float]:
     """Return the greatest move of each term, in standard uncertainties."""
-    terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
     largest = dict.fromkeys((name for name, _ in _said(node, settled)), 0.0)
     for (name, number), (value, uncertainty) in _said(node, settled).items():
-        one, term = terms[name]
+        one, term, _ = node.terms[name]
         before = dict(zip(one.names, term.numbers, strict=True))[number]
         largest[name] = max(largest[name], abs(value - before) / uncertainty)
     return largest
@@ -213,9 +211,8 @@ def moves(node: Node, settled: Settled) -> dict[str, float]:
 def _said(node: Node, settled: Settled) -> dict[tuple[str, str], tuple[float, float]]:
     members = [member for member in settled.best.members if member.name in node.names]
     found, said = values_of_members(settled, members), dict[tuple[str, str], tuple[float, float]]()
-    terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
     for of, values in found.items():
-        one, term = terms[of]
+        one, term, _ = node.terms[of]
         for k, name in enumerate(one.names):
             # Responses to shapes are linearised about the fitted shape.
             about = term.numbers[k] if k >= len(term.amplitudes) else 0.0

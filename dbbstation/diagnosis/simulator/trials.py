@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.fit import directions_of
 from dbbstation.diagnosis.simulator.model import TrialInput
 from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import left_by, rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -95,8 +96,5 @@ def apart(work: SimulationRuns, trial: TrialInput, state: FittedState, pair: Seq
     return float(np.linalg.norm(beside(columns, effects[0])))
 
 
-def beside(columns: Floats, wanted: Floats) -> Floats:
-    """Return the residual of rows, shape (n,), after fitting columns, shape (n, p)."""
-    norm = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    values = np.linalg.lstsq(columns / norm, wanted, rcond=1e-10)[0]
-    return wanted - (columns / norm) @ values
+beside = partial(left_by, rcond=1e-10)
+"""Residual of rows after fitting columns that may be nearly equal."""

@@ -7,18 +7,26 @@ import pytest
 
 from dbbstation.diagnosis.simulator.candidates import candidates
 from dbbstation.diagnosis.simulator.held import PredictedPart, gains_of
-from dbbstation.diagnosis.simulator.laws import followed, way
+from dbbstation.diagnosis.simulator.laws import law_of_term
 from dbbstation.diagnosis.simulator.model import SimulatorPort
 from dbbstation.diagnosis.simulator.terms import TermForm
+
+
+def law_of(candidate):
+    return law_of_term(candidate, columns=lambda _: np.zeros((1, 1)), plausible=np.ones(1), parameters=(), units=())
 
 
 def test_terms_follow_signals_at_their_port():
     rng = np.random.default_rng(1)
     signals = {"joint": {"t": np.arange(60.0), "x": rng.standard_normal(60), "v": rng.standard_normal(60)}}
     found = {one.term.form: one for one in candidates((SimulatorPort("joint", "N", {"x": "m", "v": "m/s"}),), signals)}
-    assert followed(found[TermForm.PRODUCT]) == ("x at joint", "v at joint")
-    assert followed(found[TermForm.CONSTANT]) == ("port joint",)
-    assert (way(found[TermForm.MEMORY]), way(found[TermForm.SLIP]), way(found[TermForm.LINEAR])) == (
+    assert law_of(found[TermForm.PRODUCT]).followed == ("x at joint", "v at joint")
+    assert law_of(found[TermForm.CONSTANT]).followed == ("port joint",)
+    assert (
+        law_of(found[TermForm.MEMORY]).way,
+        law_of(found[TermForm.SLIP]).way,
+        law_of(found[TermForm.LINEAR]).way,
+    ) == (
         "late",
         "direction",
         "",

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.blocks import Columns
     from dbbstation.inference.channel import Channel, Law
     from dbbstation.inference.model_comparison import Member
-    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.patterns import Choices, Pattern
     from dbbstation.inference.pieces import Left
 
 TANGENT = 1e-3
@@ -192,16 +192,10 @@ class Bank:
             self._of_patterns[name] = replace(cause, log_prior_odds=self._odds(pattern))
         return [p.name for p in fresh]
 
-    def measure(self, members: Sequence[Member]) -> Coloured:
-        """Estimate the noise, and whiten columns; see `measures_beside_members`."""
-        return self.measure_noise(members if self.measures_beside_members else None)
+    def measure(self, members: Sequence[Member] = ()) -> Coloured:
+        """Estimate the noise from the residual of members, or first of all laws and patterns, and whiten columns.
 
-    def measure_noise(self, members: Sequence[Member] | None = None) -> Coloured:
-        """Estimate the noise from the residual of members, and whiten columns.
-
-        Args:
-            members: None for all laws and patterns; picked patterns count only if they outweigh their odds, because
-                chance peaks absorb noise.
+        Picked patterns count only if they outweigh their odds, because chance peaks absorb noise.
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches
@@ -210,7 +204,7 @@ class Bank:
             target = self.target
             rng = np.random.default_rng(len(target))
             draws = rng.standard_normal((len(target), BOUNDS.noise_draws))
-            sd = self._taking_part(beside) if members is None else self._sizes(members)
+            sd = self._sizes(members) if self.measures_beside_members else self._taking_part(beside)
             left = beside.left(np.column_stack([target, draws]), sd)
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
             free = max(len(target) - used, 1.0)
@@ -411,42 +405,23 @@ class Bank:
 
     def _on_a_grid(self, law: Law) -> tuple[Variant, ...]:
         weight = -float(np.log(len(law.on_grid)))
-        found: list[Variant] = []
-        for point, samples in law.on_grid:
-            found += _forms(law, self._add(samples), law.plausible_of(samples), point, weight)
-        return tuple(found)
+        forms = (_forms(law, self._add(own), law.plausible_of(own), point, weight) for point, own in law.on_grid)
+        return tuple(variant for some in forms for variant in some)
 
     def _cause(self, pattern: Pattern, own: Integers, plausible: float) -> Cause:
-        size = np.full(len(own), plausible)
         slack = own[list(pattern.slack)]
         # A zero moves by the ratio of its column's value to the amplitudes.
         moved = np.full(len(slack), ZERO_SD * LARGE * plausible)
-        variants = tuple(
-            Variant(
-                own[list(part)],
-                size[list(part)],
-                label=label,
-                log_weight=weight,
-                slack=slack,
-                slack_sd=moved,
-                slack_at=LARGE,
-                tangents=len(slack),
-            )
-            for part, weight, label in pattern.choices
+        whole = Variant(
+            own, np.full(len(own), plausible), slack=slack, slack_sd=moved, slack_at=LARGE, tangents=len(slack)
         )
-        if pattern.family is Family.BLOCKS:
-            variants = self._blocks(own, size)
-        if not variants:
-            variants = (Variant(own, size),)
-        return Cause(pattern.name, variants, self._odds(pattern), named=pattern.family in NAMED)
+        choices = self._of_blocks() if pattern.family is Family.BLOCKS else pattern.choices
+        return Cause(pattern.name, _parts(whole, choices), self._odds(pattern), named=pattern.family in NAMED)
 
-    def _blocks(self, own: Integers, size: Floats) -> tuple[Variant, ...]:
-        half = float(np.log(0.5))
-        alone = [
-            Variant(own[k : k + 1], size[:1], label=self.channel.names[k], log_weight=half - float(np.log(len(own))))
-            for k in range(len(own))
-        ]
-        return (Variant(own, size, log_weight=half), *alone)
+    def _of_blocks(self) -> Choices:
+        half, names = float(np.log(0.5)), self.channel.names
+        alone = (((k,), half - float(np.log(len(names))), name) for k, name in enumerate(names))
+        return ((tuple(range(len(names))), half, ""), *alone)
 
     def _odds(self, pattern: Pattern) -> float:
         every = (*self.patterns.values(), pattern)
@@ -465,27 +440,27 @@ def _whitened(kept: Flags, whitening: csr_array | None, rows: Floats) -> Floats:
     return own if whitening is None else whitening @ own
 
 
-def _forms(
-    law: Law,
-    columns: Integers,
-    plausible: Floats,
-    nonlinear: tuple[float, ...],
-    log_weight: float,
-) -> list[Variant]:
-    if not law.choices:
-        return [Variant(columns, plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
-    return [
-        Variant(
-            columns[list(part)],
-            plausible[list(part)],
-            nonlinear,
+def _parts(whole: Variant, choices: Choices) -> tuple[Variant, ...]:
+    """Return each choice of a form's amplitudes as a form; without choices only the whole."""
+    return tuple(
+        replace(
+            whole,
+            columns=whole.columns[list(part)],
+            plausible=whole.plausible[list(part)],
             label=label,
-            whole=columns,
-            log_weight=log_weight + weight,
-            positive=law.positive[: len(part)],
+            log_weight=whole.log_weight + weight,
+            positive=whole.positive[: len(part)],
         )
-        for part, weight, label in law.choices
-    ]
+        for part, weight, label in choices
+    ) or (whole,)
+
+
+def _forms(
+    law: Law, columns: Integers, plausible: Floats, point: tuple[float, ...], log_weight: float
+) -> tuple[Variant, ...]:
+    every = columns if law.choices else columns[:0]
+    whole = Variant(columns, plausible, point, whole=every, log_weight=log_weight, positive=law.positive)
+    return _parts(whole, law.choices)
 
 
 def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: Sequence[float]) -> list[Floats]:

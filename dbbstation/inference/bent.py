@@ -11,7 +11,7 @@ import numpy as np
 
 from dbbstation.inference.channel import Law
 from dbbstation.inference.memory import starts_of
-from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, odds_of_driven, play
+from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, odds_of_driven, one_of, play
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
@@ -183,8 +183,7 @@ def _with_width(
     size: float,
     members: int,
 ) -> Law:
-    weight = -float(np.log(len(amplitudes)))
-    choices = tuple(((k,), weight, label) for k, (_, _, label) in enumerate(amplitudes))
+    choices = one_of([label for _, _, label in amplitudes])
     return Law(
         name=name,
         columns=columns,
@@ -251,7 +250,6 @@ def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, u
     turned = [one.directions(blocks), *(play(one.values, blocks, share * one.extent) for share in TRANSITS[:-1])]
     labels = ("at once", *(f"over {share * one.extent:.3g} {one.unit}".strip() for share in TRANSITS[:-1]))
     samples = np.column_stack(turned) * by.values[:, None]
-    weight = -float(np.log(len(labels)))
     return Law(
         name=f"{Family.SCALED} of {one.name} by {by.name}",
         columns=lambda _point: samples,
@@ -259,7 +257,7 @@ def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, u
         parameters=("size per unit",) * len(labels),
         units=(f"{unit}/{by.unit}" if by.unit else unit,) * len(labels),
         log_odds=log_odds(members) + float(np.log(0.5 * BENT)) + odds_of_driven([one, by]),
-        choices=tuple(((k,), weight, label) for k, label in enumerate(labels)),
+        choices=one_of(labels),
         reach=size,
         family=Family.SCALED,
         variables=(one, by),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.inference.levels import JOINED, FollowsAnswer
@@ -22,33 +23,29 @@ MAKES_UP = "Held-out parts are predicted worse than as simulated, and something 
 """Why a single event is uncertain: its probability assumes effects that other rows refute."""
 
 
+@dataclass(frozen=True, eq=False)
 class VerdictsByLevel:
     """Verdicts on members of the best set and on equivalent causes.
 
-    Args:
+    Attributes:
         pushes: sizes of all stretches of time, by member.
     """
 
-    def __init__(
-        self,
-        settled: Settled,
-        levels: Levels,
-        pushes: Mapping[str, Sequence[Value]],
-        *,
-        worse: bool,
-    ) -> None:
-        self._settled, self._levels, self._pushes, self._worse = settled, levels, pushes, worse
+    settled: Settled
+    levels: Levels
+    pushes: Mapping[str, Sequence[Value]]
+    worse: bool
 
     def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
         """Return the verdict on a member, given its size in standard deviations.
 
         A class may be certain although each of its members is uncertain. Held-out parts cannot refute a single member then.
         """
-        classes = [one for one in self._levels.follows if name in one.members]
+        classes = [one for one in self.levels.follows if name in one.members]
         answers = {one.answer for one in classes}
         unsure = probability < SURE and FollowsAnswer.DOES_NOT_PREDICT in answers
         if unsure or FollowsAnswer.UNDECIDED in answers:
-            return Verdict.AMBIGUOUS, (), f"These {self._settled.channel.rows_are} do not decide it."
+            return Verdict.AMBIGUOUS, (), f"These {self.settled.channel.rows_are} do not decide it."
         if sigmas < OUT:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
         if acts is Acts.ONCE or any(one.in_time for one in classes):
@@ -57,41 +54,41 @@ class VerdictsByLevel:
             return (
                 Verdict.DOES_NOT_PREDICT,
                 (),
-                f"It was found in these {self._settled.channel.rows_are}, and held-out parts gain nothing by it.",
+                f"It was found in these {self.settled.channel.rows_are}, and held-out parts gain nothing by it.",
             )
-        if FollowsAnswer.NOT_TESTED in answers and self._worse:
+        if FollowsAnswer.NOT_TESTED in answers and self.worse:
             return (
                 Verdict.DOES_NOT_PREDICT,
                 (),
                 "With everything that was found these rows are left worse than as simulated.",
             )
-        return _of_laws(classes, name, self._settled.channel.rows_are)
+        return _of_laws(classes, name, self.settled.channel.rows_are)
 
     def instead_of(self, name: str) -> frozenset[str]:
         """Return members that a named law replaces."""
-        return frozenset[str]().union(*(one.members for one in self._levels.follows if _named(one, name)))
+        return frozenset[str]().union(*(one.members for one in self.levels.follows if _named(one, name)))
 
     def alike(self, name: str) -> str:
         """Return a member equivalent to a cause outside the set, or an empty text."""
-        for one in self._levels.follows:
+        for one in self.levels.follows:
             if one.form is not None and name in (*one.form.not_worse, *one.form.names):
                 return next(other for other in (*one.form.names, *sorted(one.members)) if other != name)
         return ""
 
     def equivalent(self, name: str) -> tuple[str, ...]:
         """Return a named law and its equivalents; empty if no law is named."""
-        forms = [one.form for one in self._levels.follows if one.form is not None and one.form.name == name]
+        forms = [one.form for one in self.levels.follows if one.form is not None and one.form.name == name]
         same = dict.fromkeys(other for form in forms for other in form.not_worse)
         return (name, *same) if same else ()
 
     def _happened(self, name: str) -> Said:
-        every = [size for own in self._pushes.values() for size in own]
-        if name in self._pushes and (
-            why := within_a_step(self._pushes[name], self._settled.channel.step) or too_many(every)
+        every = [size for own in self.pushes.values() for size in own]
+        if name in self.pushes and (
+            why := within_a_step(self.pushes[name], self.settled.channel.step) or too_many(every)
         ):
             return Verdict.AMBIGUOUS, (), why
-        refuted = any(one.answer is FollowsAnswer.DOES_NOT_PREDICT for one in self._levels.follows)
-        if refuted and self._levels.correction is False:
+        refuted = any(one.answer is FollowsAnswer.DOES_NOT_PREDICT for one in self.levels.follows)
+        if refuted and self.levels.correction is False:
             return Verdict.AMBIGUOUS, (), MAKES_UP
         return Verdict.HAPPENED, (), ""
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.curves import Clock
-    from dbbstation.inference.patterns import Family, Pattern
+    from dbbstation.inference.patterns import Choices, Family, Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.inference.variables import Variable
 
@@ -104,7 +104,7 @@ class Law:
     discrepancy: Discrepancy | None = None
     log_odds: float = NAMED_ODDS
     at: Callable[[tuple[float, ...], Floats], Floats] | None = None
-    choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    choices: Choices = ()
     zero_from: float | None = None
     reach: float | None = None
     family: Family | None = None

@@ -50,11 +50,10 @@ class Power(Form):
 
     low: float
     high: float
-    power: int = 1
 
     def columns(self, values: Floats) -> Floats:
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
-        return (((values - middle) / half) ** self.power)[..., None]
+        return ((values - middle) / half)[..., None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ adds, removes and exchanges causes until all neighbours of likely sets are exami
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, slices_of, with_slack_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.inference.model_comparison import Around, Cause, ModelComparison, Scan, Variant
 
@@ -172,62 +172,56 @@ def search(
         thorough: also replace two members by one, and one by two.
         work: limit of counted work, at which the best set so far is returned; None for no limit.
     """
-    limit = work or SearchWork()
-    return _Search(comparison, causes, most_expanded, most_members, likely, limit, thorough=thorough).run(seeds)
+    limit = np.inf if most_members is None else most_members
+    named = {cause.name: cause for cause in causes}
+    return _Search(comparison, named, most_expanded, limit, likely, thorough, work or SearchWork()).run(seeds)
 
 
+@dataclass(eq=False)
 class _Search:
-    def __init__(
-        self,
-        comparison: ModelComparison,
-        causes: Sequence[Cause],
-        most_expanded: int,
-        most_members: int | None,
-        likely: float,
-        work: SearchWork,
-        *,
-        thorough: bool,
-    ) -> None:
-        self._comparison, self._thorough = comparison, thorough
-        self._causes = {cause.name: cause for cause in causes}
-        self._seen: dict[frozenset[str], Hypothesis] = {}
-        self._scored: dict[frozenset[str], float] = {}
-        self._most, self._likely, self._work = most_expanded, likely, work
-        self._most_members = np.inf if most_members is None else most_members
-        self._beyond = -np.inf  # log posterior of the most probable set that is too large
-        self._room = BOUNDS.scores
-        self._top = -np.inf  # log posterior of the most probable hypothesis so far
-        self._begun = False  # seeds are examined without a limit, because they are the best so far
+    comparison: ModelComparison
+    causes: Mapping[str, Cause]
+    most: int
+    most_members: float
+    likely: float
+    thorough: bool
+    work: SearchWork
+    seen: dict[frozenset[str], Hypothesis] = field(default_factory=dict)
+    scored: dict[frozenset[str], float] = field(default_factory=dict)
+    beyond: float = -np.inf  # log posterior of the most probable set that is too large
+    room: int = BOUNDS.scores
+    top: float = -np.inf  # log posterior of the most probable hypothesis so far
+    begun: bool = False  # seeds are examined without a limit, because they are the best so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
         """Search until all likely sets are examined."""
         self._grow(seeds)
         self._drop_negligible()
-        weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
-        found = tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior))
-        return Posterior(found, weights, at_limit=self._beyond > self._top)
+        weights = {**self.scored, **{key: h.log_posterior for key, h in self.seen.items()}}
+        found = tuple(sorted(self.seen.values(), key=lambda h: -h.log_posterior))
+        return Posterior(found, weights, at_limit=self.beyond > self.top)
 
     def _grow(self, seeds: Iterable[Sequence[Member]]) -> None:
         self._look_at(())
         for members in seeds:
-            self._look_at([self._anew(member) for member in members if member.name in self._causes])
-        self._begun = True
-        self._pairs((), self._comparison.scan((), self._causes.values()))
+            self._look_at([self._anew(member) for member in members if member.name in self.causes])
+        self.begun = True
+        self._pairs((), self.comparison.scan((), self.causes.values()))
         expanded: set[frozenset[str]] = set()
         challenged: set[frozenset[str]] = set()
-        while len(expanded) < self._most and not self._work.is_spent:
+        while len(expanded) < self.most and not self.work.is_spent:
             waiting = [
                 h
-                for key, h in self._seen.items()
-                if key not in expanded and h.log_posterior > self._top - self._likely and h.lean
+                for key, h in self.seen.items()
+                if key not in expanded and h.log_posterior > self.top - self.likely and h.lean
             ]
             if waiting:
                 best = max(waiting, key=lambda h: h.log_posterior)
                 expanded.add(best.names)
                 self._expand(best)
                 continue
-            best = max(self._seen.values(), key=lambda h: h.log_posterior)
-            if best.names in challenged or not self._thorough:
+            best = max(self.seen.values(), key=lambda h: h.log_posterior)
+            if best.names in challenged or not self.thorough:
                 break
             challenged.add(best.names)
             self._challenge(best)
@@ -259,28 +253,28 @@ class _Search:
         return sorted(pairs, key=lambda pair: worth[pair[0]] + worth[pair[1]])[: BOUNDS.replaced]
 
     def _around(self, hypothesis: Hypothesis) -> Around:
-        self._work.scan(self._causes.values(), len(hypothesis.members) + 1)
-        return self._comparison.around(hypothesis.members, self._causes.values())
+        self.work.scan(self.causes.values(), len(hypothesis.members) + 1)
+        return self.comparison.around(hypothesis.members, self.causes.values())
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
         worth = scan.log_odds
-        for k in np.flatnonzero(log_posterior + worth > self._top - NEGLIGIBLE).tolist():
+        for k in np.flatnonzero(log_posterior + worth > self.top - NEGLIGIBLE).tolist():
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
-        if len(members) > self._most_members:
-            self._beyond = max(self._beyond, log_posterior)
+        if len(members) > self.most_members:
+            self.beyond = max(self.beyond, log_posterior)
             return
-        if log_posterior > self._top - NEGLIGIBLE:
-            self._scored.setdefault(frozenset(member.name for member in members), log_posterior)
-            if len(self._scored) > self._room:
+        if log_posterior > self.top - NEGLIGIBLE:
+            self.scored.setdefault(frozenset(member.name for member in members), log_posterior)
+            if len(self.scored) > self.room:
                 self._drop_negligible()
-        if worth > 0.0 and log_posterior > self._top - self._likely:
+        if worth > 0.0 and log_posterior > self.top - self.likely:
             self._look_at(members)
 
     def _drop_negligible(self) -> None:
-        self._scored = {key: score for key, score in self._scored.items() if score > self._top - NEGLIGIBLE}
-        self._room = max(BOUNDS.scores, 2 * len(self._scored))
+        self.scored = {key: score for key, score in self.scored.items() if score > self.top - NEGLIGIBLE}
+        self.room = max(BOUNDS.scores, 2 * len(self.scored))
 
     def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
         hidden = {c.name for c, odds in zip(scan.causes, scan.log_odds, strict=True) if odds <= 0.0}
@@ -293,7 +287,7 @@ class _Search:
         if len(named) > BOUNDS.paired:
             worth = dict(zip((c.name for c in scan.causes), scan.log_factor.tolist(), strict=True))
             named = sorted(named, key=lambda member: -worth[member.name])[: BOUNDS.paired]
-        pairs, evidence = self._comparison.log_evidence_of_pairs(members, named)
+        pairs, evidence = self.comparison.log_evidence_of_pairs(members, named)
         causes = np.array([id(member.cause) for member in named])
         apart = np.flatnonzero(causes[pairs[:, 0]] != causes[pairs[:, 1]])
         odds = np.array([member.cause.log_prior_odds for member in named])
@@ -302,17 +296,17 @@ class _Search:
         # A flexible form imitates two causes, so pairs of inflexible causes are examined separately.
         widths = np.array([member.width for member in named])
         stiff = best[widths[pairs[best]].max(axis=1) < FLEXIBLE]
-        alone = self._comparison.log_evidence(members)
+        alone = self.comparison.log_evidence(members)
         for some in (best, stiff):
             for k in some[: BOUNDS.paired_hypotheses].tolist():
                 if self._may_be_likely(members, alone, worth[k] - alone):
                     self._look_at([*members, *(named[one] for one in pairs[k])])
 
     def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
-        return evidence + sum(member.log_odds for member in members) + worth > self._top - NEGLIGIBLE
+        return evidence + sum(member.log_odds for member in members) + worth > self.top - NEGLIGIBLE
 
     def _anew(self, member: Member) -> Member:
-        cause, old = self._causes[member.name], member.variant
+        cause, old = self.causes[member.name], member.variant
         same = [v for v in cause.variants if (v.label, v.law) == (old.label, old.law)] or list(cause.variants)
 
         def away(variant: Variant) -> float:
@@ -322,18 +316,18 @@ class _Search:
 
     def _look_at(self, members: Sequence[Member]) -> None:
         key = frozenset(member.name for member in members)
-        if key in self._seen or len(key) > self._most_members or (self._begun and self._work.is_spent):
+        if key in self.seen or len(key) > self.most_members or (self.begun and self.work.is_spent):
             return
-        self._work.examine(members)
+        self.work.examine(members)
         found = self._settled(list(members))
-        self._seen[key] = found
-        self._top = max(self._top, found.log_posterior)
+        self.seen[key] = found
+        self.top = max(self.top, found.log_posterior)
         if not found.lean:
             self._look_at(found.without(found.members[int(np.argmin(found.log_odds))].name))
 
     def _settled(self, members: list[Member]) -> Hypothesis:
         many = len(members) > BOUNDS.many
-        beside = _Beside(self._comparison, members)
+        beside = _Beside(self.comparison, members)
         for _ in range(BOUNDS.sweeps if len(members) > 1 else 1):
             at_once = [one for one, _, _ in beside.local.each_beside_others(members)] if many else members
             for k, member in enumerate(members):

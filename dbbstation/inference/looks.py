@@ -186,15 +186,5 @@ def _near(form: Form) -> list[Form]:
 
 
 def _pattern(variable: Variable, family: Family, form: Form, tried: float, label: str = "") -> Pattern:
-    samples = form.columns(variable.values)
-    width = samples.shape[1]
-    return Pattern(
-        family,
-        (variable,),
-        samples,
-        form,
-        ("",) * width,
-        (1.0,) * width,
-        label or " ".join(form.text(variable.unit).split()).replace(" ,", ","),
-        tried,
-    )
+    label = label or " ".join(form.text(variable.unit).split()).replace(" ,", ",")
+    return Pattern.plain(family, (variable,), form.columns(variable.values), form, label, tried)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
+    from dbbstation.inference.patterns import Choices
     from dbbstation.inference.variables import Variable
 
 SHORTEST_ROWS = 2.0
@@ -83,7 +84,7 @@ def memory_laws(
     return found
 
 
-def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:
+def _choices(width: int) -> Choices:
     """Return two choices: the simulation lacks the effect, or has it without delay; both with initial states."""
     starts = tuple(range(2, width))
     return (

@@ -22,11 +22,11 @@ LATER = 2.0
 """Possible delay of a transit after a reversal, in samples: a degree of the turn."""
 
 
-def bernstein(values: Floats, low: float, high: float, degree: int = DEGREE) -> Floats:
+def bernstein(values: Floats, low: float, high: float) -> Floats:
     """Return Bernstein polynomials over a range, shape (..., degree + 1), summing to one [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]."""
     share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
-    k = np.arange(degree + 1)
-    return comb(degree, k) * share**k * (1.0 - share) ** (degree - k)
+    k = np.arange(DEGREE + 1)
+    return comb(DEGREE, k) * share**k * (1.0 - share) ** (DEGREE - k)
 
 
 def modulated(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations, product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,16 @@ DISTINCT = 5
 
 WAVE_SHARE = 0.15
 """Least share of a turn that an angle must cover; with less, a wave once per turn is a straight line to one hundredth."""
+
+
+Choices: TypeAlias = "tuple[tuple[tuple[int, ...], float, str], ...]"
+"""Forms of an effect: places of their amplitudes, log probability, label."""
+
+
+def one_of(labels: Sequence[str], width: int = 1) -> Choices:
+    """Return equally probable forms, of `width` amplitudes each."""
+    weight = -float(np.log(len(labels)))
+    return tuple((tuple(range(k * width, (k + 1) * width)), weight, label) for k, label in enumerate(labels))
 
 
 class Family(StrEnum):
@@ -103,9 +113,24 @@ class Pattern:
     per: tuple[float, ...] = ()
     label: str = ""
     tried: float = 1.0
-    choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    choices: Choices = ()
     slack: tuple[int, ...] = ()
     acts_once: bool = False
+
+    @classmethod
+    def plain(
+        cls,
+        family: Family,
+        variables: tuple[Variable, ...],
+        samples: Floats,
+        form: Form,
+        label: str = "",
+        tried: float = 1.0,
+        choices: Choices = (),
+    ) -> Pattern:
+        """Return a pattern with amplitudes in the channel's unit."""
+        width = samples.shape[1]
+        return cls(family, variables, samples, form, ("",) * width, (1.0,) * width, label, tried, choices)
 
     @property
     def name(self) -> str:
@@ -199,7 +224,7 @@ def _over(variable: Variable) -> list[Pattern]:
     if covers_turns(variable):
         for order, name in ((1, Family.ONCE), (2, Family.TWICE)):
             wave = turn(variable, order)
-            found.append(Pattern(name, (variable,), wave.columns(variable.values), wave, ("", ""), (1.0, 1.0)))
+            found.append(Pattern.plain(name, (variable,), wave.columns(variable.values), wave))
     if variable.distinct >= DISTINCT:
         spline = Spline(variable.low, variable.high, CURVES)
         found.append(Pattern(Family.CURVE, (variable,), spline.columns(variable.values), spline))
@@ -229,10 +254,7 @@ def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: Floats) -> Pa
         "at once, a row earlier",
         *(f"over {width:.3g} {variable.unit}".strip() for width in widths),
     )
-    weight = -float(np.log(len(labels)))
-    choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
-    width = len(labels)
-    return Pattern(Family.HYSTERESIS, (variable,), samples, SignForm(), ("",) * width, (1.0,) * width, choices=choices)
+    return Pattern.plain(Family.HYSTERESIS, (variable,), samples, SignForm(), choices=one_of(labels))
 
 
 TRANSITS = (0.003, 0.01, 0.03, 0.1)
@@ -291,15 +313,15 @@ def _product(one: Variable, other: Variable) -> Pattern:
         columns.append(wave * np.prod([v.scaled - z for v, z in zip(lines, zeros, strict=True)], axis=0)[:, None])
         labels.append(f"about {zeros_text(lines, zeros)}")
     moving = [wave] if waves else [one.scaled[:, None], other.scaled[:, None]]
-    width, weight = wave.shape[1], -float(np.log(len(labels)))
-    choices = tuple((tuple(range(k * width, (k + 1) * width)), weight, label) for k, label in enumerate(labels))
-    whole = width * len(labels)
+    whole = wave.shape[1] * len(labels)
     slack = tuple(range(whole, whole + sum(part.shape[1] for part in moving)))
     first, second = (f"({v.unit})" if "/" in v.unit or " " in v.unit else v.unit or v.name for v in (one, other))
     unit = f"/{first}²" if first == second else f"/({first} {second})"
     units, per = ((unit,) * whole, (one.half_range * other.half_range,) * whole) if not waves else ((), ())
     samples = np.hstack([*columns, *moving])
-    return Pattern(Family.PRODUCT, (one, other), samples, None, units, per, choices=choices, slack=slack)
+    return Pattern(
+        Family.PRODUCT, (one, other), samples, None, units, per, choices=one_of(labels, wave.shape[1]), slack=slack
+    )
 
 
 def zeros_text(lines: Sequence[Variable], zeros: Sequence[float]) -> str:

@@ -136,17 +136,8 @@ def _pattern(
         (tuple(range(k)), float(gammaln(k + 1) - (k - 1) * np.log(tried) - np.log(len(sizes))), f"{k} of them")
         for k in sizes
     )
-    return Pattern(
-        family,
-        over,
-        form.columns(clock.rows) * factor[:, None],
-        form,
-        ("",) * width,
-        (1.0,) * width,
-        _label(found),
-        tried,
-        choices if width > 1 else (),
-    )
+    samples = form.columns(clock.rows) * factor[:, None]
+    return Pattern.plain(family, over, samples, form, _label(found), tried, choices if width > 1 else ())
 
 
 def _label(found: Sequence[tuple[float, float]]) -> str:

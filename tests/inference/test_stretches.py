@@ -73,19 +73,19 @@ def test_noise_that_grows_is_measured_and_no_pulse_is_seen_in_it(rng):
     sigma = np.hypot(0.1, 0.3 * size)
     channel = made(rng.normal(0.0, 1.0, ROWS) * sigma, grows=size)
     bank = Bank(channel)
-    bank.measure_noise()
+    bank.measure()
     # A grid of ratios that are apart by factors of two.
     ratio = bank.spread[size > 0].mean() / bank.spread[size == 0].mean()
     assert np.sqrt(10.0) / np.sqrt(2.0) < ratio < np.sqrt(10.0) * np.sqrt(2.0)
     assert settle(channel).best.members == ()
     even = Bank(replace(channel, grows=None))
-    even.measure_noise()
+    even.measure()
     assert np.ptp(even.spread) == 0.0
 
 
 def test_noise_that_is_the_same_everywhere_does_not_grow(rng):
     bank = Bank(made(rng.normal(0.0, 0.1, ROWS), grows=np.abs(np.sin(np.arange(ROWS) / 20.0))))
-    bank.measure_noise()
+    bank.measure()
     assert np.ptp(bank.spread) == 0.0
 
 

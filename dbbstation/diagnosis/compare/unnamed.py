@@ -93,8 +93,7 @@ def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
         text for text in (which, shape.form.text("mm") if shape.moves not in {EVERY, SIGNED} else "") if text
     )
     tried = shape.tried * (STRUTS + 1 if shape.strut or which else 1)
-    width = samples.shape[1]
-    return Pattern(family, (variable,), samples, shape.form, ("",) * width, (1.0,) * width, label or shape.moves, tried)
+    return Pattern.plain(family, (variable,), samples, shape.form, label or shape.moves, tried)
 
 
 def of_each_test(sides: Sides) -> Pattern:

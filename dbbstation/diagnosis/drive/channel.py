@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.recordings import with_waves
 from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
@@ -297,7 +296,7 @@ def _first_look(recordings: Recordings, smooth: Floats) -> tuple[Scale, float]:
         left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
         if all(abs(best - other) * scale.travel_m > 2.0 * WAVE_STEP for other in found):
             found.append(best)
-    return with_waves(scale, tuple(found), len(waves) * WAVE_STEP), 1e3 / float(waves[-1])
+    return replace(scale, waves_per_m=tuple(found), waves_tried=len(waves) * WAVE_STEP), 1e3 / float(waves[-1])
 
 
 def _power(waves: Floats, position: Floats, left: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -173,8 +173,3 @@ def _refuse_wrong_sign(one: Recordings) -> None:
             where=one.names[0],
             remedy="force and current must be positive towards greater positions; change the sign of one channel",
         )
-
-
-def with_waves(scale: Scale, waves_per_m: tuple[float, ...], tried: float) -> Scale:
-    """Return sizes with waves of a first search."""
-    return replace(scale, waves_per_m=waves_per_m, waves_tried=tried)

@@ -191,7 +191,7 @@ def test_what_a_first_list_shows_to_be_hopeless_is_never_taken_in(tmp_path, monk
     path = record(FOUND[name][0]).write(tmp_path / "x.csv")
     channel = load_tables([path], ASKED).table.channel(())
     bank = Bank(channel)
-    bank.measure_noise()
+    bank.measure()
     quick = [pattern.name for pattern in seen(bank, (), in_time=False)]
     monkeypatch.setattr(looks, "NEIGHBOUR", 0.0)
     assert [pattern.name for pattern in seen(bank, (), in_time=False)] == quick

@@ -230,7 +230,7 @@ def _circle(observation: Observation, effect_mm: Floats) -> CuredCircle:
         test=observation.test,
         direction=str(raw.circle.direction),
         repeat=observation.repeat,
-        g_um=_own_g_um(raw, effect_mm),
+        g_um=smooth_circularity_um(raw, raw.circle.bar_mm + effect_mm),
         centre_um=before - after,
         measured_g_um=smooth_circularity_um(raw, measured),
         cured_g_um=smooth_circularity_um(raw, cured),
@@ -239,10 +239,6 @@ def _circle(observation: Observation, effect_mm: Floats) -> CuredCircle:
         raw=raw,
         effect_mm=effect_mm,
     )
-
-
-def _own_g_um(raw: RawCircle, effect_mm: Floats) -> float:
-    return smooth_circularity_um(raw, raw.circle.bar_mm + effect_mm)
 
 
 def _u_of_mean(

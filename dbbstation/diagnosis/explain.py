@@ -337,13 +337,10 @@ def _estimated(channel: CircleChannel, comparison: ModelComparison, hypothesis: 
     return found
 
 
-def _values_in(fit: Calibration, name: str) -> dict[str, Floats]:
-    return {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
-
-
 def _refine(channel: CircleChannel, fit: Calibration, named: Collection[tuple[str, str]]) -> None:
     for name, law in sorted(named):
-        channel.refine(name, law, _values_in(fit, name), fit)
+        values = {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
+        channel.refine(name, law, values, fit)
 
 
 def _lay_out(

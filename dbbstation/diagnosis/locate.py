@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.levels import Levels
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import Effect, Fitted
+    from dbbstation.sources.contract import Fitted
 
 
 def locations_of(before: Calibration, settled: SettledCircles, first: Misfit, levels: Levels) -> tuple[Location, ...]:
@@ -95,13 +95,9 @@ def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> l
         if effect.strut_mm is None:
             contributions.append(None)
             continue
-        gain = reading.sensitivity.response.per_strut
-        contributions.append((gain * _per_sample(effect, len(motion)))[motion.kept])
+        lengths = np.broadcast_to(effect.strut_mm, (len(motion), 6))
+        contributions.append((reading.sensitivity.response.per_strut * lengths)[motion.kept])
     return contributions
-
-
-def _per_sample(effect: Effect, count: int) -> Floats:
-    return np.broadcast_to(np.asarray(effect.strut_mm), (count, 6))
 
 
 def _strut(contribution: Floats | None, rows: Integers) -> int | None:

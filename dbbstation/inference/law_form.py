@@ -63,7 +63,8 @@ def _place(
     parts: Sequence[Flags] | None,
     barred: Collection[str],
 ) -> LawForm:
-    others = _sure(settled, names)
+    every = zip(settled.best.members, settled.best.log_odds, strict=True)
+    others = tuple(member for member, odds in every if member.name not in names and odds >= SURELY)
     candidates, worth = _candidates(settled, names, wanted, others)
     scores = (
         _scores(settled, candidates, others, parts) if parts else {name: np.array([w]) for name, w in worth.items()}
@@ -95,11 +96,6 @@ def _place(
         tuple(same if named else [best, *(n for n in order if n in same or n in not_worse)]),
         tuple(ScoredLaw(n, totals[n]) for n in order),
     )
-
-
-def _sure(settled: Settled, names: Collection[str]) -> tuple[Member, ...]:
-    best = settled.best
-    return tuple(m for m in best.without(*names) if best.log_factor(m.name) + m.cause.log_prior_odds >= SURELY)
 
 
 def _candidates(

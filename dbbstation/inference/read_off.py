@@ -26,7 +26,7 @@ from dbbstation.inference.verdict import ABSENT, OUT, Acts, Gains, Verdict
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.computing.arrays import Flags, Floats
+    from dbbstation.computing.arrays import Floats
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.levels import Levels
@@ -195,7 +195,8 @@ class CauseJudge:
         rows = _stretches(effect) if there and pattern is not None and pattern.family == "pulses" else ()
         happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
         lasts = pattern is None or pattern.family is Family.STEP or self._is_a_step(rows)
-        largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
+        away = np.abs(effect - np.median(effect))
+        largest = away >= HALF * away.max() if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return CauseFinding(
             name=cause.name,
@@ -361,11 +362,6 @@ def concealed(effect: Floats, rest: Floats) -> tuple[float, float, float]:
     """Return the rms of an effect, the rms that fitted parameters do not absorb, and the share of squares that they absorb."""
     whole, left = rms(effect), rms(rest)
     return whole, left, float(np.clip(1.0 - (left / whole) ** 2 if whole > 0.0 else 0.0, 0.0, 1.0))
-
-
-def _at_half(effect: Floats) -> Flags:
-    away = np.abs(effect - np.median(effect))
-    return away >= HALF * away.max()
 
 
 def _span(values: Floats, name: str, unit: str) -> Span:

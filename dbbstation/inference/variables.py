@@ -111,7 +111,8 @@ class Variable:
         Along a path, speed gives the direction; between poses, the previous pose. Stationary rows keep the last
         direction; before a block's first motion they have the next direction.
         """
-        return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
+        central = self.is_path(blocks)
+        return _signs(self, blocks, lambda own: np.gradient(own) if central and len(own) > 1 else _arriving(own))
 
     def arriving(self, blocks: Sequence[slice]) -> Floats:
         """Return directions from the previous row alone, for ambiguous turning points."""
@@ -129,10 +130,6 @@ class Variable:
 
 def _arriving(values: Floats) -> Floats:
     return np.diff(values, prepend=values[:1])
-
-
-def _central(values: Floats) -> Floats:
-    return np.gradient(values) if len(values) > 1 else np.zeros(len(values))
 
 
 def _signs(variable: Variable, blocks: Sequence[slice], change_of: Callable[[Floats], Floats]) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -197,7 +197,10 @@ def _departure(effect: Floats, along: Floats) -> Floats:
 
 def _curves(recordings: Recordings) -> Iterator[Pattern]:
     scale = recordings.scale
-    starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
+    first = (
+        (one, recordings.time_s[rows.start]) for rows, one in zip(recordings.blocks, recordings.signals, strict=True)
+    )
+    starts = {id(one): float(begins - one.t_s[one.kept[0]]) for one, begins in first}
     travels = recordings.at(lambda s: s.since_reversal_m)
     # Nearer to a reversal than all compared samples, a curve stays constant.
     nearest = float(np.min(travels, initial=scale.travel_m, where=travels > 0.0))
@@ -211,9 +214,6 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
     def way(signals: Signals) -> Floats:
         return signals.direction
 
-    def after_reversal(signals: Signals) -> Floats:
-        return signals.direction * np.isfinite(signals.since_reversal_m)
-
     every: list[tuple[str, str, Kind, Callable[[Signals], Floats], Callable[[Signals], Floats] | None]] = [
         ("speed", "mm/s", Kind.SPEED, lambda s: 1e3 * s.speed_m_s, None),
         ("acceleration", "mm/s²", Kind.SPEED, lambda s: 1e3 * s.acceleration_m_s2, None),
@@ -223,7 +223,9 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
         ("time", "s", Kind.TIME, time, way),
     ]
     if scale.reverses:
-        every.append(("log travel since reversal", "", Kind.ANY, since, after_reversal))
+        every.append(
+            ("log travel since reversal", "", Kind.ANY, since, lambda s: s.direction * np.isfinite(s.since_reversal_m))
+        )
     for name, unit, kind, values, factor in every:
         functions = LOOPS if factor is not None else TIGHT if name == "position" else CURVES
         variable = Variable(name, unit, kind, recordings.at(values))
@@ -248,28 +250,15 @@ def _curve_over(
     values: Callable[[Signals], Floats],
     factor: Callable[[Signals], Floats] | None,
 ) -> Iterator[Pattern]:
-    samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
+    def columns(signals: Signals) -> Floats:
+        found = spline.columns(values(signals))
+        return found if factor is None else found * factor(signals)[:, None]
+
+    samples = recordings.compared(columns)
     norms = np.linalg.norm(samples, axis=0)
     seen = samples[:, norms > SAME * norms.max()]
     if seen.shape[1]:
         yield Pattern(Family.CURVE if factor is None else Family.BY_DIRECTION, (variable,), seen, spline)
-
-
-def _curve(
-    signals: Signals,
-    spline: Spline,
-    values: Callable[[Signals], Floats],
-    factor: Callable[[Signals], Floats] | None,
-) -> Floats:
-    found = spline.columns(values(signals))
-    return found if factor is None else found * factor(signals)[:, None]
-
-
-def _starts(recordings: Recordings) -> list[float]:
-    return [
-        float(recordings.time_s[rows.start] - one.t_s[one.kept[0]])
-        for rows, one in zip(recordings.blocks, recordings.signals, strict=True)
-    ]
 
 
 def _first_look(recordings: Recordings, smooth: Floats) -> tuple[Scale, float]:

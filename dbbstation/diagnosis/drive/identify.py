@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
     from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.left_over import LeftOver
     from dbbstation.trace.recording import DriveRecording
 
 HELD_BACK = 0.25
@@ -90,15 +89,16 @@ def identify(
     levels = levels_of(settled, left, parts, None, sizes=detectable_causes(settled))
     levels = levels if held is None else replace(levels, correction=held.corrected < held.reference)
     verdicts = Verdicts(explained, levels, several_speeds=limits.several_speeds, held=held)
-    values = base_values(explained.drive, explained.settled, after)
+    values, scale = base_values(explained.drive, explained.settled, after), put_together.scale
     known = {
         MASS: mass_is_known(limits, values.get(MASS)),
         VISCOUS: limits.several_speeds
         and VISCOUS in values
-        and _is_known(values[VISCOUS], put_together.scale.speed_m_s, put_together.scale.force_n),
+        and values[VISCOUS].uncertainty < VAGUE * max(values[VISCOUS].value, 0.1 * scale.force_n / scale.speed_m_s),
     }
     named, predicting = verdicts.named, verdicts.predicting
-    misfit = _left_of_base(explained)
+    alone = replace(settled.posterior, hypotheses=(Hypothesis((), 0.0),))
+    misfit = left_over(replace(settled, posterior=alone))
     progress("held-back stretch")
     time = put_together.time_s
     held_back = time > np.quantile(time, 1.0 - HELD_BACK)
@@ -189,16 +189,6 @@ def _number(value: Value, *, is_known: bool) -> DriveValue:
     return DriveValue(known, value.uncertainty, value.unit, is_known)
 
 
-def _is_known(viscous: Value, speed_m_s: float, force_n: float) -> bool:
-    return viscous.uncertainty < VAGUE * max(viscous.value, 0.1 * force_n / speed_m_s)
-
-
-def _left_of_base(explained: ExplainedDrive) -> LeftOver:
-    settled = explained.settled
-    alone = replace(settled.posterior, hypotheses=(Hypothesis((), 0.0),))
-    return left_over(replace(settled, posterior=alone))
-
-
 def _beyond(residual: Floats, sigma: float) -> float:
     return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
 
@@ -249,15 +239,13 @@ def _per_direction(fitted: DriveFit, values: dict[str, Value]) -> dict[str, dict
     for side, sign in (("forwards", 1.0), ("backwards", -1.0)):
         dry, wet = np.zeros(len(fitted.values)), np.zeros(len(fitted.values))
         wet[fitted.drive.channel.base.names.index(VISCOUS)] = 1.0
+        of_speed = {"coulomb_n": (dry, 1.0), "coulomb_asymmetry_n": (dry, sign), "viscous_asymmetry_n_s_m": (wet, sign)}
         for law in fitted.laws:
             first = fitted.columns_of(law).start
             for k, parameter in enumerate(fitted.drive.of_law[law][1].amplitudes):
-                if parameter.name == "coulomb_n":
-                    dry[first + k] = 1.0
-                elif parameter.name == "coulomb_asymmetry_n":
-                    dry[first + k] = sign
-                elif parameter.name == "viscous_asymmetry_n_s_m":
-                    wet[first + k] = sign
+                if parameter.name in of_speed:
+                    weights, size = of_speed[parameter.name]
+                    weights[first + k] = size
         own = fitted.weighted(wet, "N·s/m")
         # The change of viscous friction in other hypotheses applies to both directions.
         between = max(values[VISCOUS].uncertainty ** 2 - fitted.base[VISCOUS].uncertainty ** 2, 0.0)

@@ -277,7 +277,8 @@ class Verdicts(CauseJudge):
         scale, shortest = self._drive.scale, self._drive.shortest_wave_mm
         if not np.isfinite(shortest):
             return Verdict.NOT_TESTABLE, f"Within {scale.cutoff_hz:.3g} Hz no wave fits three times into the travel."
-        hidden = self._beyond_band_n()
+        recordings = self._drive.recordings
+        hidden = rms(recordings.at(lambda s: s.force_n) - recordings.force_n)
         if hidden >= 0.1 * scale.force_n / np.sqrt(2.0):
             return Verdict.NOT_TESTABLE, (
                 f"Waves down to {shortest:.3g} mm are looked for ({scale.cutoff_hz:.3g} Hz at the usual speed, the band of the "
@@ -290,11 +291,6 @@ class Verdicts(CauseJudge):
             f"Waves down to {shortest:.3g} mm ({scale.cutoff_hz:.3g} Hz at the usual speed) would have been seen, and above that "
             f"the force moves by {hidden:.2g} N rms only."
         )
-
-    def _beyond_band_n(self) -> float:
-        """Return the rms force above the cut-off [N]."""
-        recordings = self._drive.recordings
-        return rms(recordings.at(lambda s: s.force_n) - recordings.force_n)
 
     def _no_transient(self) -> tuple[Verdict, str]:
         settled, scale = self._settled, self._drive.scale

@@ -19,7 +19,7 @@ from dbbstation.inference.blocks import Block, compress, slices, with_random
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.harmonics import noise_left_by
-from dbbstation.inference.model_comparison import Cause, Variant
+from dbbstation.inference.model_comparison import Cause, Variant, largest_sd
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.triangle import axes_of, rms
@@ -164,10 +164,7 @@ class CircleChannel:
 
     def noise(self, target: Floats, others: Sequence[Cause], noise_mm: float) -> Spectrum:
         """Estimate noise from the residual of base and all causes."""
-        sd = np.zeros(self.columns.count)
-        for cause in (*self.named, *self.set_up, *others):
-            for variant in cause.variants:
-                sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
+        sd = largest_sd((*self.named, *self.set_up, *others), self.columns.count)
         rng = np.random.default_rng(self.columns.count)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
         white = rng.standard_normal((len(target), BOUNDS.noise_draws))

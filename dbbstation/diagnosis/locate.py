@@ -8,6 +8,7 @@ import numpy as np
 
 from dbbstation.diagnosis.findings import Location
 from dbbstation.diagnosis.variables import SESSION_TIME
+from dbbstation.inference.blocks import runs_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import smooth
 from dbbstation.inference.left_over import COUNTS_SIGMA
@@ -113,7 +114,4 @@ def _stretches(marked: Flags) -> list[tuple[int, int]]:
     if not marked.any():
         return []
     shift = int(np.argmin(marked))
-    rolled = np.roll(marked, -shift).astype(np.int8)
-    edges = np.diff(np.concatenate([[0], rolled, [0]]))
-    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [(int(a) + shift, int(b) + shift) for a, b in zip(starts, stops, strict=True)]
+    return [(rows.start + shift, rows.stop + shift) for rows in runs_of(np.roll(marked, -shift))]

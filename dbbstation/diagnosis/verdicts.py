@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.explained import Explained
+    from dbbstation.inference.by_level import Said
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member, Variant
@@ -86,9 +87,7 @@ class _CircleJudge(CauseJudge):
         follows = self._joint.unmodelled.follows
         return tuple(f"an unmodelled effect over {follows[n]}" if n in follows else n for n in names)
 
-    def _verdict(
-        self, cause: Cause, member: Member | None, probability: float, sigmas: float
-    ) -> tuple[Verdict, tuple[str, ...], str]:
+    def _verdict(self, cause: Cause, member: Member | None, probability: float, sigmas: float) -> Said:
         verdict, others, text = super()._verdict(cause, member, probability, sigmas)
         if verdict is Verdict.AMBIGUOUS and member is None and (group := self._group_of(cause.name)):
             others = tuple(name for name in group if name != cause.name)
@@ -117,7 +116,7 @@ class _CircleJudge(CauseJudge):
         effect = self._circles.columns.of(columns) @ amplitudes
         return concealed(effect, self._circles.unconcealed(effect))
 
-    def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
+    def _absent(self, cause: Cause, probability: float) -> Said:
         unseen_at = self._unseen_points(cause)
         if unseen_at and self._would_be_seen(max(cause.variants, key=lambda v: len(v.columns)), cause.name):
             source = self._circles.source_of(cause.name, cause.variants[0])

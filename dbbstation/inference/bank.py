@@ -25,7 +25,7 @@ from dbbstation.inference.coloured import (
     with_put_back,
 )
 from dbbstation.inference.harmonics import LEAST_LEFT
-from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
+from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant, largest_sd
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, ZERO_SD, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
@@ -318,11 +318,7 @@ class Bank:
         if found:
             scan = beside.comparison(self.target).scan((), found)
             idle = {c.name for c, odds in zip(found, scan.log_odds, strict=True) if odds <= 0.0}
-        sd = np.zeros(self._columns.count)
-        for cause in (one for one in self.causes if one.name not in idle):
-            for variant in cause.variants:
-                sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
-        return sd
+        return largest_sd((one for one in self.causes if one.name not in idle), self._columns.count)
 
     def _take(self, noise: Coloured, spread: Floats, trust: Floats) -> None:
         same = noise.partial == self.noise.partial and np.array_equal(spread, self.spread)

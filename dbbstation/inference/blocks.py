@@ -40,6 +40,12 @@ def slices(lengths: Iterable[int], first: int = 0) -> list[slice]:
     return [slice(*pair) for pair in pairwise(np.cumsum([first, *lengths]).tolist())]
 
 
+def runs_of(marked: Flags) -> list[slice]:
+    """Return the stretches of marked rows."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int64))).tolist()
+    return [slice(*pair) for pair in zip(edges[::2], edges[1::2], strict=True)]
+
+
 def compress(columns: Integers, jacobian: Floats, target: Floats) -> Block:
     """Compress a run to its triangular factor."""
     stacked = np.column_stack([jacobian, target])

@@ -19,7 +19,7 @@ import numpy as np
 
 from dbbstation.inference.blocks import Block, Columns, compress, slices
 from dbbstation.inference.square_root import lost_directions, solve
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import norms, rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -236,7 +236,7 @@ class Channel:
     def refitted(self) -> Floats:
         """Return the base's ordinary least-squares values, shape (k,)."""
         rows = self.base.samples[self.kept]
-        scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+        scale = norms(rows)
         return np.linalg.lstsq(rows / scale, self.target, rcond=None)[0] / scale
 
     @property

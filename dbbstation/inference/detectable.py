@@ -12,7 +12,7 @@ from dbbstation.inference.followed import followed_by
 from dbbstation.inference.levels import Detectable
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.patterns import CURVES, Family
-from dbbstation.inference.triangle import squares
+from dbbstation.inference.triangle import norms, squares
 from dbbstation.inference.verdict import ABSENT, SURE
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _over_variables(settled: Settled, follows: str, cause: Cause) -> Detectable:
     samples = settled.bank.samples(variant.columns)[kept]
     samples = samples - samples.mean(axis=0)
     base = settled.channel.base.samples[kept]
-    axes = np.linalg.qr(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))[0]
+    axes = np.linalg.qr(base / norms(base))[0]
     rest = samples - axes @ (axes.T @ samples)
     return _detectable(
         settled, cause, variant, samples, float(np.sum(rest**2) / max(np.sum(samples**2), 1e-300)), follows

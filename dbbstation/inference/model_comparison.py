@@ -286,7 +286,6 @@ class ModelComparison:
         self._last: tuple[tuple[Member, ...], _Eliminated] | None = None
         self._of_causes: dict[str, _OfCause] = {}
         self._forms: dict[str, _Forms] = {}
-        self._forms_of_many: _Forms | None = None
 
     def among(self, causes: Iterable[Cause]) -> ModelComparison:
         """Return the comparison of some causes, in contiguous arrays."""
@@ -428,21 +427,18 @@ class ModelComparison:
         return information
 
     def _forms_of(self, causes: tuple[Cause, ...]) -> _Forms:
-        each = []
-        for cause in causes:
-            one = self._of_causes.get(cause.name)
-            if one is None or one.cause is not cause:
-                one = self._of_causes[cause.name] = _OfCause(cause, self._gram, self._at)
-                self._forms.pop(cause.name, None)
-            each.append(one)
-        if len(each) != 1:
-            if self._forms_of_many is None or list(map(id, self._forms_of_many.causes)) != list(map(id, causes)):
-                self._forms_of_many = _Forms(each, len(self._gram))
-            return self._forms_of_many
-        name = causes[0].name
-        if name not in self._forms:
-            self._forms[name] = _Forms(each, len(self._gram))
-        return self._forms[name]
+        each = [self._of_cause(cause) for cause in causes]
+        key = causes[0].name if len(causes) == 1 else ""
+        known = self._forms.get(key)
+        if known is None or list(map(id, known.causes)) != list(map(id, causes)):
+            known = self._forms[key] = _Forms(each, len(self._gram))
+        return known
+
+    def _of_cause(self, cause: Cause) -> _OfCause:
+        one = self._of_causes.get(cause.name)
+        if one is None or one.cause is not cause:
+            one = self._of_causes[cause.name] = _OfCause(cause, self._gram, self._at)
+        return one
 
     def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         if not members:
@@ -585,6 +581,14 @@ def _log_factors(seen: Floats, along: Floats) -> Floats:
     squares = SCALES[:, None] ** 2
     information = 1.0 + squares * seen[:, None, :]
     return 0.5 * np.sum(squares * along[:, None, :] / information - np.log(information), axis=2)
+
+
+def largest_sd(causes: Iterable[Cause], count: int) -> Floats:
+    """Return the largest plausible size of each of `count` columns over all forms of causes; zero for other columns."""
+    sd = np.zeros(count)
+    for variant in (variant for cause in causes for variant in cause.variants):
+        sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
+    return sd
 
 
 def slices_of(members: Sequence[Member], first: int = 0) -> list[slice]:

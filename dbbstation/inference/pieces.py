@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.triangle import norms
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -108,7 +109,7 @@ class Fitting:
         """Return basis with further columns, shape (n, k); unknown priors are infinite."""
         noise = self.coloured.innovation
         bounded = np.flatnonzero(np.isfinite(sd))
-        size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        size = np.where(np.isfinite(sd), sd, noise / norms(columns))
         priors = np.zeros((len(bounded), columns.shape[1]))
         priors[np.arange(len(bounded)), bounded] = 1.0
         old = np.vstack([self.axes, np.zeros((len(priors), self.axes.shape[1]))])

@@ -12,7 +12,8 @@ import numpy as np
 from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
-from dbbstation.inference.by_level import VerdictsByLevel
+from dbbstation.inference.blocks import runs_of
+from dbbstation.inference.by_level import Said, VerdictsByLevel
 from dbbstation.inference.impossible import impossible, impossible_beside
 from dbbstation.inference.model_comparison import SCALES, slices_of
 from dbbstation.inference.named_values import label_of, named_values, values_of_law, with_jackknife
@@ -192,7 +193,8 @@ class CauseJudge:
         of = self._settled.bank.of(cause.name)
         variables = of.variables if of else ()
         there = verdict.rank <= Verdict.AMBIGUOUS.rank and (member is not None or verdict is Verdict.IDENTIFIED)
-        rows = _stretches(effect) if there and pattern is not None and pattern.family == "pulses" else ()
+        runs = runs_of(np.abs(effect) > 0.0) if there and pattern is not None and pattern.family == "pulses" else []
+        rows = tuple((run.start, run.stop - 1) for run in runs)
         happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
         lasts = pattern is None or pattern.family is Family.STEP or self._is_a_step(rows)
         away = np.abs(effect - np.median(effect))
@@ -266,9 +268,7 @@ class CauseJudge:
         chosen = [one.get(member.name, {}) for one in self._trial.chosen]
         return with_jackknife(found, chosen, 1.0 - 1.0 / max(len(chosen), 2))
 
-    def _verdict(
-        self, cause: Cause, member: Member | None, probability: float, sigmas: float
-    ) -> tuple[Verdict, tuple[str, ...], str]:
+    def _verdict(self, cause: Cause, member: Member | None, probability: float, sigmas: float) -> Said:
         if member is not None or self._instead_of(cause.name):
             return self._levels.of_member(cause.name, probability, sigmas, self._acts(cause.name))
         if why := self._impossible_in_place(cause):
@@ -325,7 +325,7 @@ class CauseJudge:
         told = [values_of_law(laws[n], m, *self._values[n], 0.0).items() for n, m in self._members.items() if n in laws]
         return {name: value.value for values in told for name, value in values}
 
-    def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
+    def _absent(self, cause: Cause, probability: float) -> Said:
         seen = self._seen(cause, self._best.members)
         if seen < OUT:
             if self._seen(cause, ()) >= OUT:
@@ -366,9 +366,3 @@ def concealed(effect: Floats, rest: Floats) -> tuple[float, float, float]:
 
 def _span(values: Floats, name: str, unit: str) -> Span:
     return Span(name, float(values.min()), float(values.max()), unit)
-
-
-def _stretches(effect: Floats) -> tuple[tuple[int, int], ...]:
-    inside = np.concatenate([[False], np.abs(effect) > 0.0, [False]])
-    edges = np.flatnonzero(np.diff(inside.astype(np.int64)))
-    return tuple((int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True))

@@ -31,19 +31,24 @@ def triangle_of(stacked: Floats) -> Floats:
     return triangle
 
 
+def norms(columns: Floats) -> Floats:
+    """Return the norms of columns, above zero, shape (k,)."""
+    return np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+
+
 def axes_of(columns: Floats, least: float = RANK) -> Floats:
     """Return orthonormal axes of columns, shape (n, k).
 
     Args:
         least: rank tolerance, relative to the largest singular value of scaled columns.
     """
-    u, s, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
+    u, s, _ = np.linalg.svd(columns / norms(columns), full_matrices=False)
     return u[:, s > least * s[:1]]
 
 
 def left_by(columns: Floats, values: Floats, rcond: float = RANK) -> Floats:
     """Return the residual of values, shape (n,), after a least-squares fit of columns, shape (n, k)."""
-    scaled = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    scaled = columns / norms(columns)
     return values - scaled @ np.linalg.lstsq(scaled, values, rcond=rcond)[0]
 
 

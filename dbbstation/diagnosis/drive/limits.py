@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS
 from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
 from dbbstation.facts.value import Value
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import norms, rms
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def limits_of(explained: ExplainedDrive) -> DriveLimits:
     sign = recordings.compared(lambda s: s.direction)
     late = recordings.compared(lambda s: np.gradient(s.force_n, 1.0 / s.rate_hz))
     columns = bank.whitened(np.column_stack([recordings.motion, late, sign]))
-    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300) * np.linalg.norm(columns[:, -1])
+    columns = columns / norms(columns) * np.linalg.norm(columns[:, -1])
     beside, *_ = np.linalg.lstsq(columns[:, :-1], columns[:, -1], rcond=None)
     rest = float(np.linalg.norm(columns[:, -1] - columns[:, :-1] @ beside))
     seen = COULOMB_SHARE * recordings.scale.force_n * rest / explained.settled.noise.innovation

@@ -32,6 +32,7 @@ from dbbstation.diagnosis.drive.moving import (
 from dbbstation.diagnosis.drive.sampling import evenly_sampled, stuck_samples
 from dbbstation.diagnosis.drive.travel import resolution_of, retreat_m, turning_points, ways
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.blocks import runs_of
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:
@@ -232,8 +233,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
 
 
 def _rests(standing: Flags, force_n: Floats, rate_hz: float, step: int) -> list[str]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int64)))
-    long = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > RESTS * step]
+    long = [rows for rows in runs_of(standing) if rows.stop - rows.start > RESTS * step]
     if not long:
         return []
     seconds = sum(rows.stop - rows.start for rows in long) / rate_hz

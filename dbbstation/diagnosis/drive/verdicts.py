@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.findings import Complement, HeldOutForce
     from dbbstation.diagnosis.drive.pulses import Edges
     from dbbstation.facts.value import Value
+    from dbbstation.inference.by_level import Said
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.read_off import CauseFinding
@@ -122,9 +123,7 @@ class Verdicts(CauseJudge):
         found = after.values[own]
         return min(sigmas, float(np.sqrt(found @ np.linalg.solve(after.covariance[own, own], found))))
 
-    def _verdict(
-        self, cause: Cause, member: Member | None, probability: float, sigmas: float
-    ) -> tuple[Verdict, tuple[str, ...], str]:
+    def _verdict(self, cause: Cause, member: Member | None, probability: float, sigmas: float) -> Said:
         """Return the verdict; stretches whose edges follow the motion may equally be errors of a law."""
         verdict, others, text = super()._verdict(cause, member, probability, sigmas)
         if verdict is Verdict.AMBIGUOUS and not others:
@@ -188,9 +187,7 @@ class Verdicts(CauseJudge):
             gains=gains,
         )
 
-    def _said(
-        self, source: DriveSource, own: Sequence[CauseFinding], there: Sequence[CauseFinding]
-    ) -> tuple[Verdict, tuple[str, ...], str]:
+    def _said(self, source: DriveSource, own: Sequence[CauseFinding], there: Sequence[CauseFinding]) -> Said:
         alike = self._others(source, there or own)
         if there and source.name == COULOMB and not self._several:
             alike = (*alike, "viscous friction")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -84,19 +85,12 @@ def candidates(
             found += _at(port, {s: at[s] for s in port.signals if len(np.unique(at[s])) >= DISTINCT}, span)
     for source in own:
         parameters = source.parameters()
-        amplitudes = [p for p in parameters if not p.grid]
-        shaped = [p for p in parameters if p.grid]
+        amplitudes, shaped = [p for p in parameters if not p.grid], [p for p in parameters if p.grid]
         middle = tuple(p.grid[len(p.grid) // 2] for p in shaped)
-        found.append(
-            Candidate(
-                Term(source.port, TermForm.OWN, (), (0.0,) * len(amplitudes), middle, own=source),
-                tuple(p.name for p in (*amplitudes, *shaped)),
-                tuple(p.unit for p in (*amplitudes, *shaped)),
-                tuple(p.grid for p in shaped),
-                NAMED_ODDS,
-                tuple(p.positive for p in amplitudes),
-            )
-        )
+        term = Term(source.port, TermForm.OWN, (), (0.0,) * len(amplitudes), middle, own=source)
+        names, units = (tuple(getattr(p, of) for p in (*amplitudes, *shaped)) for of in ("name", "unit"))
+        signs = tuple(p.positive for p in amplitudes)
+        found.append(Candidate(term, names, units, tuple(p.grid for p in shaped), NAMED_ODDS, signs))
     count = {form: sum(one.term.form is form for one in found) for form in TermForm}
     results = {(port.name, signal) for port in ports for signal in port.results}
     return tuple(one if one.term.own else _weighed(one, count[one.term.form], results) for one in found)
@@ -115,77 +109,52 @@ def _span(times: Floats) -> tuple[float, float]:
 
 def _at(port: SimulatorPort, signals: Mapping[str, Floats], span: tuple[float, float]) -> list[Candidate]:
     """Yield a port's terms over varying signals, shape (calls,)."""
-    found = [_candidate(port, TermForm.CONSTANT, (), ("value",), (port.unit,))]
+    found = [_candidate(port, (), TermForm.CONSTANT, ("value",), (port.unit,))]
     greatest = sizes(signals)
     for name, values in signals.items():
-        unit, size = port.signals[name], greatest[name]
+        unit, size, both_signs = port.signals[name], greatest[name], values.min() < 0.0 < values.max()
+        of, per = partial(_candidate, port, (name,)), _per(port.unit, unit)
         if unit in PERIODS and np.ptp(values) >= PERIODS[unit]:
-            for order in (1.0, 2.0):
-                fixed = (PERIODS[unit], order)
-                found.append(
-                    _candidate(port, TermForm.PERIODIC, (name,), ("cosine", "sine"), (port.unit,) * 2, fixed=fixed)
-                )
+            both = ("cosine", "sine"), (port.unit,) * 2
+            found += [of(TermForm.PERIODIC, *both, (PERIODS[unit], order)) for order in (1.0, 2.0)]
         for form, power in ((TermForm.LINEAR, ""), (TermForm.SQUARE, "²"), (TermForm.DRAG, "²"), (TermForm.CUBIC, "³")):
-            if form is not TermForm.DRAG or values.min() < 0.0 < values.max():
-                found.append(_candidate(port, form, (name,), ("coefficient",), (_per(port.unit, unit, power),)))
-        longest = span[1] / 3.0
+            if form is not TermForm.DRAG or both_signs:
+                found.append(of(form, ("coefficient",), (_per(port.unit, unit, power),)))
         if len(inside := inner_quantiles(values, BOUNDS.answer_lengths)):
-            found.append(_candidate(port, TermForm.CURVE, (name,), *_curve(port, values)))
-            hinge = _candidate(
-                port, TermForm.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=inside
-            )
+            found.append(of(TermForm.CURVE, *_curve(port, values)))
+            hinge = of(TermForm.HINGE, ("slope", "place"), (per, unit), grid=inside)
             # A hinge outside the signal's range has no effect, so its values are undetermined.
             reached = (float(values.min()), float(values.max()))
             found.append(replace(hinge, term=replace(hinge.term, bounds=(reached,))))
-        constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), BOUNDS.answer_lengths).tolist())
-        found.append(
-            _candidate(
-                port, TermForm.MEMORY, (name,), ("gain", "time constant"), (_per(port.unit, unit), "s"), grid=constants
-            )
-        )
-        if values.min() < 0.0 < values.max():
+        constants = _grid(2.0 * span[0], max(span[1] / 3.0, 4.0 * span[0]))
+        found.append(of(TermForm.MEMORY, ("gain", "time constant"), (per, "s"), grid=constants))
+        if both_signs:
             turns = tuple(share * size for share in ROUNDINGS)
-            found.append(_candidate(port, TermForm.SIGN, (name,), ("size", "rounding"), (port.unit, unit), grid=turns))
+            found.append(of(TermForm.SIGN, ("size", "rounding"), (port.unit, unit), grid=turns))
             widths = tuple((size * np.geomspace(0.03, 0.6, BOUNDS.answer_lengths)).tolist())
-            found.append(
-                _candidate(
-                    port, TermForm.LIMIT, (name,), ("slope", "half width"), (_per(port.unit, unit), unit), grid=widths
-                )
-            )
+            found.append(of(TermForm.LIMIT, ("slope", "half width"), (per, unit), grid=widths))
         widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, BOUNDS.answer_lengths)).tolist())
-        found.append(_candidate(port, TermForm.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
+        found.append(of(TermForm.SLIP, ("size", "half width"), (port.unit, unit), grid=widths))
         if unit == port.unit:
-            found += _in_place(port, name, values, span, widths)
+            whiles = _grid(span[0], max(0.1 * span[1], 2.0 * span[0]), 1)
+            waiting = [(TermForm.DELAY, "dead time"), (TermForm.LAG, "time constant")]
+            found += [replace(of(form, (what,), ("s",)), tried=whiles) for form, what in waiting]
+            lost = [TermForm.PLAY, TermForm.GAP] if both_signs else [TermForm.PLAY]
+            found += [replace(of(form, ("half width",), (unit,)), tried=widths) for form in lost]
     for one, other in combinations(signals, 2):
         units = _per(_per(port.unit, port.signals[one]), port.signals[other])
-        found.append(_candidate(port, TermForm.PRODUCT, (one, other), ("coefficient",), (units,)))
+        found.append(_candidate(port, (one, other), TermForm.PRODUCT, ("coefficient",), (units,)))
     return found
 
 
-def _in_place(
-    port: SimulatorPort,
-    name: str,
-    values: Floats,
-    span: tuple[float, float],
-    widths: tuple[float, ...],
-) -> list[Candidate]:
-    """Yield terms that replace a signal, shape (calls,)."""
-    unit = port.signals[name]
-    whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), BOUNDS.answer_lengths + 1).tolist())
-    forms = [
-        (TermForm.DELAY, "dead time", "s", whiles),
-        (TermForm.LAG, "time constant", "s", whiles),
-        (TermForm.PLAY, "half width", unit, widths),
-    ]
-    if values.min() < 0.0 < values.max():
-        forms.append((TermForm.GAP, "half width", unit, widths))
-    return [replace(_candidate(port, form, (name,), (what,), (of,)), tried=tried) for form, what, of, tried in forms]
+def _grid(least: float, most: float, more: int = 0) -> tuple[float, ...]:
+    return tuple(np.geomspace(least, most, BOUNDS.answer_lengths + more).tolist())
 
 
 def _candidate(
     port: SimulatorPort,
-    form: TermForm,
     signals: tuple[str, ...],
+    form: TermForm,
     names: tuple[str, ...],
     units: tuple[str, ...],
     fixed: tuple[float, ...] = (),
@@ -193,10 +162,7 @@ def _candidate(
 ) -> Candidate:
     count = len(names) - bool(grid)
     middle = (grid[len(grid) // 2],) if grid else ()
-    if grid and form is not TermForm.HINGE:
-        bounds: tuple[tuple[float, float], ...] = ((grid[0] / REACH, grid[-1] * REACH),)
-    else:
-        bounds = ()
+    bounds = ((grid[0] / REACH, grid[-1] * REACH),) if grid and form is not TermForm.HINGE else ()
     return Candidate(
         Term(port.name, form, signals, (0.0,) * count, middle, fixed, bounds=bounds),
         names,

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from dbbstation.diagnosis.simulator.terms import IN_PLACE
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, PerturbedParameter
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import norms, rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -219,9 +219,9 @@ def near(
     before = _weighed(work, state, residual, weigh, sigma)
     if not rows.shape[1]:
         return state, residual
-    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    scale = norms(rows)
     # Parameters that these rows hardly determine stay, such as the initial state if first rows are held out.
-    seen = scale / np.maximum(np.linalg.norm(fitted.columns, axis=0), 1e-300)
+    seen = scale / norms(fitted.columns)
     scale = np.where(seen < HARDLY * seen.max(), np.inf, scale)
     for _ in range(rounds):
         step = np.linalg.lstsq(rows / scale, before, rcond=1e-10)[0] / scale

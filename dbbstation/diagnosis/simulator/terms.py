@@ -119,35 +119,14 @@ def _momentary(term: Term) -> Evaluate:
 
 def _of_one_signal(form: TermForm, x: str, a: float, place: float) -> Evaluate:
     rounding = place * place
-
-    def square(_t: float, signals: Mapping[str, float]) -> float:
-        value = signals[x]
-        return a * (value * value)
-
-    def drag(_t: float, signals: Mapping[str, float]) -> float:
-        value = signals[x]
-        return a * (value * abs(value))
-
-    def cubic(_t: float, signals: Mapping[str, float]) -> float:
-        value = signals[x]
-        return a * (value * value * value)
-
-    def sign(_t: float, signals: Mapping[str, float]) -> float:
-        value = signals[x]
-        return a * (value / sqrt(value * value + rounding))
-
-    def limited(_t: float, signals: Mapping[str, float]) -> float:
-        value = signals[x]
-        return a * (place if value > place else max(value, -place))
-
     of: dict[TermForm, Evaluate] = {
         TermForm.LINEAR: lambda _t, signals: a * signals[x],
-        TermForm.SQUARE: square,
-        TermForm.DRAG: drag,
-        TermForm.CUBIC: cubic,
-        TermForm.SIGN: sign,
+        TermForm.SQUARE: lambda _t, signals: a * ((v := signals[x]) * v),
+        TermForm.DRAG: lambda _t, signals: a * ((v := signals[x]) * abs(v)),
+        TermForm.CUBIC: lambda _t, signals: a * ((v := signals[x]) * v * v),
+        TermForm.SIGN: lambda _t, signals: a * ((v := signals[x]) / sqrt(v * v + rounding)),
         TermForm.HINGE: lambda _t, signals: a * max(signals[x] - place, 0.0),
-        TermForm.LIMIT: limited,
+        TermForm.LIMIT: lambda _t, signals: a * (place if (v := signals[x]) > place else max(v, -place)),
     }
     return of[form]
 

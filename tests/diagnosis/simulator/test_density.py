@@ -9,6 +9,7 @@ from scipy.stats import multivariate_normal, norm
 from scipy.stats import t as student
 
 from dbbstation.diagnosis.simulator import density
+from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.coloured import Coloured
 
@@ -30,8 +31,8 @@ def stood_for(monkeypatch, noise, tails, spread, known=None):
 
     bank = SimpleNamespace(noise=noise, tails=tails, spread=spread[outputs[~held]], whitened=whitened)
     monkeypatch.setattr(density, "noise_left", lambda *_args, **_named: bank)
-    parameters = [SimpleNamespace(uncertainty=known), SimpleNamespace(uncertainty=None)]
-    work = SimpleNamespace(output=outputs, model=SimpleNamespace(outputs=(0, 1), parameters=parameters))
+    parameters = SimulatorParameter("a", "a", 0.0, uncertainty=known), SimulatorParameter("b", "b", 0.0)
+    work = SimpleNamespace(output=outputs, model=Model("", parameters, (), (Output("x", "m"), Output("y", "m")), ()))
     return work, channel, held, outputs
 
 

@@ -25,7 +25,7 @@ class Compared:
         every = [candidate(*key) for key in effects]
         self.inside, self.outside, self.names = every[:1], every[1:], [one.name for one in every]
         self.effects = dict(zip(self.names, effects.values(), strict=True))
-        self.best = SimpleNamespace(members=[SimpleNamespace(cause=one) for one in every])
+        self.best = SimpleNamespace(members=every)
         samples = np.array([[1.0], [0.0], [0.0], [0.0]])
         self.channel = SimpleNamespace(residual=np.zeros(4), base=SimpleNamespace(samples=samples))
         self.bank = SimpleNamespace(base_values=lambda effect: 7.0 - effect[:1])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.louder import louder
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +56,7 @@ def after_reversals(runs: Sequence[Samples], residual_mm: Sequence[Floats]) -> A
     found: list[AfterReversals] = []
     lengths = [(within_s, round(within_s / apart_s)) for within_s in WITHIN_S]
     lengths = [(within_s, rows) for within_s, rows in lengths if rows >= FEWEST_ROWS]
-    for strut in range(1, STRUTS + 1):
+    for strut in STRUT_NUMBERS:
         begins = [_reversals(run.values["strut-speed-sign"][:, strut - 1]) for run in runs]
         for within_s, rows in lengths:
             one = louder(residual_mm, begins, rows)

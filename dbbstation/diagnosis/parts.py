@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,6 +83,6 @@ def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
     kinds = [[("", every)]]
     if len(set(labels)) > 1:
         kinds.append([(part, tuple(k for k in every if labels[k] == part)) for part in sorted(set(labels))])
-    if sets == 1 and [p.strut for p in amplitudes] == list(range(1, STRUTS + 1)):
+    if sets == 1 and [p.strut for p in amplitudes] == [*STRUT_NUMBERS]:
         kinds.append([(ALIKE, every)])
     return [Part(label, own, -float(np.log(len(kinds) * len(kind)))) for kind in kinds for label, own in kind]

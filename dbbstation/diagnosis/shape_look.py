@@ -27,7 +27,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.forms import Form, Lobes, PlaneStep, Ringing, Wave, WaveOfTurn
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.sums import Sums, bumps, peaks, steps
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -178,29 +178,29 @@ class TemplateScan:
 def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
     """Return the best shapes of each kind that the runs can show."""
     found: list[Shape] = []
-    for strut in range(1, STRUTS + 1):
-        low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
+    for strut in STRUT_NUMBERS:
+        low, high = extent.of("strut-length", strut)
         lengths = look.over("strut-length", strut, EVERY, (low, PIECE_MM))
         grid = np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low)
         found += lengths.waves(grid, lengths.sums.of_forms([Wave(float(frequency)) for frequency in grid]))
         found += lengths.best("bump", bumps(low, high, WIDTHS_MM), _BUMPS_APART)
         found += lengths.best("step", steps(low, high, _STEPS))
         if "strut-force" in extent.low:
-            low, high = (float(limit["strut-force"][strut - 1]) for limit in (extent.low, extent.high))
+            low, high = extent.of("strut-force", strut)
             forces = look.over("strut-force", strut, EVERY, (low, max(high - low, 1e-6) / _FORCES))
             found += forces.best("step", steps(low, high, _STEPS))
     if "time" in extent.low:
-        low, high = float(extent.low["time"]), float(extent.high["time"])
+        low, high = extent.of("time")
         wide = max(SHORTEST_S / 4.0, (high - low) / BOUNDS.pieces_of_travel)
         movers: list[tuple[int | None, str]] = [(None, READING), (None, BALL)]
-        for own, moves in (*movers, *((strut, EVERY) for strut in range(1, STRUTS + 1))):
+        for own, moves in (*movers, *((strut, EVERY) for strut in STRUT_NUMBERS)):
             times = look.over("time", own, moves, (low, wide))
             length = next_fast_len(2 * (int(times.sums.place[-1]) + 1), real=True)
             first, last = max(1, int(np.floor(0.5 * length * wide / (high - low)))), length // 4
             found += times.waves(np.arange(first, last) / (length * wide), times.sums.of_waves(length, first, last))
             found += times.best("step", steps(low, high, _TIMES))
     if "time since its reversal" in extent.low:
-        for strut in range(1, STRUTS + 1):
+        for strut in STRUT_NUMBERS:
             found += look.over("time since its reversal", strut, EVERY, _since).best("ringing", RINGS, _RINGS_APART)
     if "angle" in extent.low:
         found += look.over("angle", None, READING, (0.0, 1.0)).best("wave", [Lobes((k,)) for k in LOBES_ALONE])
@@ -220,7 +220,7 @@ def _shared(found: Sequence[Shape], extent: Ranges) -> list[Shape]:
         if shape.strut is None or shape.kind not in {"wave", "ringing"}:
             kept.append(shape)
         elif not any(_is_one(shape, other, extent) for other in kept):
-            kept += [replace(shape, strut=strut) for strut in range(1, STRUTS + 1)]
+            kept += [replace(shape, strut=strut) for strut in STRUT_NUMBERS]
     return kept
 
 

@@ -20,7 +20,7 @@ from dbbstation.inference.forms import (
     Walk,
     Wave,
 )
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
 from dbbstation.sources.laws.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
@@ -186,7 +186,7 @@ class Shape:
         count = columns.shape[-1]
         curve = columns @ amplitudes[:count]
         effect = gain * (curve[:, None] if curve.ndim == 1 else curve)
-        return effect * (np.arange(1, STRUTS + 1) == self.strut) if self.strut else effect, count
+        return effect * (np.array(STRUT_NUMBERS) == self.strut) if self.strut else effect, count
 
     def followed(self, values: Floats) -> Floats:
         """Return its variable's values, by strut or place."""
@@ -228,6 +228,11 @@ class Ranges:
 
     low: dict[str, Floats]
     high: dict[str, Floats]
+
+    def of(self, name: str, strut: int | None = None) -> tuple[float, float]:
+        """Return the limits of a variable, or of one strut's."""
+        low, high = (each[name] if strut is None else each[name][strut - 1] for each in (self.low, self.high))
+        return float(low), float(high)
 
 
 def variables(motion: Motion, machine: Machine) -> dict[str, Floats]:
@@ -276,7 +281,7 @@ def _since_reversal_s(time_s: Floats, speed_mm_s: Floats) -> Floats:
 def _temperatures(motion: Motion) -> dict[str, Floats]:
     logged = known_thermometers(motion)
     found = {f"{name}-temperature": logged_degc(motion, name)[0] for name in THERMOMETERS if name in logged}
-    on_struts = [f"strut{strut}" for strut in range(1, STRUTS + 1)]
+    on_struts = [f"strut{strut}" for strut in STRUT_NUMBERS]
     if all(name in logged for name in on_struts):
         found["strut-temperature"] = np.column_stack([logged_degc(motion, name)[0] for name in on_struts])
     return found
@@ -358,14 +363,13 @@ def shapes(extent: Ranges) -> list[Shape]:
     for name in (*usual, *warmed):
         if name not in extent.low:
             continue
-        found += [Shape(name, "", strut, EVERY, _usual(name, extent, strut)) for strut in (*range(1, STRUTS + 1), None)]
+        found += [Shape(name, "", strut, EVERY, _usual(name, extent, strut)) for strut in (*STRUT_NUMBERS, None)]
     if "strut-speed-sign" in extent.low:
         found += [
-            Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
-            for strut in range(1, STRUTS + 1)
+            Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut)) for strut in STRUT_NUMBERS
         ]
         behind = BehindReversal(STICKING_MM, STICKING_HALVES)
-        found += [Shape("travel since its reversal", "", strut, EVERY, behind) for strut in range(1, STRUTS + 1)]
+        found += [Shape("travel since its reversal", "", strut, EVERY, behind) for strut in STRUT_NUMBERS]
     for name in ("time", *warmed):
         if name in extent.low and name not in OF_STRUTS:
             found += [Shape(name, "", None, moves, _usual(name, extent, None)) for moves in (READING, BALL)]

@@ -132,7 +132,7 @@ def held_out_error(
         settled = choose_without(channel, out)
         plain = float(np.mean(channel.residual[~rows])) if reference is None else reference(~rows)
         refitted = channel.residual - channel.base.samples @ channel.without(rows).refitted()
-        corrected = channel.residual - settled.predicted()
+        corrected = settled.left
         one, two, three = (rms(errors[rows]) for errors in (channel.residual - plain, refitted, corrected))
         found.append(Fold(name, int(rows.sum()), one, two, three, _gains(settled, rows)))
     return HeldOutError(tuple(found))

@@ -64,7 +64,7 @@ class LeftOver:
 def left_over(settled: Settled) -> LeftOver:
     """Test the best hypothesis's whitened residual."""
     channel, bank = settled.channel, settled.bank
-    rows = channel.residual - settled.predicted()
+    rows = settled.left
     left = bank.whitened(rows) / settled.noise.innovation
     used = sum(member.width for member in settled.best.members) + channel.base.samples.shape[1]
     freedom = max(float(len(left) - used), 1.0)

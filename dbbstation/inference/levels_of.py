@@ -119,7 +119,7 @@ def slow_chance(settled: Settled) -> float:
     channel = settled.channel
     if channel.time is None:
         return 1.0
-    rows = (channel.residual - settled.predicted())[channel.kept]
+    rows = settled.left[channel.kept]
     own = rows[max(channel.stretches, key=lambda one: one.stop - one.start)]
     power = np.abs(np.fft.rfft(own - own.mean())[1 : len(own) // 2]) ** 2
     low, following = power[:SLOW], power[SLOW : 3 * SLOW]

@@ -43,7 +43,6 @@ def named_values(settled: Settled, member: Member, values: Floats, covariance: F
     if len(pattern.per) < width:
         return {}
     names = _NAMES.get(str(pattern.family), tuple(f"amplitude {k + 1}" for k in range(width)))[:width]
-    names = ("slope",) if pattern.family in {"linear", "drift"} else names
     return {
         name: Value(float(values[k] / pattern.per[k]), float(sigma[k] / pattern.per[k]), _unit(unit, pattern.units[k]))
         for k, name in enumerate(names)
@@ -133,6 +132,8 @@ def with_jackknife(
 
 
 _NAMES = {
+    "linear": ("slope",),
+    "drift": ("slope",),
     "once per turn": ("cosine", "sine"),
     "twice per turn": ("cosine", "sine"),
     "wave": ("cosine", "sine", *(f"{name} {k}" for k in range(2, max(HARMONICS) + 1) for name in ("cosine", "sine"))),

@@ -77,6 +77,11 @@ class Settled:
         effect = self.effect()
         return effect + self.channel.base.samples @ self.base_values(effect)
 
+    @property
+    def left(self) -> Floats:
+        """Return what is left of the residual over all rows, shape (n,)."""
+        return self.channel.residual - self.predicted()
+
     def averaged(self, probability: float, names: Collection[str]) -> float:
         """Return the probability of causes, averaged over initial noise models.
 

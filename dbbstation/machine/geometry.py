@@ -17,6 +17,7 @@ from dbbstation.facts.record import AsArray, Record, Sha256Hex
 from dbbstation.machine.rotation import Rotation
 
 STRUTS = 6
+STRUT_NUMBERS = range(1, STRUTS + 1)
 
 GREATEST_FEED_MM_MIN = 100_000.0
 """Greatest feed if the machine file states none [mm/min]: 100 m/min, the rapid of the fastest parallel machine tools.

@@ -19,7 +19,7 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.laws.contract import Parameter as Parameter  # noqa: PLC0414 - part of the contract: sources take it from here
 from dbbstation.laws.contract import Texts as Texts  # noqa: PLC0414 - part of the interface: sources import it from here
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.machine.kinematics import Struts, inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.trace.columns import WithLogged
@@ -216,8 +216,7 @@ def of_each_strut(
 ) -> tuple[Parameter, ...]:
     """Return one amplitude parameter per strut."""
     return tuple(
-        Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k)
-        for k in range(1, STRUTS + 1)
+        Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k) for k in STRUT_NUMBERS
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from dbbstation.laws.contract import MOVING, TableSource
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.sources.contract import Effect, ErrorSource, Need, Owner, Parameter
 from dbbstation.sources.laws.rates import SHORTEST_S
 from dbbstation.sources.laws.turning import since_turning
@@ -66,7 +66,7 @@ class _OfStruts(ErrorSource):
             replace(p, name=f"strut_{k}_{p.name}", meaning=f"{p.meaning}, strut {k}", strut=k)
             for p in self._law.parameters()
             if not p.grid
-            for k in range(1, STRUTS + 1)
+            for k in STRUT_NUMBERS
         ]
         return (*sizes, *self._shapes)
 

@@ -158,7 +158,7 @@ class Mismatch:
     @property
     def rms_after(self) -> float:
         """Return the rms after correction by all findings."""
-        return rms(self.settled.channel.residual - self.explained)
+        return rms(self.settled.left)
 
 
 @with_one_thread
@@ -207,7 +207,7 @@ def _found(
     held_out = _held_out(settled, table, chosen, progress) if hold_out else None
     refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
     kept = channel.residual - (float(np.mean(channel.residual)) if table.has_offset else 0.0)
-    is_worse_here = is_worse(rms(channel.residual - settled.predicted()), rms(kept))
+    is_worse_here = is_worse(rms(settled.left), rms(kept))
     left = left_over(settled)
     parts = ChosenWithoutParts(chosen) if hold_out else None
     levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)

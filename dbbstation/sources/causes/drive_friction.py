@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws.play_operator import followed, leaning
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
@@ -32,7 +32,7 @@ def of_motor(motor: int, kind: str) -> str:
     return f"motor_{motor}_{kind}"
 
 
-MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in range(1, STRUTS + 1)}
+MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in STRUT_NUMBERS}
 """Motors, 1 to 6, by the name of their gain."""
 
 
@@ -71,7 +71,7 @@ class DriveFriction(ErrorSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         platform_masses(self.name, machine)
         found = []
-        for motor in range(1, STRUTS + 1):
+        for motor in STRUT_NUMBERS:
             kinds = (
                 ("A/kN", 2.5, f"current of motor {motor} per force that pulls its strut"),
                 ("N", 100.0, f"constant friction of drive {motor}, positive: against the motion"),

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
-
-if TYPE_CHECKING:
-    from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.drive.signals import Signals
 
 POWERS = (1.5, 2.0, 2.5, 3.0)
 """Tried powers. At few speeds, powers below 1 cannot be distinguished from Coulomb plus viscous friction; unnamed
@@ -40,7 +34,6 @@ class PowerLawFriction(DriveSource):
         power = Parameter("power", "1", 1.0, "exponent of the speed", POWERS)
         top = scale.speed_m_s
 
-        def columns(one: Signals, exponent: tuple[float, ...]) -> Floats:
-            return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent[0])[:, None]
-
-        return (DriveForm((size, power), columns),)
+        return (
+            DriveForm((size, power), lambda s, shape: (s.direction * (np.abs(s.speed_m_s) / top) ** shape[0])[:, None]),
+        )

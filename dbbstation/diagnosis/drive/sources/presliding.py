@@ -12,8 +12,6 @@ from dbbstation.diagnosis.drive.sources.coulomb_friction import MOST_OF_COULOMB
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
 """Tried lengths of the build-up, over the travel."""
@@ -50,11 +48,12 @@ class Presliding(DriveSource):
         lengths = tuple(1e3 * share * scale.travel_m for share in SHARES)
         meaning = "travel after which 37 % are left of it"
         length = Parameter("length_mm", "mm", 1e3 * 0.01 * scale.travel_m, meaning, lengths)
-        return (DriveForm((size, length), _columns),)
+        return (
+            DriveForm(
+                (size, length),
+                lambda s, shape: (-2.0 * s.direction * np.exp(-1e3 * s.since_reversal_m / shape[0]))[:, None],
+            ),
+        )
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
-
-
-def _columns(signals: Signals, length_mm: tuple[float, ...]) -> Floats:
-    return (-2.0 * signals.direction * np.exp(-1e3 * signals.since_reversal_m / length_mm[0]))[:, None]

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Parameter, Scale, Texts
-
-if TYPE_CHECKING:
-    from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.drive.signals import Signals
 
 SHARES = (0.02, 0.04, 0.07, 0.1, 0.14, 0.2, 0.28)
 """Tried Stribeck speeds, over the greatest speed; above a fifth the curve is not limited to low speed."""
@@ -37,8 +31,6 @@ class StribeckFriction(DriveSource):
         size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True)
         speeds = tuple(share * scale.speed_m_s for share in SHARES)
         speed = Parameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left", speeds)
-        return (DriveForm((size, speed), _columns),)
-
-
-def _columns(signals: Signals, speed_m_s: tuple[float, ...]) -> Floats:
-    return (signals.direction * np.exp(-np.abs(signals.speed_m_s) / speed_m_s[0]))[:, None]
+        return (
+            DriveForm((size, speed), lambda s, shape: (s.direction * np.exp(-np.abs(s.speed_m_s) / shape[0]))[:, None]),
+        )

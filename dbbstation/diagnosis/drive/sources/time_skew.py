@@ -11,8 +11,6 @@ from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Paramete
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.drive.signals import Signals
 
 MOST_SAMPLES = 5.0
 """Largest shift between filtered channels of one logger, in samples."""
@@ -37,12 +35,8 @@ class ForceTimeSkew(DriveSource):
 
     def forms(self, scale: Scale) -> tuple[DriveForm, ...]:
         size = Parameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
-        return (DriveForm((size,), _columns),)
+        # The low-pass bounds the noise of the difference.
+        return (DriveForm((size,), lambda s, _: -1e-3 * np.gradient(s.force_n, 1.0 / s.rate_hz)[:, None]),)
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:
         return abs(values.get("delay_ms", 0.0)) <= MOST_SAMPLES * 1e3 * scale.sample_s
-
-
-def _columns(signals: Signals, _: tuple[float, ...]) -> Floats:
-    # The low-pass bounds the noise of the difference.
-    return -1e-3 * np.gradient(signals.force_n, 1.0 / signals.rate_hz)[:, None]

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
-from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.workspace import workspace
+from dbbstation.inference.verdict import Verdict
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plan, PlannedTest
 from dbbstation.sources.contract import Fitted, Motion

@@ -11,7 +11,7 @@ from pydantic import Field, computed_field
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.facts.serialise import Absent, Kept, OrNull
 from dbbstation.facts.value import Value
-from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains, Verdict
+from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
@@ -23,19 +23,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.limit_reached import LimitReached
-
-__all__ = [
-    "Curve",
-    "CurvePoint",
-    "Diagnosis",
-    "Location",
-    "NextTest",
-    "Shift",
-    "SourceFinding",
-    "Unexplained",
-    "Value",
-    "Verdict",
-]
 
 
 @dataclass(frozen=True, kw_only=True)

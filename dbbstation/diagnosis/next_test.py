@@ -8,14 +8,14 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.diagnosis.findings import NextTest, Verdict
+from dbbstation.diagnosis.findings import NextTest
 from dbbstation.diagnosis.foreseen import ForeseenTests
 from dbbstation.diagnosis.parts import amplitudes
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
-from dbbstation.inference.verdict import OUT
+from dbbstation.inference.verdict import OUT, Verdict
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Need
 

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
+from dbbstation.diagnosis.findings import SourceFinding
 from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.diagnosis.parts import amplitudes
+from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import standing_out
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial, concealed
-from dbbstation.inference.verdict import OUT, SURE
+from dbbstation.inference.verdict import OUT, SURE, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -37,18 +37,6 @@ class Left:
     whitening: csr_array | None
     known: Floats | None = None
 
-    @classmethod
-    def of(
-        cls,
-        target: Floats,
-        columns: Floats,
-        sd: Floats,
-        coloured: Coloured,
-        whitening: csr_array | None,
-    ) -> Left:
-        """Return the residual of a whitened target after fitting columns with Gaussian priors."""
-        return Fitting.of(columns, sd, coloured, whitening).left(target)
-
     @cached_property
     def towards(self) -> Floats:
         """Return the transposed whitening times `rest`, for products with unwhitened columns, shape (n,)."""
@@ -101,7 +89,7 @@ class Fitting:
 
     @classmethod
     def of(cls, columns: Floats, sd: Floats, coloured: Coloured, whitening: csr_array | None) -> Fitting:
-        """Return basis of columns; arguments as for `Left.of`."""
+        """Return basis of whitened columns with Gaussian priors."""
         none = np.zeros((len(columns), 0))
         return cls(none, len(columns), coloured, whitening).beside(columns, sd)
 

@@ -54,7 +54,7 @@ def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[Floats, Floats]:
 
 
 def _left(bank: Bank, columns: Floats, sd: Floats) -> Left:
-    return Left.of(bank.target, columns, sd, bank.noise, bank.whitening)
+    return Fitting.of(columns, sd, bank.noise, bank.whitening).left(bank.target)
 
 
 def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:

@@ -6,11 +6,12 @@ import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import misfit_of
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
-from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained, Verdict
+from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.held_out import HeldOut
 from dbbstation.inference.levels import DifferenceFound, Differs, Levels
+from dbbstation.inference.verdict import Verdict
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named

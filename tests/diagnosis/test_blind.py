@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
-from dbbstation.diagnosis.findings import Verdict
 from dbbstation.facts.serialise import plain
+from dbbstation.inference.verdict import Verdict
 from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named

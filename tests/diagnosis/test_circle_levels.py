@@ -7,7 +7,6 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import without_doubtful
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.left_out import without_tests
 from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
@@ -16,6 +15,7 @@ from dbbstation.inference.chosen_anew import chosen_anew
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.levels import Differs, FollowsAnswer
 from dbbstation.inference.places import form_probabilities
+from dbbstation.inference.verdict import Verdict
 from dbbstation.results.levels_text import short_sentences
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions

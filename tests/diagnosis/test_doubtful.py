@@ -6,11 +6,11 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import doubtful, without_doubtful
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.inference.alternatives import EVEN
+from dbbstation.inference.verdict import Verdict
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity

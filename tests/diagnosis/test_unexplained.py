@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
-from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import READING, Follows
 from dbbstation.diagnosis.unexplained_model import keep_unexplained
 from dbbstation.errors import ModelError
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model, write_model
+from dbbstation.inference.verdict import Verdict
 from dbbstation.model.compensation import compensated
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.results.diagnosis import diagnosis_figures

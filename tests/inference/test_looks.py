@@ -8,7 +8,7 @@ import pytest
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Left
+from dbbstation.inference.pieces import Fitting
 from dbbstation.inference.variables import Kind, Variable
 
 
@@ -17,7 +17,7 @@ def test_a_wave_of_which_only_a_multiple_is_strong_is_sought_with_its_pitch(rng,
     """A screw of 10 mm pitch over 100 mm, whose error has one harmonic far above the noise."""
     place = np.sort(rng.uniform(0.0, 100.0, 2000))
     residual = 3.0 * np.sin(2 * np.pi * multiple * place / 10.0) + rng.standard_normal(2000)
-    left = Left.of(residual, np.ones((2000, 1)), np.array([np.inf]), Coloured(1.0), None)
+    left = Fitting.of(np.ones((2000, 1)), np.array([np.inf]), Coloured(1.0), None).left(residual)
     screw = Variable("screw", "mm", Kind.LENGTH, place)
     found = looked_for(left, [screw], np.ones(2000, dtype=bool), 10.0)
     forms = [pattern.form for pattern in found if pattern.family is Family.WAVE]

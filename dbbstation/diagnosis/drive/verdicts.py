@@ -14,7 +14,7 @@ from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, ed
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pushes import MOST_PUSHES
-from dbbstation.inference.read_off import CauseJudge
+from dbbstation.inference.read_off import CauseFinding, CauseJudge
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.by_level import Said
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member
-    from dbbstation.inference.read_off import CauseFinding
 
 CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT, Verdict.AMBIGUOUS})
 PREDICTS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED})
@@ -155,7 +154,8 @@ class Verdicts(CauseJudge):
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
         there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
-        best = max(there or own, key=lambda f: f.log_bayes_factor, default=None)
+        none = CauseFinding(name="", verdict=Verdict.RULED_OUT)
+        best = max(there or own, key=lambda f: f.log_bayes_factor, default=none)
         verdict, alike, text = self._said(source, own, there)
         ends = self._at_end(there)
         beyond = (f"{name} is at the end of what is tried, {span}: it may lie beyond." for name, span in ends.items())
@@ -164,8 +164,8 @@ class Verdicts(CauseJudge):
         told = bool(pulses) and distinct_pushes(self._pulses) <= MOST_PUSHES
         complement = self._complement if told else None
         text = " ".join([text, *beyond, *([] if complement is None else [_in_words(complement)])])
-        parameters = self._values_found(best) if best is not None else {}
-        if len(there) > 1 and best is not None and best.form is None:
+        parameters = self._values_found(best)
+        if len(there) > 1 and best.form is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values_found(f).items()}
         gains = None if self._held is None else self._held.gains.get(source.name, Gains(()))
         return DriveFinding(
@@ -173,10 +173,10 @@ class Verdicts(CauseJudge):
             verdict=verdict,
             probability=self._probability(own) * (self._edges.pushed if pulses else 1.0),
             ambiguous_with=alike,
-            gain=best.log_bayes_factor if best is not None else 0.0,
-            concealed=best.confounded if best is not None else 0.0,
-            signature_rms_n=best.whole_rms if best is not None else 0.0,
-            unconcealed_rms_n=best.rms if best is not None else 0.0,
+            gain=best.log_bayes_factor,
+            concealed=best.confounded,
+            signature_rms_n=best.whole_rms,
+            unconcealed_rms_n=best.rms,
             parameters=parameters,
             parts=(*parts, *(self._pulses if told else ())),
             text=text,

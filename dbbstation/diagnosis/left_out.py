@@ -27,11 +27,12 @@ from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.chosen_anew import KnownGains
+    from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
     from dbbstation.model.observation import Observation
@@ -42,38 +43,32 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
-    groups = in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR)
-    variants = [member.variant for member in settled.members]
-    known = channel.known_with(variants)
-    blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
-    every = np.arange(len(known.prior))
-    without, having = (
-        held_out(blocks, groups, known, active, noise_mm, channel.held, single)
-        for active in (every[: len(channel.base.prior)], every)
-    )
-    return without, having
+    having = _held_out(explained, settled.members, single=single)
+    return having(settled.members), having(())
 
 
 def predicted_without(explained: Explained, left_out: Sequence[Collection[str]]) -> list[float]:
     """Return the rms error of held-out tests [mm] after omitting each set of causes; a displaced ball stays in its test."""
-    channel, settled = explained.channel, explained.settled
-    members = [m for m in settled.best.members if not m.cause.setup]
-    variants = [member.variant for member in members]
-    known = channel.known_with(variants)
+    members = [m for m in explained.settled.best.members if not m.cause.setup]
+    having = _held_out(explained, members)
+    return [having([m for m in members if m.name in names]).rms for names in left_out]
+
+
+def _held_out(
+    explained: Explained, members: Sequence[Member], single: float | None = None
+) -> Callable[[Sequence[Member]], HeldOut]:
+    """Return a function that predicts held-out tests with all members but some."""
+    channel, settled, variants = explained.channel, explained.settled, [member.variant for member in members]
+    known, base = channel.known_with(variants), len(channel.base.prior)
     blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
-    owner = np.repeat(np.arange(len(members)), [len(variant.columns) for variant in variants])
-    groups, base = (
-        in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR),
-        np.arange(len(channel.base.prior)),
-    )
-    found = []
-    for names in left_out:
-        kept = np.array([m.name not in names for m in members], dtype=bool)[owner]
-        active = np.concatenate([base, len(base) + np.flatnonzero(kept)])
-        found.append(
-            held_out(blocks, groups, known, active, max(settled.noise_mm, SMALLEST_NOISE_MM), channel.held).rms
-        )
-    return found
+    groups = in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR)
+
+    def but_for(some: Sequence[Member]) -> HeldOut:
+        out = np.concatenate([np.zeros(base, dtype=bool), *(np.full(m.width, m in some) for m in members)])
+        noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
+        return held_out(blocks, groups, known, np.flatnonzero(~out), noise_mm, channel.held, single)
+
+    return but_for
 
 
 def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, 
 from dbbstation.diagnosis.unmodelled import EACH
 from dbbstation.inference.forms import LinearSplines, Plane, PlaneStep, Walk
 from dbbstation.inference.model_comparison import Member
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import rms, root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,7 +86,7 @@ def curve_of(channel: CircleChannel, settled: SettledCircles, member: Member) ->
         readings_um=1e3 * rms(effect),
         unconcealed_um=1e3 * rms(channel.unconcealed(effect)),
         points=tuple(
-            CurvePoint(float(x), 1e3 * float(value), 1e3 * float(np.sqrt(max(variance, 0.0))))
+            CurvePoint(float(x), 1e3 * float(value), 1e3 * root(variance))
             for x, value, variance in zip(at, values, np.diag(covariance), strict=True)
         ),
     )

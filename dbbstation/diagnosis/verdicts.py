@@ -15,6 +15,7 @@ from dbbstation.inference.alternatives import standing_out
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial, concealed
+from dbbstation.inference.triangle import root
 from dbbstation.inference.verdict import OUT, SURE, Verdict
 
 if TYPE_CHECKING:
@@ -152,7 +153,7 @@ class _CircleJudge(CauseJudge):
         own, spread = member.width, self._circles.to_whole(member.variant)
         whole, variance = spread @ values[:own], np.diag(spread @ covariance[:own, :own] @ spread.T)
         return {
-            p.name: Value(float(whole[k]), float(np.sqrt(max(variance[k], 0.0))), p.unit)
+            p.name: Value(float(whole[k]), root(variance[k]), p.unit)
             for k, p in enumerate(amplitudes(source, self._circles.machine))
         }
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import NEGLIGIBLE
-from dbbstation.inference.triangle import RANK
+from dbbstation.inference.triangle import RANK, root
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def standing_out(products: Floats, plausible: Floats) -> Floats:
 
 def norm_over_sigma(products: Floats, values: Floats, covariance: Floats) -> float:
     """Return an effect's norm in standard deviations, to first order."""
-    norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
+    norm = root(float(values @ products @ values))
     if norm == 0.0:
         return 0.0
     slope = products @ values / norm

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtrc, fdtrc, ndtr
 
+from dbbstation.inference.triangle import root
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -69,7 +71,7 @@ def left_over(settled: Settled) -> LeftOver:
     used = sum(member.width for member in settled.best.members) + channel.base.samples.shape[1]
     freedom = max(float(len(left) - used), 1.0)
     square = float(left @ left) / freedom
-    beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma
+    beyond = root(square - 1.0) * settled.noise.sigma
     # The noise was estimated on the same rows with more columns, so it is about as uncertain as the square.
     looks = [ResidualTest("sum of squares", float(fdtrc(freedom, freedom, square)), beyond, "")]
     if channel.time is not None:

@@ -22,7 +22,7 @@ from dbbstation.inference.followed import (
 from dbbstation.inference.law_form import law_form
 from dbbstation.inference.left_over import SIGNIFICANT
 from dbbstation.inference.levels import ONCE, RUN, TIME, Followed, FollowsAnswer, Levels, corrects_of, difference_of
-from dbbstation.inference.triangle import squares
+from dbbstation.inference.triangle import root, squares
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE
@@ -188,7 +188,7 @@ def _straight(settled: Settled, one: VariableClass) -> tuple[Value | None, float
     samples = settled.bank.samples(columns)[channel.kept]
     weights = along @ samples / (along @ along)
     slope, effect = float(weights @ values), samples @ values
-    u = float(np.sqrt(max(widening_of(settled.bank.tails) * float(weights @ covariance @ weights), 0.0)))
+    u = root(widening_of(settled.bank.tails) * float(weights @ covariance @ weights))
     whole = squares(effect - effect.mean())
     unit = f"{channel.unit}/{variable.unit}" if variable.unit else channel.unit
     return Value(slope, u, unit), slope**2 * float(along @ along) / max(whole, 1e-300)

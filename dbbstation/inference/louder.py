@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import fdtrc
 
+from dbbstation.inference.triangle import root
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -28,7 +30,7 @@ class Louder:
     @property
     def beyond(self) -> float:
         """Return the stretches' excess rms, in the residual's unit."""
-        return float(np.sqrt(max(self.rms**2 - self.elsewhere**2, 0.0)))
+        return root(self.rms**2 - self.elsewhere**2)
 
 
 def louder(residuals: Sequence[Floats], begins: Sequence[Integers], length: int) -> Louder | None:

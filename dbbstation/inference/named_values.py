@@ -13,6 +13,7 @@ from dbbstation.inference.forms import HARMONICS
 from dbbstation.inference.jackknife import weighted_jackknife
 from dbbstation.inference.model_comparison import amplitude_size
 from dbbstation.inference.patterns import ZEROS, covers_turns, zeros_text
+from dbbstation.inference.triangle import root
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
 
@@ -64,7 +65,7 @@ def values_of_law(law: Law, member: Member, values: Floats, covariance: Floats, 
     if law.zero_from is not None and values[0]:
         moved_by = float(values[1] / values[0])
         slopes = np.array([moved_by, -1.0]) / values[0]
-        u = float(np.sqrt(max(slopes @ covariance[:2, :2] @ slopes, 0.0)))
+        u = root(slopes @ covariance[:2, :2] @ slopes)
         found["zero"] = Value(law.zero_from - moved_by, u, law.variables[0].unit)
     return found
 

@@ -14,6 +14,7 @@ from scipy.special import fdtrc
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, centred_coefficients
+from dbbstation.inference.triangle import root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,8 +86,8 @@ def remainder(
     harmonic, chance = _largest(in_harmonics, noise.freedom)
     worst, by_run = _largest(in_runs, noise.freedom)
     return Remainder(
-        Largest(min(1.0, chance * (low + 1)), harmonic, _rms(beyond[harmonic] / len(residuals) / samples)),
-        Largest(min(1.0, by_run * len(residuals)), worst, _rms(float(beyond_run[worst]) / samples)),
+        Largest(min(1.0, chance * (low + 1)), harmonic, root(beyond[harmonic] / len(residuals) / samples)),
+        Largest(min(1.0, by_run * len(residuals)), worst, root(float(beyond_run[worst]) / samples)),
         Largest(min(1.0, tried * BOUNDS.pulses * len(residuals)), run, abs(float(means[at]))),
         (at + 0.5) * 2.0 * np.pi / BOUNDS.pulses,
     )
@@ -103,7 +104,3 @@ def _stretches(residual: Floats, phase_rad: Floats) -> tuple[Floats, Integers, i
     counts = np.bincount(place, minlength=BOUNDS.pulses)
     means = np.bincount(place, residual, minlength=BOUNDS.pulses) / np.maximum(counts, 1)
     return means, counts, int(np.argmax(means**2 * counts))
-
-
-def _rms(square: float) -> float:
-    return float(np.sqrt(max(square, 0.0)))

@@ -57,6 +57,11 @@ def squares(values: Floats) -> float:
     return float(np.sum(np.square(values)))
 
 
+def root(square: float) -> float:
+    """Return the root of a square that rounding may make negative."""
+    return float(np.sqrt(max(square, 0.0)))
+
+
 def rms(values: Floats) -> float:
     """Return the root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))

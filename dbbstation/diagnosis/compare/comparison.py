@@ -27,7 +27,7 @@ from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.verdict import OUT, SURE
 from dbbstation.trace.analysis import figures
 
@@ -180,7 +180,7 @@ def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
     for pair, rows, order, own in zip(sides.pairs, sides.blocks, sides.orders, found, strict=True):
         norm = float(np.linalg.norm(own))
         towards = samples[rows].T @ (samples[rows] @ values) / max(norm, 1e-300)
-        sigma = float(np.sqrt(max(float(towards @ covariance @ towards), 0.0)))
+        sigma = root(float(towards @ covariance @ towards))
         out.append(_run(pair, settled, rows, order, own, norm / sigma if sigma > 0.0 else 0.0))
     return tuple(out)
 

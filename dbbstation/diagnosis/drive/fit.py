@@ -17,7 +17,7 @@ from dbbstation.inference.folds import FOLDS
 from dbbstation.inference.impossible import NEGATIVE_SIGMA
 from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.named_values import values_of_law
-from dbbstation.inference.triangle import RANK, triangle_of
+from dbbstation.inference.triangle import RANK, root, triangle_of
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class DriveFit:
 
     def weighted(self, weights: Floats, unit: str) -> Value:
         """Return a weighted sum of values, weights of shape (k,)."""
-        sigma = float(np.sqrt(max(float(weights @ self.covariance @ weights), 0.0)))
+        sigma = root(float(weights @ self.covariance @ weights))
         return Value(float(weights @ self.values), sigma, unit)
 
     @property

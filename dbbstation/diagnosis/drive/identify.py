@@ -35,7 +35,7 @@ from dbbstation.inference.detectable import detectable_causes
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
 from dbbstation.inference.levels_of import levels_of
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ def _number(value: Value, *, is_known: bool) -> DriveValue:
 
 
 def _beyond(residual: Floats, sigma: float) -> float:
-    return float(np.sqrt(max(float(np.mean(residual**2)) - sigma**2, 0.0)))
+    return root(float(np.mean(residual**2)) - sigma**2)
 
 
 def _rest(explained: ExplainedDrive, verdicts: Verdicts, model_n: Floats) -> UnexplainedForces:

@@ -25,7 +25,7 @@ from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import solve
-from dbbstation.inference.triangle import rms
+from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
@@ -278,8 +278,8 @@ def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple
     return tuple(
         refitted(
             name,
-            Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
-            Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]).at_least(float(moved[k])),
+            Value(float(alone.x[k]), root(before[k]), units[k]),
+            Value(float(beside.x[k]), root(after[k]), units[k]).at_least(float(moved[k])),
             float(np.clip(1.0 - before[k] / after[k], 0.0, 1.0)) if after[k] > 0.0 else 1.0,
             float(channel.base.prior[k]) if np.isfinite(channel.base.prior[k]) else None,
             stated=name in table.known,

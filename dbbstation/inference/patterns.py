@@ -141,15 +141,11 @@ class Pattern:
 
 
 _JOIN = {
+    **dict.fromkeys(
+        (Family.ONCE, Family.TWICE, Family.HYSTERESIS, Family.SPEED, Family.DRAG, Family.LAG, Family.PRODUCT), " of "
+    ),
     Family.LINEAR: " in ",
-    Family.ONCE: " of ",
-    Family.TWICE: " of ",
-    Family.HYSTERESIS: " of ",
-    Family.SPEED: " of ",
-    Family.DRAG: " of ",
-    Family.LAG: " of ",
     Family.DRIFT: " with ",
-    Family.PRODUCT: " of ",
 }
 """Words between a family and its variables."""
 

@@ -41,23 +41,9 @@ _TIMES = {
 }
 _FORCES = {"n": "N", "kn": "kN"}
 _OTHERS = {
-    "a": "A",
-    "v": "V",
-    "bar": "bar",
-    "mbar": "mbar",
-    "pa": "Pa",
-    "hpa": "hPa",
-    "kpa": "kPa",
-    "mpa": "MPa",
-    "kw": "kW",
-    "j": "J",
-    "ppm": "ppm",
-    "w": "W",
-    "hz": "Hz",
-    "kg": "kg",
-    "percent": "%",
-    "g": "g",
-}
+    unit.lower(): unit
+    for unit in ("A", "V", "bar", "mbar", "Pa", "hPa", "kPa", "MPa", "kW", "J", "ppm", "W", "Hz", "kg", "g")
+} | {"percent": "%"}
 _TEMPERATURES = {"c": "degC", "degc": "degC", "celsius": "degC", "k": "K", "kelvin": "K"}
 
 UNITS: dict[str, Meaning] = {

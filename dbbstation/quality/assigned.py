@@ -122,7 +122,7 @@ class Assigned:
             name, value, limit, "", FindingVerdict.WRONG, f"by all {len(self.runs)} circles together {short}", short
         )
 
-    @property
+    @cached_property
     def _cost(self) -> float:
         return MISTAKE + float(np.log(len(self.circles)))
 
@@ -223,22 +223,25 @@ class Assigned:
     def _mistakes(self, changes: _Changes) -> float:
         """Return the cost of mistakes; a mounting filed under another test, or an exchange of two mountings, counts as one."""
         whole: set[frozenset[str]] = set()
-        single, labels = 0, dict(changes)
-        for group in {id(group): group for group in (self._group_of[run] for run in labels)}.values():
-            changed = [k for k in group if k in labels]
-            shown = {self.circles[labels[k]].test if self._same_way(k, labels[k]) else "" for k in changed}
-            if len(changed) == len(group) and len(shown) == 1 and "" not in shown:
-                whole.add(frozenset({self.runs[group[0]].run.test, *shown}))
+        single, by_group = 0, dict[int, list[str]]()
+        for run, label in changes:
+            by_group.setdefault(self._group_of[run], []).append(self._shown(run, label))
+        for group, shown in by_group.items():
+            runs = self._groups[group]
+            if shown[0] and shown.count(shown[0]) == len(runs):
+                whole.add(frozenset({self.runs[runs[0]].run.test, shown[0]}))
             else:
-                single += len(changed)
+                single += len(shown)
         return self._cost * (len(whole) + single)
 
     @cached_property
-    def _group_of(self) -> Mapping[int, list[int]]:
-        return {run: group for group in self._groups for run in group}
+    def _group_of(self) -> Mapping[int, int]:
+        return {run: at for at, group in enumerate(self._groups) for run in group}
 
-    def _same_way(self, run: int, label: int) -> bool:
-        return label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
+    def _shown(self, run: int, label: int) -> str:
+        """Return the test of a circle that a run shows in the run's own direction; else nothing."""
+        same_way = label >= 0 and self.circles[label].circle.direction is self.runs[run].run.circle.direction
+        return self.circles[label].test if same_way else ""
 
     def information(self, labels: Sequence[int]) -> Floats:
         """Return products of whitened effects and readings, summed over runs, shape (p + 1, p + 1)."""
@@ -350,8 +353,11 @@ class _Limits:
 
 def _odds(known: Mapping[_Changes, float], run: int) -> tuple[float, float]:
     """Return the greatest log posterior density with another circle for a run, and with its planned circle."""
-    others = max((score for changes, score in known.items() if run in dict(changes)), default=-np.inf)
-    return others, max(score for changes, score in known.items() if run not in dict(changes))
+    found = [-np.inf, -np.inf]
+    for changes, score in known.items():
+        own = run not in dict(changes)
+        found[own] = max(found[own], score)
+    return found[False], found[True]
 
 
 def _likely(known: Mapping[_Changes, float]) -> list[_Changes]:

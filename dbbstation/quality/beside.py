@@ -7,6 +7,7 @@ The posterior of the shared effects, given all runs, is computed once. Runs are 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,9 @@ SIZES = np.append(0.0, SHARES)
 
 NEGLIGIBLE = -np.log(np.finfo(float).eps)
 """Log ratio below which a term of a sum is less than the rounding of the sum."""
+
+BLOCKS = 1024
+"""Number of blocks for each size that are computed at once. It affects only the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,18 +78,18 @@ class NearAssignments:
         self._readings, self.labels, shared = readings, labels, effects.shared
         wide = shared.shape[2]
         rows = shared.reshape(-1, wide)
-        logs, covariances, means = [], [], []
-        for size in SIZES:
+        count, logs, means = len(shared), [], []
+        self._covariance = np.empty((len(SIZES), count, count, COEFFICIENTS, COEFFICIENTS))
+        for size, blocks in zip(SIZES, self._covariance, strict=True):
             scale = effects.scale(size)
             root = np.linalg.cholesky(np.eye(wide) + scale[:, None] * known[:-1, :-1] * scale)
             right = (np.vstack([known[-1:, :-1], rows]) * scale).T
             white = solve_triangular(root, right, lower=True, overwrite_b=True, check_finite=False)
             logs.append(0.5 * (white[:, 0] @ white[:, 0] - known[-1, -1]) - log_diagonal(root))
-            covariances.append(white[:, 1:].T @ white[:, 1:])
+            covariance = (white[:, 1:].T @ white[:, 1:]).reshape(count, COEFFICIENTS, count, COEFFICIENTS)
+            blocks[:] = covariance.transpose(0, 2, 1, 3)
             means.append(white[:, 1:].T @ white[:, 0])
-        count = len(shared)
         self._logs = np.array(logs)
-        self._covariance = np.reshape(covariances, (len(SIZES), count, COEFFICIENTS, count, COEFFICIENTS))
         self._mean = np.reshape(means, (len(SIZES), count, COEFFICIENTS))
         self.log = float(mean_of(self._logs))
 
@@ -99,13 +103,12 @@ class NearAssignments:
         """
         found = np.empty((len(SIZES), *instead.shape[:2]))
         exchanged = self._exchanged(runs, instead)
-        if exchanged.any():
-            found[:, exchanged, 0] = self._most_of_exchanged(runs[exchanged], instead[exchanged, 0], least)
-        if not exchanged.all():
-            runs, instead = runs[~exchanged], instead[~exchanged]
+        for part in _parts(np.flatnonzero(exchanged), runs):
+            found[:, part, 0] = self._most_of_exchanged(runs[part], instead[part, 0], least)
+        for part in _parts(np.flatnonzero(~exchanged), runs):
             # However well runs are predicted, their readings scatter by their own part.
-            alone = np.sum(self._readings.alone[runs[:, None, :], instead], axis=2)
-            found[:, ~exchanged] = self._without(runs, np.arange(len(SIZES)))[2][:, :, None] - alone
+            alone = np.sum(self._readings.alone[runs[part][:, None, :], instead[part]], axis=2)
+            found[:, part] = self._without(runs[part], np.arange(len(SIZES)))[0][:, :, None] - alone
         return found
 
     def changed(self, runs: Integers, instead: Integers, most: Floats, limit: Floats) -> Floats:
@@ -119,23 +122,26 @@ class NearAssignments:
         """
         sizes = np.flatnonzero((most >= limit - NEGLIGIBLE).any(axis=1))
         before = self._readings.circles[runs, self.labels[runs]]
-        root, pull, logs = self._without(runs, sizes)
         circles, off, scatter = self._of(runs, instead)
-        turned = np.linalg.solve(root, self._between(before, circles, sizes))
-        root = np.linalg.cholesky(scatter + self._between(circles, circles, sizes) + _turned(turned) @ turned)
+        logs, pull, turned = self._without(runs, sizes, self._between(before, circles, sizes))
+        covariance = scatter + self._between(circles, circles, sizes) + _turned(turned) @ turned
         apart = (off - self._means(circles, sizes))[..., None] + _turned(turned) @ pull
-        white = np.linalg.solve(root, apart)
+        white, alone = _whitened(covariance, apart)
         found = most.copy()
-        found[sizes] = logs - 0.5 * np.sum(white**2, axis=(2, 3)) - log_diagonal(root)
+        found[sizes] = logs - 0.5 * np.sum(white**2, axis=(2, 3)) - alone
         return mean_of(found)
 
-    def _without(self, runs: Integers, sizes: Integers) -> tuple[NDArray[np.floating], NDArray[np.floating], Floats]:
-        """Return the removed runs' covariance root and whitened residuals, and log densities of the other readings."""
+    def _without(
+        self, runs: Integers, sizes: Integers, more: Floats | None = None
+    ) -> tuple[Floats, NDArray[np.floating], NDArray[np.floating]]:
+        """Return log densities of the other readings, and the removed runs' whitened residuals and further columns."""
         circles, off, scatter = self._of(runs, self.labels[runs])
-        root = np.linalg.cholesky(scatter - self._between(circles, circles, sizes))
-        pull = np.linalg.solve(root, (off - self._means(circles, sizes))[..., None])
-        logs = self._logs[sizes, None] + 0.5 * np.sum(pull**2, axis=(2, 3)) - log_diagonal(root)
-        return root, pull, logs + 2.0 * np.sum(self._readings.alone[runs, self.labels[runs]], axis=1)
+        apart = (off - self._means(circles, sizes))[..., None]
+        columns = apart if more is None else np.concatenate([apart, more], axis=3)
+        white, alone = _whitened(scatter - self._between(circles, circles, sizes), columns)
+        pull = white[..., :1]
+        logs = self._logs[sizes, None] + 0.5 * np.sum(pull**2, axis=(2, 3)) - alone
+        return logs + 2.0 * np.sum(self._readings.alone[runs, self.labels[runs]], axis=1), pull, white[..., 1:]
 
     def _exchanged(self, runs: Integers, instead: Integers) -> Flags:
         """Return whether runs only exchange their circles, shape (m,)."""
@@ -149,29 +155,38 @@ class NearAssignments:
         Any multipliers of the readings give a bound [weak duality, Boyd and Vandenberghe, Convex Optimization (2004),
         5.2.2]. These multipliers are optimal if all runs have the same noise.
         """
-        labels, every = self.labels[runs], np.arange(len(self.labels))
+        labels, precision = self.labels[runs], self._precision[runs]
         at = np.take_along_axis(np.argsort(instead, axis=1), np.argsort(np.argsort(labels, axis=1), axis=1), axis=1)
         shown = np.take_along_axis(runs, at, axis=1)
-        circles, own = self._readings.circles[every, self.labels], self._readings.scatter[every, self.labels]
+        circles = self._readings.circles[runs, labels]
         more = self._readings.off[shown, labels] - self._readings.off[runs, labels]
         wider = (self._readings.scatter[shown, labels] - self._readings.scatter[runs, labels])[..., 0, 0]
         # Scatters of one circle differ by noise only, which is equal for all coefficients.
         known = self._readings.alone[runs, labels] - self._readings.alone[shown, labels]
-        left = self._readings.off[every, self.labels] - self._mean[:, circles]
-        pull = np.linalg.solve(own, left[..., None])[..., 0][:, runs]
+        pull = self._pull[:, runs]
         logs = self._logs[:, None] + np.sum(np.maximum(known, 0.0), axis=1)
         found = logs - np.sum(pull * more, axis=(2, 3)) + 0.5 * np.sum(wider[..., None] * pull**2, axis=(2, 3))
         sizes = np.flatnonzero((found >= least - NEGLIGIBLE).any(axis=1))
-        weighed = np.linalg.solve(own[runs], more[..., None])[..., 0].reshape(
-            len(runs), COEFFICIENTS * runs.shape[1], 1
-        )
-        shared = (self._between(circles[runs], circles[runs], sizes) @ weighed).reshape(len(sizes), *more.shape, 1)
-        weighed = weighed.reshape(more.shape) - np.linalg.solve(own[runs], shared)[..., 0]
+        weighed = precision @ more[..., None]
+        shared = self._between(circles, circles, sizes) @ weighed.reshape(len(runs), -1, 1)
+        weighed = (weighed - precision @ shared.reshape(-1, *weighed.shape))[..., 0]
         square = np.sum(weighed * more, axis=(2, 3))
         pull = pull[sizes]
         better = logs[sizes] - np.sum(pull * more, axis=(2, 3)) - 0.5 * square
         found[sizes] = better + 0.5 * np.sum(wider[..., None] * (pull + weighed) ** 2, axis=(2, 3))
         return found
+
+    @cached_property
+    def _precision(self) -> NDArray[np.floating]:
+        """Return the inverse covariance of each run's own part, shape (n, 7, 7) [1/µm²]."""
+        return np.linalg.inv(self._readings.scatter[np.arange(len(self.labels)), self.labels])
+
+    @cached_property
+    def _pull(self) -> Floats:
+        """Return the readings multiplied by their inverse covariance, shape (s, n, 7) [1/µm]."""
+        every = np.arange(len(self.labels))
+        left = self._readings.off[every, self.labels] - self._mean[:, self._readings.circles[every, self.labels]]
+        return (self._precision @ left[..., None])[..., 0]
 
     def _of(self, runs: Integers, labels: Integers) -> tuple[Integers, Floats, Floats]:
         """Return circles, shape (m, k), readings minus expectation, (m, 7 k), and their own covariance, (m, 7 k, 7 k)."""
@@ -184,17 +199,34 @@ class NearAssignments:
 
     def _between(self, one: Integers, other: Integers, sizes: Integers) -> Floats:
         """Return covariances between circles, shape (s, m, 7 k, 7 k) [µm²]."""
-        found = self._covariance[sizes][:, one[:, :, None], :, other[:, None, :], :]
+        found = self._covariance[sizes[:, None, None, None], one[:, :, None], other[:, None, :]]
         wide = COEFFICIENTS * one.shape[1]
-        return found.transpose(3, 0, 1, 4, 2, 5).reshape(len(sizes), len(one), wide, wide)
+        return found.swapaxes(3, 4).reshape(len(sizes), len(one), wide, wide)
 
     def _means(self, circles: Integers, sizes: Integers) -> Floats:
         return self._mean[sizes][:, circles].reshape(len(sizes), len(circles), COEFFICIENTS * circles.shape[1])
 
 
+def _parts(places: Integers, runs: Integers) -> list[Integers]:
+    """Return places in parts of limited size."""
+    return np.array_split(places, -(-len(places) * runs.shape[1] ** 2 // BLOCKS)) if len(places) else []
+
+
 def mean_of(logs: Floats) -> Floats:
     """Return the log of the mean density over SIZES, the first axis."""
     return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(SIZES)))
+
+
+def _whitened(covariance: Floats, columns: Floats) -> tuple[NDArray[np.floating], Floats]:
+    """Return columns multiplied by the inverse root of covariances, and half the covariances' log determinants."""
+    # The rows that border a matrix become such products in its Cholesky factor [Golub and Van Loan, 4.2].
+    n, k = columns.shape[-2:]
+    bordered = np.empty((*columns.shape[:-2], n + k, n + k))
+    bordered[..., :n, :n] = covariance
+    bordered[..., n:, :n] = _turned(columns)
+    bordered[..., n:, n:] = np.finfo(float).max * np.eye(k)
+    root = np.linalg.cholesky(bordered)
+    return _turned(root[..., n:, :n]), log_diagonal(root[..., :n, :n])
 
 
 def _turned(matrices: NDArray[np.floating]) -> NDArray[np.floating]:

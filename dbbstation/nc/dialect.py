@@ -125,5 +125,6 @@ class Dialect(ABC):
         if not path.is_move.any():
             if says_compensated(path):
                 raise already_compensated(name, "says its header")
-            raise InputError.of(name, "this program moves nothing", "check that it is the file you mean")
+            remedy = "check that it is the file you mean: subprograms move only if a program calls them"
+            raise InputError.of(name, "this program moves nothing", remedy)
         return path

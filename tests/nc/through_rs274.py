@@ -25,6 +25,9 @@ MOVES = {"RAPID", "FEED", "ARC"}
 PRINTED = 0.51e-4
 """Half the last decimal that the interpreter prints [mm, deg, in]."""
 
+ROUNDINGS = 3
+"""A place is the sum of three numbers that the interpreter prints: position, work offset and G92."""
+
 CHORD_MM = 1.5e-4
 """The chord that was asked for, and what our own arcs add to it [mm]."""
 
@@ -165,7 +168,9 @@ class _Walk:
     def _check_on(there: np.ndarray, pose: np.ndarray, slack_mm: float, what: str) -> None:
         x, y, z, *angles = (pose - there).tolist()
         tilt_mm = LEVER_MM * math.radians(math.hypot(*angles))
-        if math.hypot(x, y, z) > 2.0 * slack_mm or tilt_mm > 2.0 * slack_mm + LEVER_MM * math.radians(2 * PRINTED):
+        if max(abs(x), abs(y), abs(z)) > ROUNDINGS * slack_mm or tilt_mm > 2.0 * slack_mm + LEVER_MM * math.radians(
+            2 * PRINTED
+        ):
             raise DiffersError(f"{what}: {pose} in place of {there}")
 
     def _check_time(self, index: int, place: int, end: int) -> None:

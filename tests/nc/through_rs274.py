@@ -155,7 +155,7 @@ class _Walk:
             for pose, name in ((self.middle[end], "middle"), (self.tool[end], "end")):
                 there = way.nearest(pose)
                 self._check_on(there, pose, slack + CHORD_MM, f"{name} of piece {end - place} of move {index}")
-            if way.is_at_end(self.tool[end], 2.0 * slack) and not self._comes_nearer(end, event):
+            if way.is_at_end(self.tool[end], ROUNDINGS * slack) and not self._comes_nearer(end, event):
                 return end + 1
         raise DiffersError(f"move {index} does not reach {event.pose}")
 

@@ -40,6 +40,10 @@ def written(linuxcnc, text: str) -> list[str]:
         "G54",
         "G59.3",
         "M7",
+        "M50 P0",
+        "M51",
+        "M52 P1",
+        "M53 P0",
         "M62 P1",
         "M67 E0 Q-1.5",
         "M101",
@@ -49,6 +53,13 @@ def written(linuxcnc, text: str) -> list[str]:
 )
 def test_a_word_is_written_as_it_was(linuxcnc, line):
     assert line in written(linuxcnc, f"{FIRST}{line}\nG1 X1 F100\nM2\n")
+
+
+def test_a_switch_that_stored_modes_would_set_back_is_refused(linuxcnc):
+    """M70 stores overrides and feed stop [LinuxCNC, M70], and the program that is written restores none."""
+    with pytest.raises(InputError, match=r"4:1: M50 between modes that are stored"):
+        linuxcnc.read(f"{FIRST}M70\nM50 P0\nG1 X1 F100\nM72\nM2\n", "part.ngc")
+    assert "M50 P0" in written(linuxcnc, f"{FIRST}M50 P0\nM70\nG91\nG1 X1 F100\nM72\nM2\n")
 
 
 def test_a_message_has_the_values_that_its_parameters_had(linuxcnc):

@@ -39,7 +39,7 @@ class LinuxCNC(WordDialect):
     what = "LinuxCNC (RS274/NGC)"
     look_ahead = LookAhead(share=0.5)
     takes_setup = True
-    functions = r"[STEPQ]-?[0-9.]+|G97|M(?:[3-9]|48|49|6[1-57-8]|1[0-9]{2})"
+    functions = r"[STEPQ]-?[0-9.]+|G97|M(?:[3-9]|48|49|5[0-3]|6[1-57-8]|1[0-9]{2})"
     systems = r"[\s\S]*"
     instead = MappingProxyType({"(": "[", ")": "]"})
     words = MappingProxyType(

@@ -60,6 +60,9 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((98, 99), ModalGroup.RETRACT),
 }
 
+SWITCHES = (50.0, 51.0, 52.0, 53.0)
+"""Switches of feed and spindle override, adaptive feed and feed stop."""
+
 M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((0, 1, 2, 30), ModalGroup.STOP),
     **dict.fromkeys((3, 4, 5), ModalGroup.SPINDLE),
@@ -68,7 +71,7 @@ M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
     **dict.fromkeys((98, 99), ModalGroup.CALL),
     **dict.fromkeys((70, 71, 72, 73), ModalGroup.STATE),
-    **dict.fromkeys((62, 63, 64, 65, 67, 68, *range(100, 198), 199), ModalGroup.OUTPUT),
+    **dict.fromkeys((*SWITCHES, 62, 63, 64, 65, 67, 68, *range(100, 198), 199), ModalGroup.OUTPUT),
 }
 
 STORED: dict[ModalGroup, str] = {

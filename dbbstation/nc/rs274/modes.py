@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES
-from dbbstation.nc.rs274.codes import CURVES, CYCLES, STORED, ModalGroup, name
+from dbbstation.nc.rs274.codes import CURVES, CYCLES, STORED, SWITCHES, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.expressions import shown
@@ -208,6 +208,9 @@ class Modes:
         self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
         output = block.codes.get(ModalGroup.OUTPUT)
+        if self._stored and output is not None and output.value in SWITCHES:
+            what = f"M{output.value:g} between modes that are stored (M70, M73) and come back"
+            raise block.fault(what, "write it before them, or behind", output)
         said += [] if output is None else [output, *(block.words.pop(letter, None) for letter in "EPQ")]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:

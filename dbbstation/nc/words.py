@@ -1,4 +1,4 @@
-"""Write a toolpath as lines of words, with one method for each kind of row."""
+"""Write a toolpath as lines of words, with one method for each kind of row, of its name in small letters."""
 
 from __future__ import annotations
 
@@ -276,14 +276,8 @@ class WordDialect(Dialect):
             return self.dwell(float(toolpath.dwell_s[row]))
         if kind == RowKind.OPTIONAL_STOP:
             return self.optional_stop()
-        said = {
-            RowKind.PAUSE: self.pause,
-            RowKind.COMMENT: self.comment,
-            RowKind.FUNCTION: self.function,
-            RowKind.MESSAGE: self.message,
-            RowKind.SYSTEM: self.system,
-        }
-        return said[kind](text)
+        written: Callable[[str], str] = getattr(self, kind.name.lower())
+        return written(text)
 
     def _words(self, toolpath: Toolpath, changed: Flags) -> list[str]:
         numbers = np.rint(toolpath.numbers_written * 10.0 ** np.array(self.decimals)).astype(np.int64)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from dbbstation.nc.rs274.codes import TAPS, name
-from dbbstation.nc.rs274.state import AXES, unknown_place
+from dbbstation.nc.rs274.state import unknown_place, unplaced
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -84,8 +82,7 @@ class ModalCycle:
         if lacking:
             what = f"{name('G', code)} needs {' and '.join(sorted(lacking))}"
             raise block.fault(what, "give them in its line", column)
-        unknown = [each for each, at in zip(AXES, state.pose, strict=True) if np.isnan(at)]
-        up = self.begun_at
+        unknown, up = unplaced(state.pose), self.begun_at
         if unknown or math.isnan(up):
             raise unknown_place(block, unknown or ["Z"])
         clear = numbers["R"] + (offset if absolute else up)

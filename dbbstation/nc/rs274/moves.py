@@ -13,7 +13,7 @@ from dbbstation.nc.rs274.arcs import Arc
 from dbbstation.nc.rs274.codes import CURVES, CYCLES, TAPS, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, NoRoomError, element_of, with_plane
 from dbbstation.nc.rs274.cycles import cycle_steps
-from dbbstation.nc.rs274.state import AXES, unknown_place
+from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
 from dbbstation.nc.toolpath import (
     IN_FORCE,
     LEAST_MM,
@@ -37,6 +37,8 @@ steps of 0.05 mm. Rows take 0.4 GB, and the program 0.3 kB a row while it is com
 
 FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
 """Largest coordinates that increments may reach, equal to the largest numbers of a program."""
+
+FARTHEST = (*[FARTHEST_MM] * 3, *[FARTHEST_DEG] * 3)
 
 FLOATING = "G74 and G84 tap with a floating chuck, as in LinuxCNC: the spindle turns back at the bottom, and F is kept"
 
@@ -104,10 +106,9 @@ class Moves(Modes):
         ):
             what = f"{name('G', code.value)} is a curve in X and Y, without G41, G42, G90.1 and another motion"
             raise block.fault(what, CURVES, code)
-        if np.isnan(self._state.pose).any():
-            raise unknown_place(
-                block, [letter for letter, at in zip(AXES, self._state.pose, strict=True) if np.isnan(at)]
-            )
+        unknown = unplaced(self._state.pose)
+        if unknown:
+            raise unknown_place(block, unknown)
         self._begin_motion(code.value)
         poses = curve_of(block, self._state, self._target(block))
         length_mm = float(lengths(np.diff(poses[:, :3], axis=0, prepend=self._state.pose[None, :3])).sum())
@@ -119,7 +120,7 @@ class Moves(Modes):
     def _go_beside(self, cutter: Cutter, block: ProgramBlock, target: Floats) -> None:
         arc = self._arc(block, target) if self._motion in ARCS else None
         if self._motion != RAPID:
-            self._check_feed(block, block.first_column)
+            self._check_feed(block)
         self._begin_move(block, target)
         plane = PLANES[self._plane]
         begin, end = (complex(*pose[plane]) for pose in (self._state.pose, target))
@@ -193,7 +194,7 @@ class Moves(Modes):
         in_machine: bool = False,
         arc: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        self._check_feed(block, block.first_column)
+        self._check_feed(block)
         self._begin_move(block, poses[-1])
         speed, unknown = self._speed, bits_of(np.isnan(poses[-1]))
         if self._per_move:  # G93: one over the minutes of the move
@@ -218,7 +219,7 @@ class Moves(Modes):
         if not self._absolute:
             raise block.fault("G53 is allowed only with absolute distances (G90)", "write G90 before it", machine)
 
-    def _check_feed(self, block: ProgramBlock, column: int) -> None:
+    def _check_feed(self, block: ProgramBlock, column: int | None = None) -> None:
         if self._unsure_feed is not None:
             raise self._unsure_feed
         if self._speed.mm_min <= 0.0:
@@ -240,14 +241,10 @@ class Moves(Modes):
         if not block.words.keys().isdisjoint(POLAR):
             target[:2] = self._by_angle(block, target, offset)
         if self._motion != RAPID and not through:
-            unknown = [letter for letter, value in zip(AXES, target, strict=True) if math.isnan(value)]
+            unknown = unplaced(target)
             if unknown:
                 self._cut_somewhere(block, unknown)
-        known = [value for value in target if not math.isnan(value)]
-        if max(map(abs, known), default=0.0) > FARTHEST_DEG and (
-            max((abs(value) for value in target[:3] if not math.isnan(value)), default=0.0) > FARTHEST_MM
-            or max((abs(value) for value in target[3:] if not math.isnan(value)), default=0.0) > FARTHEST_DEG
-        ):
+        if any(abs(value) > far for value, far in zip(target, FARTHEST, strict=True)):
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
             raise block.fault(what, "check the numbers, and whether G91 or G20 is in force")
         return np.array(target)

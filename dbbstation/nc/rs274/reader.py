@@ -13,7 +13,7 @@ from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
 from dbbstation.nc.rs274.plain import LEAST_LINES, going_on
-from dbbstation.nc.rs274.state import AXES, unknown_place
+from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.toolpath import (
@@ -107,8 +107,7 @@ class _Interpreter(Moves):
             self._check_places(block)
 
     def _check_places(self, block: ProgramBlock) -> None:
-        away = [math.isnan(value) and axis not in self._away for axis, value in enumerate(self._state.pose)]
-        unknown = [letter for letter, missing in zip(AXES, away, strict=True) if missing]
+        unknown = [letter for letter in unplaced(self._state.pose) if AXES.index(letter) not in self._away]
         place, fault = self._unplaced or (block.place, unknown_place(block, unknown, ""))
         if unknown:
             raise fault
@@ -281,7 +280,7 @@ class _Interpreter(Moves):
         if once == MACHINE:
             self._check_machine(block.codes[ModalGroup.ONCE], block, named)
         if motion == LINEAR and once not in TAKES_AXES:
-            self._check_feed(block, block.first_column)
+            self._check_feed(block)
         if named or self._goes_nowhere(block, motion, once):
             self._go_to(block, named, in_machine=once == MACHINE)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,8 @@ from dbbstation.nc.toolpath import SYSTEMS
 from dbbstation.nc.words import digits
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.tokens import BadLine, Word
@@ -187,6 +190,11 @@ class ControlState:
             )
             raise block.fault(what, f"move {AXES[axis]} to a known position first, or give --start", word)
         return float(self.pose[axis])
+
+
+def unplaced(pose: Iterable[float]) -> list[str]:
+    """Return the axes that are NaN in a pose, shape (6,)."""
+    return [letter for letter, at in zip(AXES, pose, strict=True) if math.isnan(at)]
 
 
 def unknown_place(block: ProgramBlock, axes: list[str], when: str = " before this move") -> BadLine:

@@ -120,7 +120,9 @@ def is_marked(toolpath: Toolpath) -> bool:
 def has_marks(sums: NDArray[np.uint64], count: int | None = None) -> bool:
     """Return whether more poses are marked than chance explains, from their `sums_of`; `count` is the number of different poses."""
     count = _distinct(sums) if count is None else count
-    hits = {bits: _distinct(sums[_has_mark(sums, bits)]) for bits in BITS.values()}
+    fewest = sorted(BITS.values())
+    marks = _marks(sums, _MIXING, np.append(_SHIFTS, 64 - np.array(fewest, dtype=np.uint64)))
+    hits = {bits: _distinct(sums[marks > fewer]) for fewer, bits in enumerate(fewest)}
     return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in hits.items())
 
 
@@ -169,7 +171,7 @@ def _first_marked(
     mixing: NDArray[np.uint64],
     shifts: NDArray[np.uint64],
 ) -> Integers:
-    """Return the first step that marks each row without moving a fixed axis, -1 if none, shape (n,); as `_has_mark`."""
+    """Return the first step that marks each row without moving a fixed axis, -1 if none, shape (n,)."""
     chosen = np.full(len(sums), -1)
     for row in range(len(sums)):
         for step in range(len(step_sums)):
@@ -191,15 +193,14 @@ def _sums(numbers: Integers, axes: slice = slice(None)) -> NDArray[np.uint64]:
     return weighted
 
 
-def _has_mark(sums: NDArray[np.uint64], bits: int) -> Flags:
-    return _begin_with_zeros(sums, _MIXING, np.append(_SHIFTS, np.uint64(64 - bits)))
-
-
 @compiled
-def _begin_with_zeros(sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> Flags:
-    found = np.zeros(len(sums), dtype=np.bool_)
+def _marks(sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> Integers:
+    """Return how many of the shifts from the fourth on leave zero of each hash, shape (n,)."""
+    found = np.zeros(len(sums), dtype=np.int64)
     for row in range(len(sums)):
-        found[row] = _mixed(sums[row], mixing, shifts) >> shifts[3] == 0
+        mixed = _mixed(sums[row], mixing, shifts)
+        for shift in shifts[3:]:
+            found[row] += mixed >> shift == 0
     return found
 
 

@@ -40,9 +40,9 @@ ORDER_DEG = 0.05
 """Longest piece of a move that turns, in another order of rotation. Its middle leaves the turn by the square of it: at most
 0.02 µm at a point 100 mm from the tip."""
 
-ROWS_AT_ONCE = 8_000
+ROWS_AT_ONCE = 5_000
 """Rows that are handled together. A program of 50,000 blocks takes a tenth longer with 20,000 rows, whose arrays leave the
-processor's cache, and a twentieth with 4,000."""
+processor's cache; one of 10,000 takes a twentieth longer with 8,000."""
 
 
 class RowKind(IntEnum):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import logsumexp
@@ -241,12 +241,6 @@ class ClassGain:
     gains: DensityGains
     before: float
     after: float
-
-    @property
-    def figures(self) -> dict[str, Any]:
-        """Return the figures of a class's answer."""
-        of = {"before": self.before, "after": self.after, "gain": self.gains.total}
-        return of | {"gain_without_best": self.gains.without_best, "parts_with_gain": self.gains.share_with_gain}
 
     @property
     def predicts(self) -> bool:

@@ -62,6 +62,7 @@ _MODULES = {
     "compensate": "programs.compensate",
     "instrument": "instruments.instrument",
     "program": "programs.program",
+    "simulate": "predict.simulate",
 }
 
 

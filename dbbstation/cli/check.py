@@ -13,7 +13,6 @@ from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE
 from dbbstation.cli.output import echo, echo_line
 from dbbstation.tasks import options as o
-from dbbstation.tasks.chosen import chosen_of
 from dbbstation.tasks.declare import Names, Option
 
 if TYPE_CHECKING:
@@ -175,15 +174,18 @@ def _print(results: Sequence[Checked], runs: Sequence[DryRunResult]) -> None:
 
 
 def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlanResult]:
-    from dbbstation.cli.sampling import sampled_circles, sampling_notes
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.instrument.library import load_instrument
+    from dbbstation.plan.sampling import sampled_circles, sampling_notes
     from dbbstation.results.checked import SampledPlanResult
 
     protocol = load_instrument(instrument, profile)
+    rate_hz = protocol.fastest_hz()
     read = [(file, read_plan(file)) for file in plans]
     return [
-        SampledPlanResult(str(file), sampled_circles(plan, protocol), tuple(sampling_notes(plan, protocol)))
+        SampledPlanResult(
+            str(file), sampled_circles(plan, rate_hz), tuple(sampling_notes(plan, protocol.label, rate_hz))
+        )
         for file, plan in read
     ]
 
@@ -233,6 +235,7 @@ def _dry_run(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.nc.export import dry_run
+    from dbbstation.plan.plan import chosen_of
     from dbbstation.results.checked import DryRunResult
 
     plan, machine = read_plan(plan_file), read_machine(machine_file)

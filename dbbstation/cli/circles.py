@@ -13,8 +13,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dbbstation.results.circle_figures import CircleFiguresResult, PairFigures, QuickLookResult, RunWithoutCircle
-    from dbbstation.results.circles import CirclesResult
+    from dbbstation.results.circles import (
+        CircleFiguresResult,
+        CirclesResult,
+        PairFigures,
+        QuickLookResult,
+        RunWithoutCircle,
+    )
 
 
 def show(
@@ -39,7 +44,7 @@ circles = command(task, show, CommandOutput("table", table=True, field="csv"), f
 
 def _print(result: CirclesResult, *, several: bool) -> None:
     from dbbstation.cli.output import EXPANDED, print_table
-    from dbbstation.results.circle_figures import RunWithoutCircle
+    from dbbstation.results.circles import RunWithoutCircle
 
     echo(f"figures of {result.edition}, filter: {result.filter}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
@@ -129,7 +134,7 @@ def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:
 
 
 def _with_budgets(result: CirclesResult) -> list[CircleFiguresResult | PairFigures]:
-    from dbbstation.results.circle_figures import RunWithoutCircle
+    from dbbstation.results.circles import RunWithoutCircle
 
     return [*(run for run in result.runs if not isinstance(run, RunWithoutCircle)), *result.pairs]
 

@@ -12,8 +12,8 @@ import click
 from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.output import echo, say
 from dbbstation.tasks import options as o
-from dbbstation.tasks.control_state import numbers_of
 from dbbstation.tasks.declare import Names, Option
+from dbbstation.tasks.options import numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -75,8 +75,8 @@ def fleet(
     from dbbstation.cli.shop import shop_settings
     from dbbstation.files.atomic import refuse_outputs
     from dbbstation.files.formats.settings import Settings
+    from dbbstation.tasks.fleet import FORMATS, write_fleet_table
     from dbbstation.tasks.fleet import fleet as worked_out
-    from dbbstation.tasks.fleet_table import FORMATS, write_fleet_table
     from dbbstation.tasks.fleet_work import FleetOptions
 
     _refuse_options_of_others(task)

@@ -122,7 +122,7 @@ instrument = LazyGroup(
     name="instrument",
     table=TABLE,
     package="dbbstation.cli",
-    modules={"list": "instruments.instruments", "ports": "instruments.ports"},
+    modules={"list": "instruments.instruments", "ports": "instruments.ports", "replay": "monitor.replay"},
     help="""List instruments and ports, read an instrument, decode its recorded bytes, or emulate one.
 
 \b

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
+import sys
 import threading
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import click
 
-from dbbstation.cli.asked import Asked, at_a_terminal
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import OpenLine, RateHz, spying
-from dbbstation.cli.output import echo
-from dbbstation.cli.sampling import say_sampling
+from dbbstation.cli.output import echo, say
 from dbbstation.cli.session_options import RecordingOptions
-from dbbstation.system.ports import SLOWEST
+from dbbstation.system.ports import SLOWEST, is_virtual
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -25,10 +24,92 @@ from dbbstation.tasks.declare import Option
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from dbbstation.cli.instrument_options import LineOptions
+    from dbbstation.files.formats.session import ReadBy
+    from dbbstation.instrument.protocol import Protocol
     from dbbstation.plan.circle import Direction
-    from dbbstation.station.assembly import Workplace
+    from dbbstation.plan.plan import Plan
+    from dbbstation.station.assembly import Job, Workplace
     from dbbstation.station.engine import Station
     from dbbstation.system.signals import Signals
+
+
+def at_a_terminal() -> bool:
+    """Return whether a screen can be shown and read."""
+    return sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options of one measurement."""
+
+    line: LineOptions
+    noted: RecordingOptions
+    plan: Path | None
+    machine: Path | None
+    out: Path | None
+    rate_hz: float | None
+    time_scale: float
+
+    @property
+    def of_operator(self) -> bool:
+        """Return whether `--job` names the job file of an operator."""
+        return self.noted.job.endswith((".yaml", ".yml"))
+
+    def require(self) -> None:
+        """Refuse missing options.
+
+        Raises:
+            click.UsageError: names the missing options.
+        """
+        needed = {
+            "--plan": self.plan,
+            "--machine": self.machine,
+            "--instrument": self.line.instrument,
+            "--port": self.line.port,
+            "--out": self.out,
+        }
+        missing = [name for name, value in needed.items() if not value]
+        if missing:
+            raise click.UsageError(f"missing {', '.join(missing)}; --virtual on a terminal needs none of them")
+
+    def job(self) -> tuple[Job, Protocol]:
+        """Return the job for a machine in real time, and the instrument's protocol. Call `require` first.
+
+        Raises:
+            StationError: every fault of the files and of the instrument's name.
+            click.UsageError: facts of bar or shop that do not fit together.
+        """
+        from dbbstation.files.formats.machine import read_machine
+        from dbbstation.files.formats.plan import read_inline_plan
+        from dbbstation.instrument.library import at_rate
+        from dbbstation.station.assembly import Job
+        from dbbstation.station.programs import load_programs
+
+        if self.plan is None or self.machine is None or self.out is None:
+            raise ValueError("plan, machine and folder are required before a job is made of them")
+        nominal, whole = read_machine(self.machine), self.noted.in_force(read_inline_plan(self.plan))
+        protocol = at_rate(self.line.protocol(bar_length_mm=self.noted.stated_length_mm()), self.rate_hz)
+        programs = self.noted.programs
+        job = Job(
+            machine=nominal,
+            plan=whole,
+            folder=self.out,
+            details=self.noted.details(protocol.length.stroke_mm),
+            programs={} if programs is None else load_programs(programs, whole.to_domain(), nominal),
+            rate_hz=protocol.fastest_hz(self.line.baud),
+            range_mm=protocol.length.range_mm,
+            model=self.noted.judging_model(),
+            instrument=self.read_by(protocol),
+        )
+        return job, protocol
+
+    def read_by(self, protocol: Protocol) -> ReadBy:
+        """Return the session's note on the instrument."""
+        from dbbstation.files.formats.session import ReadBy
+
+        return ReadBy(protocol.name, self.line.profile or "", self.line.port, is_virtual(self.line.port))
+
 
 _WAITING_SCALE = 100.0
 """Approximate speed of a waiting machine's time relative to real time."""
@@ -216,3 +297,11 @@ class VirtualHands:
         """Start a circle."""
         self._client.free()
         self._client.ask("start", test, direction, *([program] if program else []))
+
+
+def say_sampling(plan: Plan, protocol: Protocol, baud: int | None) -> None:
+    """Print the instrument's readings of the circles."""
+    from dbbstation.plan.sampling import sampling_notes
+
+    for note in sampling_notes(plan, protocol.label, protocol.fastest_hz(baud)):
+        say(f"note: {note}")

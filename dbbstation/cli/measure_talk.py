@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
 from dbbstation.cli.progress import COUNTED, ProgressBar
-from dbbstation.results.measured import CompletedRun, MeasuredSession, RecordedRun
+from dbbstation.results.sessions import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, AddNote, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start

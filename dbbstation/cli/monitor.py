@@ -1,13 +1,16 @@
-"""`dbbstation instrument monitor`: live reading of an instrument."""
+"""`dbbstation instrument monitor` and `replay`: readings of an instrument, live or from a byte log."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import click
+
 from dbbstation.cli.declared import made
-from dbbstation.cli.instrument_options import LineOptions, Spy, spying
+from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE, ZERO_MM, LineOptions, Spy, spying
 from dbbstation.cli.output import echo, json_text
 from dbbstation.cli.provenance import provenance
 from dbbstation.tasks import options as o
@@ -68,10 +71,14 @@ def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
         row |= {"t_uncertainty_s": reading.t_uncertainty_s}
         echo(json_text(row))
         return
+    echo(f"{t_s:10.3f} s {_in_words(reading)}")
+
+
+def _in_words(reading: Reading) -> str:
     length = f"{reading.length_mm:14.5f} mm" if reading.length_mm is not None else f"{'--':>14}   "
     lost = f"  ({reading.lost} lost before)" if reading.lost else ""
     said = f"  {reading.status}: {reading.said}" if reading.status != "ok" else ""
-    echo(f"{t_s:10.3f} s {length}{lost}{said}")
+    return f"{length}{lost}{said}"
 
 
 def _conclude(tally: Tally, *, as_json: bool) -> None:
@@ -89,3 +96,55 @@ def _conclude(tally: Tally, *, as_json: bool) -> None:
     if tally.rejected:
         text += f" ({', '.join(f'{count} by {reason}' for reason, count in sorted(tally.rejected.items()))})"
     echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)
+
+
+@made()
+def replay(
+    file: Annotated[Path, Option("byte log.", kind="argument")],
+    *,
+    instrument: Annotated[str | None, replace(INSTRUMENT, setting="", usual="that of the log")] = None,
+    profile: Annotated[str | None, replace(PROFILE, setting="", usual="that of the log")] = None,
+    zero_mm: Annotated[float | None, replace(ZERO_MM, usual="lengths count from zero")] = None,
+    as_json: o.Json = False,
+) -> None:
+    r"""Decode a byte log of `--spy` or `monitor --log`: print every reading, and all bytes that it does not understand.
+
+    \b
+    Examples:
+      dbbstation instrument replay bytes.txt
+      dbbstation instrument replay bytes.txt --instrument streaming-encoder --json
+    """
+    from dbbstation.cli.output import print_json
+    from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
+    from dbbstation.instrument.library import load_instrument, with_zero
+    from dbbstation.instrument.reading import DOUBTFUL
+    from dbbstation.instrument.replay import replayed
+
+    of_log, profile_of_log = logged_instrument(file)
+    name = instrument or of_log
+    if not name:
+        raise click.UsageError(
+            "the log does not name its instrument: give --instrument with a name or a file, as in --instrument ./my-gauge.yaml"
+        )
+    # The profile of the log is one of the log's instrument.
+    protocol = load_instrument(name, profile or (profile_of_log if instrument in {None, of_log} else None))
+    if zero_mm is not None:
+        protocol = with_zero(protocol, zero_mm)
+    say = (lambda _text: None) if as_json else echo
+    readings, unread, lost, doubtful, unread_bytes = [], [], 0, 0, 0
+    for row in replayed(protocol, read_byte_log(file), where=str(file)):
+        one = row.reading
+        if one is None:
+            unread_bytes += len(row.raw)
+            unread.append({"t_s": row.t_s, "bytes": row.raw.hex(" "), "why": row.why})
+            say(f"{row.t_s:12.6f} s  not understood: {row.raw.hex(' ')}" + (f"  ({row.why})" if row.why else ""))
+            continue
+        lost += one.lost
+        doubtful += one.status == DOUBTFUL
+        readings.append({"t_s": row.t_s, "length_mm": one.length_mm, "status": one.status, "lost": one.lost})
+        say(f"{row.t_s:12.6f} s {_in_words(one)}")
+    if as_json:
+        print_json({"readings": readings, "lost": lost, "doubtful": doubtful, "not_understood": unread})
+    else:
+        text = f"{len(readings)} readings, {lost} lost, {doubtful} doubtful, {unread_bytes} bytes not understood"
+        echo(text, err=True)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.instrument_options import spying
+from dbbstation.cli.measure import say_sampling
 from dbbstation.cli.output import echo
-from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 from dbbstation.system.ports import FASTEST, virtual_port
 from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered, ended_when_hung_up
@@ -21,7 +21,7 @@ from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered, ended_w
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dbbstation.cli.asked import Asked
+    from dbbstation.cli.measure import Asked
     from dbbstation.cli.session_options import RecordingOptions
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.choice import Choice, Limits

@@ -1,14 +1,16 @@
-"""`dbbstation predict`: actual poses for commanded ones."""
+"""`dbbstation predict` and `simulate`: poses and recordings as a model predicts them."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command
-from dbbstation.tasks.predict import predict as task
+from dbbstation.tasks.predict import predict as predict_task
+from dbbstation.tasks.simulate import simulate as simulate_task
 
 if TYPE_CHECKING:
     from dbbstation.results.prediction import PredictionResult
+    from dbbstation.results.sessions import SimulatedSession
 
 
 def show(result: PredictionResult) -> None:
@@ -38,4 +40,16 @@ def show(result: PredictionResult) -> None:
         )
 
 
-predict = command(task, show, CommandOutput("table", table=True, field="file", required=True))
+predict = command(predict_task, show, CommandOutput("table", table=True, field="file", required=True))
+
+
+def show_simulated(result: SimulatedSession) -> None:
+    """Print what was written."""
+    from dbbstation.cli.output import say
+
+    say(f"{result.runs} runs written to {result.session}")
+
+
+simulate = command(
+    simulate_task, show_simulated, CommandOutput("out", "SESSION", folder=True, required=True, field="session")
+)

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from dbbstation.errors import StationError
 from dbbstation.machine.travel import check_travel
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Circle, Direction
+
 
 LARGEST_LOSS_PERCENT = 0.5
 """Share of a run's samples that may be lost if the plan sets no limit [%].
@@ -94,3 +96,21 @@ class Plan:
         for test in self.tests.values():
             for direction in test.directions:
                 check_travel(machine, test.run(direction).envelope(), where=f"test {test.name} {direction}")
+
+
+def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Sequence[str]) -> list[str]:
+    """Return the named tests in their order, or all tests, without the excluded ones.
+
+    Raises:
+        StationError: an unknown name, or no test is left.
+    """
+    names = list(known)
+    unknown = [name for name in (*tests, *exclude) if name not in names]
+    if unknown:
+        raise StationError(
+            f"the plan has no test {', '.join(unknown)}", where=plan, remedy=f"it has {', '.join(names)}"
+        )
+    chosen = [name for name in tests or names if name not in exclude]
+    if not chosen:
+        raise StationError("no test is left", where=plan, remedy="exclude fewer")
+    return chosen

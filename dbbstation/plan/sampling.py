@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Plan
 
 UNDULATIONS = 30
 """Highest undulations per revolution in a circle's figures."""
@@ -48,3 +51,58 @@ def sampling(circle: Circle, rate_hz: float) -> Sampling:
 def enough_feed_mm_min(circle: Circle, rate_hz: float) -> float:
     """Return the greatest feed that still resolves all figures [mm/min]."""
     return circle.feed_mm_min * sampling(circle, rate_hz).points_per_turn / (UNDULATIONS * POINTS_PER_UNDULATION)
+
+
+@dataclass(frozen=True)
+class SampledCircle:
+    """The readings of an instrument on one circle.
+
+    Attributes:
+        spacing_deg: between readings.
+    """
+
+    test: str
+    feed_mm_min: float
+    readings_per_second: float
+    points_per_turn: float
+    spacing_deg: float
+    highest_undulation: int
+    enough: bool
+    is_circle: bool
+    greatest_feed_mm_min: float
+
+
+def sampled_circles(plan: Plan, rate_hz: float) -> tuple[SampledCircle, ...]:
+    """Return an instrument's readings of each circle of a plan."""
+    found = []
+    for name, test in plan.tests.items():
+        seen, greatest = sampling(test.circle, rate_hz), enough_feed_mm_min(test.circle, rate_hz)
+        densest = (seen.points_per_turn, seen.spacing_deg, seen.highest_undulation, seen.enough, seen.is_circle)
+        found.append(SampledCircle(name, test.circle.feed_mm_min, rate_hz, *densest, greatest))
+    return tuple(found)
+
+
+def sampling_notes(plan: Plan, label: str, rate_hz: float) -> Iterator[str]:
+    """Yield sentences on the plan and on circles that are too fast for the instrument of this label."""
+    circles = sampled_circles(plan, rate_hz)
+    slowest = min(circles, key=lambda one: one.points_per_turn)
+    yield (
+        f"{label} takes {slowest.readings_per_second:.3g} readings per second: at least "
+        f"{slowest.points_per_turn:.0f} points per turn ({slowest.spacing_deg:.2g}° apart), up to "
+        f"{slowest.highest_undulation} undulations per revolution"
+    )
+    for is_circle in (False, True):
+        slow = [one for one in circles if not one.enough and one.is_circle is is_circle]
+        if not slow:
+            continue
+        worst = min(slow, key=lambda one: one.points_per_turn)
+        tests = ", ".join(one.test for one in slow)
+        what = (
+            f"undulations above {worst.highest_undulation} per revolution are not seen, and pass for slower ones"
+            if is_circle
+            else f"fewer than {SMALLEST_POINTS} points per turn are no circle"
+        )
+        yield (
+            f"too slow for test {tests} at {worst.feed_mm_min:g} mm/min: {what}; for {UNDULATIONS} undulations take at most "
+            f"{worst.greatest_feed_mm_min:.0f} mm/min, or a higher baud rate"
+        )

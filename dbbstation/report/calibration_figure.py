@@ -15,7 +15,7 @@ from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, ShownFigure, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
-from dbbstation.results.panel import OnePanel
+from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

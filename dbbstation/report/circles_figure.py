@@ -19,7 +19,7 @@ from dbbstation.report.plot_map import draw_map
 from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_polar, draw_spectrum, draw_together
 from dbbstation.report.polar import chosen
 from dbbstation.report.sheet import MARGIN_IN, Box, Cell, Key, Sheet
-from dbbstation.results.panel import OnePanel
+from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

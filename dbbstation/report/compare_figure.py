@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, ShownFigure, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
-from dbbstation.results.panel import OnePanel
+from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,8 +15,7 @@ from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, TitledPolar, cured_polars, polar
 from dbbstation.report.shown import ReportContent, ShownBudget, ShownFindings, ShownModel, ShownSession
-from dbbstation.results.circle_figures import RunWithoutCircle
-from dbbstation.results.circles import circles_result
+from dbbstation.results.circles import RunWithoutCircle, circles_result
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.report import (
     CertificateState,
@@ -44,7 +43,7 @@ if TYPE_CHECKING:
     from dbbstation.report.certificate import Certified
     from dbbstation.results.circles import Circled, CirclesResult
     from dbbstation.results.evaluation import EvaluationResult
-    from dbbstation.results.ranked import Ranked
+    from dbbstation.results.report_verdict import Ranked
 
 
 def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:

@@ -15,8 +15,8 @@ from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, ShownFigure, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.results.frame import OnePanel
 from dbbstation.results.levels_text import place_of
-from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.files.provenance import VIRTUAL
-from dbbstation.results.panel import OnePanel
+from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

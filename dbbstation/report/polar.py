@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.effects import CuredCircle
     from dbbstation.plan.circle import Circle
     from dbbstation.results.circles import MeasuredCircle
-    from dbbstation.results.ranked import Ranked
+    from dbbstation.results.report_verdict import Ranked
 
 SIZE = 320
 """Width and height of a polar figure in drawing units."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.quality.finding import Finding
     from dbbstation.report.plate_map import MapPlace
     from dbbstation.report.polar import TitledPolar
-    from dbbstation.results.ranked import Ranked
+    from dbbstation.results.report_verdict import Ranked
 
 
 @dataclass(frozen=True, eq=False)

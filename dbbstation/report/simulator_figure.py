@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
-from dbbstation.results.panel import OnePanel
+from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

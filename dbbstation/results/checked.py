@@ -7,8 +7,8 @@ from typing import Annotated
 
 from dbbstation.errors import Problem
 from dbbstation.facts.serialise import Absent, Kept
+from dbbstation.plan.sampling import SampledCircle
 from dbbstation.quality.finding import Finding
-from dbbstation.results.sampling import SampledCircle
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,35 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from dbbstation.errors import OutputError, StationError
+from dbbstation.errors import ArgumentError, OutputError, StationError
 from dbbstation.facts.serialise import AsItIs, Kept, json_of, plain
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.provenance import Provenance, from_python, write_table
 from dbbstation.files.recordings.table_csv import table_csv
-from dbbstation.results.panel import OnePanel
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from os import PathLike
+
+
+@dataclass(frozen=True)
+class OnePanel:
+    """Axes that one panel of a figure is drawn into."""
+
+    axes: Any
+    name: str | None
+
+    def draw(self, panels: Mapping[str, Callable[[Any], object]]) -> Any:  # noqa: ANN401 - the Axes
+        """Draw the panel and return its Axes.
+
+        Raises:
+            ArgumentError: no panel has that name.
+        """
+        fits = [name for name in panels if self.name is None or f"{name} ".startswith(f"{self.name} ")]
+        if not fits:
+            raise ArgumentError("panel", f"{self.name!r} is not one of {', '.join(map(repr, panels))}")
+        panels[fits[0]](self.axes)
+        return self.axes
 
 
 _Kind = TypeVar("_Kind")

@@ -2,23 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.facts.held import ReportVerdict
 from dbbstation.quality.conformity import Conformity
 from dbbstation.results.model_warnings import lacks_physics
-from dbbstation.results.ranked import told_causes
 from dbbstation.results.words import evaluated_sentence
-from dbbstation.text.digits import with_uncertainty
+from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from dbbstation.diagnosis.effects import CauseEffect
     from dbbstation.facts.held import HeldTolerance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.circles import Circled, MeasuredCircle
     from dbbstation.results.evaluation import EvaluationResult
-    from dbbstation.results.ranked import Ranked
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """Causes shown with the circles.
+
+    Attributes:
+        why_not: reason if there are no causes; else empty.
+        said: the model's diagnosis in two sentences; may be empty.
+        picture: the diagnosis's errors in held-out tests as lines of a picture; may be empty.
+    """
+
+    session: str = ""
+    effects: tuple[CauseEffect, ...] = ()
+    why_not: str = ""
+    said: tuple[str, ...] = ()
+    picture: tuple[str, ...] = ()
+
+
+def told_causes(ranked: Ranked, coverage_factor: float) -> tuple[str, ...]:
+    """Return a sentence for each cause with its cure, in order of contribution."""
+    told = []
+    for rank, one in enumerate(ranked.effects, start=1):
+        g, g_u = with_uncertainty(one.g_um, expanded_uncertainty(one.g_u_um, coverage_factor))
+        centre, _ = with_uncertainty(one.centre_um, expanded_uncertainty(one.centre_u_um, coverage_factor))
+        known = "" if g_u == "-" else f", U {g_u} µm"
+        told.append(
+            f"Cause {rank}, {one.cause}: {g} µm of G{known}, {centre} µm of the centres. {one.cure[0].upper()}{one.cure[1:].rstrip('.')}."
+        )
+    return tuple(told)
+
 
 MOST_TOLD = 5
 """Greatest number of runs on the first page; the findings name all."""

@@ -19,12 +19,11 @@ from dbbstation.results.history import HistoryResult
 from dbbstation.results.imported import ImportResult
 from dbbstation.results.instruments import InstrumentsResult
 from dbbstation.results.jig import HoldersResult, SheetResult
-from dbbstation.results.measured import MeasuredSession
 from dbbstation.results.mismatch import MismatchResult
 from dbbstation.results.prediction import PredictionResult
 from dbbstation.results.programs import ProgramsResult
 from dbbstation.results.report import ReportResult
-from dbbstation.results.sessions import ListedSession, SessionEvents, SimulatedSession
+from dbbstation.results.sessions import ListedSession, MeasuredSession, SessionEvents, SimulatedSession
 from dbbstation.results.settings import SettingsResult
 from dbbstation.results.simulator import SimulatorResult
 from dbbstation.results.sources import SourcesResult

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.facts.run import OfRun
+from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.files.formats.session import Counts
 from dbbstation.files.provenance import Provenance
+from dbbstation.quality.finding import Finding
 from dbbstation.results.frame import Framed
 from dbbstation.trace.recording import Recording
 
@@ -95,3 +97,39 @@ class SimulatedSession(Framed):
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - a session replaces none
         self.writing(path)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedRun(OfRun):
+    """A run of the session."""
+
+    mounting: int | None
+    state: str
+    file: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompletedRun(RecordedRun):
+    """A newly measured run with its first figures."""
+
+    samples: int
+    lost: int
+    doubtful: int
+    problem: str | None
+    findings: tuple[Finding, ...]
+    centre_deviation_um: Annotated[float | None, Absent] = None
+    mean_radial_error_um: Annotated[float | None, Absent] = None
+    circularity_um: Annotated[float | None, Absent] = None
+
+
+@dataclass(frozen=True)
+class MeasuredSession:
+    """A session after its measurement."""
+
+    session: str
+    state: str
+    fault: str | None
+    planned: int
+    accepted: int
+    missing: tuple[str, ...]
+    runs: tuple[CompletedRun | RecordedRun, ...]

@@ -87,9 +87,9 @@ def program(
     from dbbstation.files.provenance import from_python
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
+    from dbbstation.plan.plan import chosen_of
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result
-    from dbbstation.tasks.chosen import chosen_of
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
 

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from dbbstation.circles.path import Filter
-    from dbbstation.results.circle_figures import CircleFiguresResult
-    from dbbstation.results.circles import Circled, CirclesResult
+    from dbbstation.results.circles import Circled, CircleFiguresResult, CirclesResult
     from dbbstation.tasks.telling import Progress
 
 

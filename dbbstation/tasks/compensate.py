@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.tasks import options as o
-from dbbstation.tasks.control_state import lengths_by_tool, named_numbers, numbers_of
 from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.options import lengths_by_tool, named_numbers, numbers_of
 from dbbstation.tasks.telling import Telling, silent
 
 if TYPE_CHECKING:

@@ -67,8 +67,8 @@ def export(
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.provenance import from_python, refuse_existing_table
     from dbbstation.files.recordings.session import read_session
+    from dbbstation.plan.plan import chosen_of
     from dbbstation.results.export import ExportResult
-    from dbbstation.tasks.chosen import chosen_of
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.exporting import exporting, write_csv, write_parquet
 

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import StationError
+from dbbstation.errors import OutputError, StationError
 from dbbstation.facts.serialise import read_plain
-from dbbstation.files.atomic import write_bytes
+from dbbstation.files.atomic import streamed, write_bytes
 from dbbstation.files.fleet_folder import FleetFolder
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book, note_known
 from dbbstation.files.keys import files_of_session, key_of, program_identity
 from dbbstation.files.places import real_path, text_of_name
-from dbbstation.files.provenance import from_python
+from dbbstation.files.provenance import from_python, write_table
 from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.report.fleet_page import fleet_html
-from dbbstation.results.fleet import FleetFound, FleetResult, FleetSession, StoredFiles
+from dbbstation.results.fleet import TABLE, FleetFound, FleetResult, FleetSession, StoredFiles
 from dbbstation.sisters.unlike import FALSE_ALARMS
 from dbbstation.tasks.declare import paths_of
 from dbbstation.tasks.executors import Ended, WorkPool
+from dbbstation.tasks.exporting import pyarrow_for
 from dbbstation.tasks.fleet_compare import Sister, compared
-from dbbstation.tasks.fleet_table import write_fleet_table
 from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked, worked
 from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.text.counting import natural
@@ -38,6 +40,52 @@ if TYPE_CHECKING:
     from dbbstation.results.fleet import State
     from dbbstation.tasks.load import Sessions
     from dbbstation.tasks.telling import Progress
+
+
+FORMATS = (".csv", ".parquet")
+"""Formats of a table, by the ending of its file."""
+
+_NUMBERS = frozenset({"value", "u", "usual", "scatter", "score", "smallest_seen"})
+_WHOLE = frozenset({"sisters"})
+_YES_OR_NO = frozenset({"unlike"})
+
+
+def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *, force: bool = False) -> None:
+    """Write each value of a fleet as one row.
+
+    Raises:
+        OutputError: another extension; the file exists without `force`; pyarrow is missing.
+    """
+    rows = result.rows()
+    if path.suffix.lower() == FORMATS[0]:
+        columns = [[_cell(row[name]) for row in rows] for name in TABLE]
+        write_table(path, table_csv(TABLE, columns), provenance, force=force)
+        return
+    if path.suffix.lower() != FORMATS[1]:
+        raise OutputError("a table is written as .csv or .parquet", where=str(path), remedy="name such a file")
+    pa, parquet = pyarrow_for(path)
+    kinds = {
+        name: pa.float64()
+        if name in _NUMBERS
+        else pa.int64()
+        if name in _WHOLE
+        else pa.bool_()
+        if name in _YES_OR_NO
+        else pa.string()
+        for name in TABLE
+    }
+    told = {"dbbstation": json.dumps(provenance.data(), ensure_ascii=False)}
+    arrays = [pa.array([row[name] for row in rows], type=kinds[name]) for name in TABLE]
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(list(kinds.items()), metadata=told))
+    with streamed(path, force=force) as file:
+        parquet.write_table(table, file)
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "" if value is None else value
+
 
 WORKING = "sessions"
 """Name of the stage that works on sessions."""

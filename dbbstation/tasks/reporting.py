@@ -13,7 +13,7 @@ from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.source_text import read_bytes
 from dbbstation.report.content import Modelled
 from dbbstation.results.model_warnings import lacks_physics
-from dbbstation.results.ranked import Ranked
+from dbbstation.results.report_verdict import Ranked
 from dbbstation.tasks.evaluate import evaluate
 from dbbstation.tasks.load import load_sessions
 from dbbstation.tasks.telling import READING, StoppedError

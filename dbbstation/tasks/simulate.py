@@ -70,8 +70,8 @@ def simulate(
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.recordings.new_session import FinishedRun, write_session
     from dbbstation.model.simulation import setup_of, simulate_circle
+    from dbbstation.plan.plan import chosen_of
     from dbbstation.results.sessions import SimulatedSession
-    from dbbstation.tasks.chosen import chosen_of
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
     from dbbstation.virtual.truth import SetUp, put_up

@@ -12,8 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from dbbstation.cli.instruments import instruments, ports
-from dbbstation.cli.monitor import monitor
-from dbbstation.cli.replay import replay
+from dbbstation.cli.monitor import monitor, replay
 from dbbstation.errors import InstrumentError, OutputError
 from dbbstation.instrument import link
 from dbbstation.instrument.library import load_instrument

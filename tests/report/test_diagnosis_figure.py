@@ -16,7 +16,7 @@ from dbbstation.diagnosis.shapes import READING, Follows
 from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.inference.levels import Followed, FollowsAnswer
 from dbbstation.report.diagnosis_figure import diagnosis_figure, draw_unexplained
-from dbbstation.results.panel import OnePanel
+from dbbstation.results.frame import OnePanel
 from tests.diagnosis.joint_fits import joint_fit
 
 SVG = "{http://www.w3.org/2000/svg}"

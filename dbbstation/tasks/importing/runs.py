@@ -32,11 +32,16 @@ from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.run_csv import count_in
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.tasks.importing.gaps import held_over_gaps, samples_of
 from dbbstation.tasks.importing.moments import UnclearMomentError, moment_of
 from dbbstation.tasks.importing.names import WORDS, RunName, named_by, run_name
 from dbbstation.tasks.importing.plausible import centre_mm, chance_of_centres, check_units
-from dbbstation.tasks.importing.splitting import longest_pause_s, parts_by_direction, parts_by_gaps
+from dbbstation.tasks.importing.splitting import (
+    held_over_gaps,
+    longest_pause_s,
+    parts_by_direction,
+    parts_by_gaps,
+    samples_of,
+)
 from dbbstation.tasks.importing.travel import (
     UnusableTravelError,
     check_span,

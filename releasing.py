@@ -216,7 +216,7 @@ def tried(interpreter: str, what: Path, folder: Path, *, lowest: bool, house: Pa
         "PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}"
     }
     run(scripts / "python", "-c", "import dbbstation", cwd=used, env=environment)
-    plan = "import dbbstation.files.shipped as s; print(s.shipped_folder('protocols') / 'plans' / 'table2.yaml')"
+    plan = "import dbbstation.files.places as s; print(s.shipped_folder('protocols') / 'plans' / 'table2.yaml')"
     plan = run(scripts / "python", "-c", plan, cwd=used, env=environment).strip()
     seconds = []
     for words in (["check", plan], ["demo", "--quick"]):

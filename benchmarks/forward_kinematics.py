@@ -23,7 +23,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.control.kinematics import component
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import package_text, shipped_folder
+from dbbstation.files.places import package_text, shipped_folder
 from tests.control.machines import poses
 from tests.control.test_parameters import truth_of
 

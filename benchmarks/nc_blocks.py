@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.registry import dialect_named

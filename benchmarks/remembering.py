@@ -17,7 +17,7 @@ from benchmarks.measuring import Row, show, timed  # isort: skip - sets up the e
 import numpy as np
 
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import compensated_parts
 from dbbstation.nc.rs274.reader import read_program

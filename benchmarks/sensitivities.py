@@ -16,7 +16,7 @@ from benchmarks.measuring import Row, show, timed  # isort: skip - sets up the e
 import numpy as np
 
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.machine.kinematics import bar_sensitivity, inverse, strut_jacobian
 from dbbstation.machine.rotation import Frames
 

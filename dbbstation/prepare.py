@@ -11,7 +11,7 @@ from dbbstation.circles.extremes import drawn_paths
 from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.strip import strip_widths
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, compensated_program

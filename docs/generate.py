@@ -16,7 +16,7 @@ import dbbstation
 from dbbstation.cli import COMMANDS, cli
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.diagnosed import default_candidates
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.calibration.reporting.identified import identified_model
+from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.sources.contract import Fitted, Motion

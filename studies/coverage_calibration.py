@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
 from dbbstation.calibration.reporting.evaluation import plane_figures, plane_uncertainty_um
-from dbbstation.calibration.reporting.identified import identified_model
+from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.uncertainty import predicted_poses

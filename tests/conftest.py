@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml import text
 from dbbstation.machine.geometry import Machine
 

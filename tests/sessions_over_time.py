@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

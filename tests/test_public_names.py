@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import dbbstation as dbb
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.public_names import kept, lines_told, signatures
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"

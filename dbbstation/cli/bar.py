@@ -99,7 +99,7 @@ def bar(
 
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.bar import write_bar
-    from dbbstation.service.bar_reading import DRIFT
+    from dbbstation.service.bar_calibration import DRIFT
 
     refuse_existing(out, force=force)
     protocol = line.protocol(bar_length_mm=calibrator.calibrator_mm)
@@ -127,7 +127,7 @@ def bar(
 
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.service.bar_reading import read_on_calibrator
+    from dbbstation.service.bar_calibration import read_on_calibrator
     from dbbstation.service.held_line import driver_patience
 
     with Instrument(protocol, port, baud=baud, **driver_patience(1.0)) as source:
@@ -144,7 +144,7 @@ def _file(
 ) -> BarFile:
     from pydantic import ValidationError
 
-    from dbbstation.service.bar_reading import bar_file
+    from dbbstation.service.bar_calibration import bar_file
 
     try:
         return bar_file(found, of_bar, calibrator, instrument, now)

@@ -85,7 +85,7 @@ def _with_virtual(asked: Asked) -> Asked:
 
 
 def _shipped(what: str) -> Path:
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
 
     folder, _, rest = _DEMO[what].partition("/")
     return shipped_folder(folder) / rest
@@ -166,9 +166,8 @@ def _operate(path: Path, model: IdentifiedModel | None) -> int:
 
 
 def _given(asked: Asked) -> Choice:
-    from dbbstation.service.choice import Choice
+    from dbbstation.service.choice import Choice, Gate, Order
     from dbbstation.service.memory import Line
-    from dbbstation.service.order import Gate, Order
 
     line, noted = asked.line, asked.noted
     lost = [name for name, given in (("spy", noted.spy), ("rate_hz", asked.rate_hz)) if given is not None]

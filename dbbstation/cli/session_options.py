@@ -161,7 +161,7 @@ class RecordingOptions(SessionOptions):
 
         The command line overrides the plan, which overrides the shop's settings.
         """
-        from dbbstation.service.order import Gate, Order, ordered, with_loss
+        from dbbstation.service.choice import Gate, Order, ordered, with_loss
 
         over_plan = not from_settings("largest_loss_percent")
         plan = with_loss(plan, self.largest_loss_percent, over_plan=over_plan)

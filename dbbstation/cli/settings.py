@@ -159,7 +159,7 @@ def _print(found: Settings) -> None:
 
 def _template() -> str:
     from dbbstation.files.formats.settings_schema import SettingsFile
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
     from dbbstation.files.yaml.schema import format_of
 
     text = (shipped_folder("fixtures") / "settings" / "every-key.yaml").read_text(encoding="utf-8")

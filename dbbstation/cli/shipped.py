@@ -126,7 +126,7 @@ def shipped(
 
 def shipped_files() -> dict[str, Path]:
     """Return all files that come along, by kind and name with a slash between."""
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
 
     fixtures, protocols = shipped_folder("fixtures"), shipped_folder("protocols")
     folders = [(kind, fixtures / kind) for kind in (*_FIXTURES, _SESSION)]

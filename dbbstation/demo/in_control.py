@@ -18,7 +18,7 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.source_text import text_of
 from dbbstation.machine.geometry import STRUTS, Hexapod
 from dbbstation.machine.kinematics import strut_lengths

@@ -17,7 +17,7 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import plan_text, read_inline_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.results.demo import DemoCircle, DemoResult, MeasuredBeforeAfter

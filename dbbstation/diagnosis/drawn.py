@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.calibration.reporting.on_the_plate import CircleBeforeAfter
+from dbbstation.calibration.reporting.residual_map import CircleBeforeAfter
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

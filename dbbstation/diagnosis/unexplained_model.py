@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.calibration.reporting.identified import identified_model
+from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.diagnosis.findings import CurvePoint
 from dbbstation.diagnosis.refit import refitted
 from dbbstation.diagnosis.shapes import Follows

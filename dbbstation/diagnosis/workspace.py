@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.reporting.identified import identified_model
+from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.facts.value import finite
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.travel import is_within_travel

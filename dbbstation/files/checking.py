@@ -14,8 +14,7 @@ from dbbstation.files.formats.jig import JigFile, parse_jig
 from dbbstation.files.formats.job import JobFile, parse_job
 from dbbstation.files.formats.machine import MachineFile, parse_machine
 from dbbstation.files.formats.mapping import MappingFile, parse_mapping
-from dbbstation.files.formats.model import parse_model
-from dbbstation.files.formats.model_schema import ModelFile
+from dbbstation.files.formats.model import ModelFile, parse_model
 from dbbstation.files.formats.plan import PlanFile, parse_plan
 from dbbstation.files.formats.session import PART, RunState, SessionFile
 from dbbstation.files.formats.settings import read_settings

@@ -17,10 +17,12 @@ from dbbstation.catalogue import FOREIGN, FoundClass, classes_of, in_words, line
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
+from dbbstation.laws.contract import TableSource
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Container, Iterable, Sequence
     from pathlib import Path
+
 
 Base = TypeVar("Base")
 
@@ -132,3 +134,25 @@ def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | No
         faults.append(Problem(str(path), line_in(error, str(path)), 0, what, "mend the line"))
         return None
     return module
+
+
+CONTRACT = "see `Physics of your own` in docs/mismatch.md"
+
+
+def load_sources(
+    files: Sequence[Path], columns: Container[str], where: str = "the table"
+) -> tuple[list[TableSource], dict[str, str]]:
+    """Return user physics whose columns exist, and the missing columns of other user physics by name.
+
+    Raises:
+        InputError: every fault: a file missing, not Python or without such a class, a missing requirement, a taken name.
+    """
+    usable: list[TableSource] = []
+    lacking = {}
+    for source in own_instances(files, TableSource, CONTRACT, ("name", "needs", "texts")):  # type: ignore[type-abstract]
+        missing = [name for name in source.needs if name not in columns]
+        if missing:
+            lacking[source.name] = f"{where} has no column {', '.join(missing)}"
+        else:
+            usable.append(source)
+    return usable, lacking

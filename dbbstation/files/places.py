@@ -1,9 +1,11 @@
-"""Targets of paths, with links resolved, and their names."""
+"""Targets of paths, with links resolved, their names, and the folders of the package."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+
+from dbbstation.errors import InputError
 
 
 def real_path(path: Path) -> Path:
@@ -32,3 +34,21 @@ def name_of(path: Path) -> str:
 def text_of_name(name: str) -> str:
     """Return a name or path as text; see `name_of`."""
     return os.fsencode(name).decode("utf-8", "backslashreplace")
+
+
+def shipped_folder(name: str) -> Path:
+    """Return a shipped folder, such as `protocols`.
+
+    Raises:
+        InputError: the installation lacks it.
+    """
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / name, package.parent / name):
+        if folder.is_dir():
+            return folder
+    raise InputError.of(package / name, "this folder is missing in the installation", "install dbbstation again")
+
+
+def package_text(name: str) -> str:
+    """Return a text file of the package, by its path in the package."""
+    return (Path(__file__).resolve().parent.parent / name).read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from dbbstation.catalogue import files_of_packages, looked_up, nearest
 from dbbstation.errors import InputError, InstrumentError, Problem
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.schema import Partly, Schema, validate
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.instrument.frame import Frame  # noqa: TC001 (pydantic needs it at run time)

@@ -1,4 +1,4 @@
-"""A test plan: balls, circles and known places."""
+"""A test plan: balls, circles and known places, and tests chosen by name."""
 
 from __future__ import annotations
 

@@ -10,8 +10,7 @@ from matplotlib.patches import Circle as Ring
 
 from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.checks.visibility import visibility
-from dbbstation.calibration.reporting.on_the_plate import ball_shifts, circle_tests
-from dbbstation.calibration.reporting.residual_map import residual_map
+from dbbstation.calibration.reporting.residual_map import ball_shifts, circle_tests, residual_map
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, ShownFigure, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import SubFigure
 
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.calibration.reporting.on_the_plate import BallShift, CircleTest
+    from dbbstation.calibration.reporting.residual_map import BallShift, CircleTest
 
 WIDTH_IN = 11.0
 COLUMNS = 5

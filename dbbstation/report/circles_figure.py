@@ -15,8 +15,7 @@ from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
-from dbbstation.report.plot_map import draw_map
-from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_polar, draw_spectrum, draw_together
+from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_map, draw_polar, draw_spectrum, draw_together
 from dbbstation.report.polar import chosen
 from dbbstation.report.sheet import MARGIN_IN, Box, Cell, Key, Sheet
 from dbbstation.results.frame import OnePanel

@@ -1,4 +1,4 @@
-"""The verdict of a report, with reasons and advice."""
+"""The ranked causes and the verdict of a report, with reasons and advice."""
 
 from __future__ import annotations
 

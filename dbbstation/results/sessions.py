@@ -1,4 +1,4 @@
-"""The results of `session list`, `session log` and `simulate`."""
+"""The results of `session list`, `session log`, `measure` and `simulate`."""
 
 from __future__ import annotations
 

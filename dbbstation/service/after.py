@@ -17,8 +17,7 @@ from dbbstation.files.keys import digests_of, files_of_session, key_of
 from dbbstation.files.places import real_path, unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.service.former_sessions import keep_models
-from dbbstation.service.job import Call, SessionTask
-from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.service.work import BackgroundWork, Call, SessionTask, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Callable

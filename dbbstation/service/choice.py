@@ -1,8 +1,8 @@
-"""The choice of a measurement, its missing parts, and the checked job."""
+"""The choice of a measurement, its order and missing parts, and the checked job."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -14,9 +14,8 @@ from dbbstation.files.formats.session import ReadBy, SessionDetails
 from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import circles_s
-from dbbstation.plan.order import LARGEST_LEAK, height_and_drift, mountings
+from dbbstation.plan.order import LARGEST_LEAK, against_drift, by_holder, height_and_drift, mountings
 from dbbstation.service.memory import Line
-from dbbstation.service.order import Gate, Order, ordered, with_loss
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.opening import check_not_mixed
@@ -34,6 +33,51 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.station.programs import RunProgram
+
+
+class Order(StrEnum):
+    """The order."""
+
+    PLAN = "plan"
+    """As the plan has the tests."""
+    HOLDER = "holder"
+    """By holder and ball, each put up once."""
+    DRIFT = "drift"
+    """Mixed heights, so that a drift does not look like an effect of height."""
+
+
+class Gate(StrEnum):
+    """Tests repeated at the end, which show the drift."""
+
+    PLAN = "plan"
+    """The tests that the plan names in `repeat_at_end`."""
+    FIRST = "first"
+    """The first test."""
+    HOLDERS = "holders"
+    """The first test of each holder."""
+
+
+def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePlan:
+    """Return the plan with ordered tests."""
+    domain = plan.to_domain()
+    choose = {Order.PLAN: lambda one: tuple(one.tests), Order.HOLDER: by_holder, Order.DRIFT: against_drift}
+    names = choose[order](domain)
+    tests = {test.name: test for test in plan.plan.tests}
+    first_of: dict[str, str] = {}
+    for name in names:
+        first_of.setdefault(domain.tests[name].ball.holder, name)
+    gates = {Gate.PLAN: (), Gate.FIRST: names[:1], Gate.HOLDERS: tuple(first_of.values())}
+    again = plan.plan.repeat_at_end or gates[gate]
+    changed = {"tests": tuple(tests[name] for name in names), "repeat_at_end": again}
+    return replace(plan, plan=plan.plan.model_copy(update=changed))
+
+
+def with_loss(plan: InlinePlan, percent: float | None, *, over_plan: bool) -> InlinePlan:
+    """Return the plan with a limit of lost samples, if it states none or `over_plan`."""
+    if percent is None or (plan.plan.largest_loss_percent is not None and not over_plan):
+        return plan
+    return replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": percent}))
+
 
 PROGRAMS = "programs"
 """Folder of a session that contains its NC programs."""

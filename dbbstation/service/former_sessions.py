@@ -11,7 +11,7 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import content_of, digest_of
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.service.candidates import CandidateFormat, candidates
+from dbbstation.service.session_list import CandidateFormat, candidates
 
 if TYPE_CHECKING:
     from datetime import datetime

@@ -14,17 +14,14 @@ from dbbstation.files.places import unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
 from dbbstation.service.after import JOINT, KINEMATIC, After
-from dbbstation.service.bar_calibration import BarCalibration, Stated
-from dbbstation.service.bar_stated import fault_of
-from dbbstation.service.candidates import CandidateFormat, candidates
+from dbbstation.service.bar_calibration import BarCalibration, Stated, fault_of
 from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen, ProbeOutcome, ports, probe
-from dbbstation.service.job import Call
 from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.runner import Runner, opener
-from dbbstation.service.session_list import list_sessions
+from dbbstation.service.session_list import CandidateFormat, candidates, list_sessions
 from dbbstation.service.virtual_place import virtual_place
-from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.service.work import BackgroundWork, Call, WorkProgress
 from dbbstation.system.ports import time_scale_of, virtual_port
 
 if TYPE_CHECKING:

@@ -24,18 +24,17 @@ from dbbstation.instrument.library import load_instrument
 from dbbstation.quality.conformity import Conformity
 from dbbstation.service.after import After
 from dbbstation.service.choice import Choice
-from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.session_notes import add_note
-from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.service.work import BackgroundWork, SessionTask, WorkProgress
 from dbbstation.station.opening import SHIFT_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.facts.held import ComparedTolerance
-    from dbbstation.service.job import Call
+    from dbbstation.service.work import Call
 
 
 @dataclass(frozen=True)

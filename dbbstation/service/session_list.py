@@ -1,20 +1,24 @@
-"""Sessions to continue, in a folder or remembered."""
+"""Files to choose from, and sessions to continue, in a folder or remembered."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.gateway import head_of
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import dated_folders
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import circles_s
 from dbbstation.station.schedule import Schedule
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
     from dbbstation.files.recordings.session import SessionFolder
@@ -74,3 +78,57 @@ def _line(folder: Path, changed: datetime) -> SessionLine:
 def schedule_of(session: SessionFolder) -> Schedule:
     """Return finished and remaining runs of a session, without writing."""
     return Schedule(session.plan, lambda _test, _direction: 1, session.runs)
+
+
+class CandidateFormat(StrEnum):
+    """Formats to choose from; the value is the begin of their `format` key."""
+
+    MACHINE = "dbb-machine/"
+    PLAN = "dbb-plan/"
+    BAR = "dbb-bar/"
+    MODEL = "dbb-model/"
+
+
+DEPTH = 2
+"""Depth of folders below the working folder that are searched."""
+
+_HEAD = 4096
+"""Number of bytes at a file's begin that contain its format, behind the comments at its top."""
+
+_SHIPPED = {
+    CandidateFormat.MACHINE: ("fixtures", "machines/reference.yaml"),
+    CandidateFormat.PLAN: ("protocols", "plans/*.yaml"),
+}
+"""Examples that come with the package."""
+
+
+def candidates(kind: CandidateFormat, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
+    """Return the files of a format, first those in a folder; copies in sessions are left out."""
+    own = [path for path in _files(under, DEPTH) if _is(kind, path)]
+    if not shipped or kind not in _SHIPPED:
+        return tuple(own)
+    folder, pattern = _SHIPPED[kind]
+    of_package = [path for path in sorted(shipped_folder(folder).glob(pattern)) if path not in own]
+    return (*own, *of_package)
+
+
+def _files(folder: Path, depth: int) -> Iterator[Path]:
+    try:
+        inside = sorted(folder.iterdir())
+    except OSError:
+        return
+    if any(path.name == "session.yaml" for path in inside):
+        return
+    yield from (path for path in inside if path.suffix in {".yaml", ".yml"} and path.is_file())
+    if depth:
+        for path in inside:
+            if path.is_dir() and not path.name.startswith("."):
+                yield from _files(path, depth - 1)
+
+
+def _is(kind: CandidateFormat, path: Path) -> bool:
+    try:
+        head = head_of(path, _HEAD)
+    except OSError:
+        return False
+    return re.search(rb"^format:\s*['\"]?" + re.escape(kind.encode()), head, re.MULTILINE) is not None

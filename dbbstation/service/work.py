@@ -1,4 +1,4 @@
-"""Long work in a process that can be ended; its outputs are complete or absent."""
+"""Long work in a process that can be ended, and its call; its outputs are complete or absent."""
 
 from __future__ import annotations
 
@@ -11,14 +11,46 @@ import threading
 import time
 from contextlib import suppress
 from enum import StrEnum
-from typing import IO, TYPE_CHECKING
+from pathlib import Path
+from typing import IO
+
+from pydantic import BaseModel, ConfigDict
 
 from dbbstation.system.children import end_tree, python_module
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    from dbbstation.service.job import Call
+class SessionTask(StrEnum):
+    """Steps after a session in their usual order."""
+
+    CALIBRATE = "calibrate"
+    DIAGNOSE = "diagnose"
+    PROGRAMS = "programs"
+    REPORT = "report"
+    ACCEPTANCE = "acceptance"
+    FIGURES = "figures"
+    HISTORY = "history"
+
+
+class Call(BaseModel):
+    """One task with its parameters and outputs, as the command of this name has them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    task: str
+    """Name of the command."""
+    given: dict[str, str]
+    """Values by parameter; what is missing comes from the settings."""
+    outputs: dict[str, str] = {}
+    """Files to write, by the option that names them on the command line."""
+    beside: Path
+    """Folder that may contain the shop's settings."""
+    settings: Path | None = None
+    """File of the shop's settings, if one was named."""
+    tolerances: Path | None = None
+    """Settings with the tolerances of an operator's job, which replace the shop's."""
+    force: bool = True
+    """Whether existing files are replaced: only the program writes into the folder of results."""
+
 
 WORKER = "dbbstation.service.worker"
 """Module that the process runs. The station never imports it, since it imports all computations."""

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import StationError, in_a_sentence
 from dbbstation.files.formats.settings import read_settings, settings_files
 from dbbstation.files.inputs import input_book
-from dbbstation.service.job import Call
-from dbbstation.service.work import LOG_MARK, STAGE_MARK
+from dbbstation.service.work import LOG_MARK, STAGE_MARK, Call
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

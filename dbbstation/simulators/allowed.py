@@ -14,8 +14,7 @@ from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.simulator import read_simulator
 from dbbstation.files.gateway import content_of
 from dbbstation.files.keys import digests_of
-from dbbstation.files.places import real_path
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import real_path, shipped_folder
 from dbbstation.simulators.program import whole_command
 
 if TYPE_CHECKING:

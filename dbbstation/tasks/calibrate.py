@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.fit.directions import Name
     from dbbstation.calibration.fit.methods import Method
-    from dbbstation.calibration.fit.prescription import Name
     from dbbstation.model.observation import Observation
     from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.contract import ErrorSource
@@ -87,8 +87,7 @@ def calibrate(
     from dbbstation.calibration.fit.methods import Method, as_known
     from dbbstation.calibration.outliers.robust import calibrate_robust
     from dbbstation.calibration.reporting.evaluation import evaluate
-    from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, report_of
-    from dbbstation.calibration.reporting.identified import identified_model
+    from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, identified_model, report_of
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.model.uncertainty import greatest_u_um
     from dbbstation.results.calibration import CalibrationResult

@@ -17,7 +17,7 @@ from dbbstation.files.atomic import refuse_outputs, write_folder, write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import in_a_book
-from dbbstation.files.shipped import package_text
+from dbbstation.files.places import package_text
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Rotation

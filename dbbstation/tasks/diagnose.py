@@ -83,8 +83,7 @@ def diagnose(
     import numpy as np
 
     from dbbstation.calibration.reporting.evaluation import evaluate
-    from dbbstation.calibration.reporting.figures import calibration_figures, report_of
-    from dbbstation.calibration.reporting.identified import identified_model
+    from dbbstation.calibration.reporting.figures import calibration_figures, identified_model, report_of
     from dbbstation.diagnosis import diagnose as search
     from dbbstation.diagnosis.effects import effects_of
     from dbbstation.files.own_sources import every_source

@@ -79,8 +79,8 @@ def identify(
     from dbbstation.diagnosis.drive.identify import identify as identified_drive
     from dbbstation.diagnosis.drive.own import own_force
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
+    from dbbstation.files.own_classes import load_sources
     from dbbstation.files.recordings.drive_csv import given_drive, read_drive
-    from dbbstation.files.table_sources import load_sources
     from dbbstation.laws.contract import MOVING
     from dbbstation.results.drive import drive_result
     from dbbstation.tasks.declare import paths_of

@@ -18,7 +18,7 @@ from dbbstation.files.keys import files_of_session, key_of, program_identity
 from dbbstation.files.places import real_path, text_of_name
 from dbbstation.files.provenance import from_python, write_table
 from dbbstation.files.recorded_ground import SESSION_FILE
-from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
+from dbbstation.files.recordings.former import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.report.fleet_page import fleet_html

@@ -21,7 +21,7 @@ from dbbstation.files.inputs import input_book, inputs_so_far, virtual_so_far
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.places import name_of
 from dbbstation.files.provenance import Provenance
-from dbbstation.files.recordings.folder_of_sessions import reason_of
+from dbbstation.files.recordings.former import reason_of
 from dbbstation.results.fleet import FleetCause, FleetFound, FleetValue
 from dbbstation.tasks.calibrate import calibrate
 from dbbstation.tasks.circles import circles

@@ -19,7 +19,7 @@ from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
 from dbbstation.files.keys import key_of
 from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.event_log import SHORTEST, links_of
-from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
+from dbbstation.files.recordings.former import files_of, reason_of
 from dbbstation.history.order import date_faults
 from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories

@@ -184,7 +184,7 @@ def mismatch(
     from dbbstation.diagnosis.table.applied import applied
     from dbbstation.diagnosis.table.mismatch import find_mismatch
     from dbbstation.files.formats.number_language import number_language
-    from dbbstation.files.table_sources import load_sources
+    from dbbstation.files.own_classes import load_sources
     from dbbstation.results.mismatch import mismatch_result
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.tables import (

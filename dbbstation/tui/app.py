@@ -31,9 +31,8 @@ from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScre
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.plain_terminal import plain_driver, show_controls
 from dbbstation.tui.questions import GiveUpQuestion, TemperatureQuestion, TypeQuestion
-from dbbstation.tui.reception import ExplainedScreen
 from dbbstation.tui.results_screen import ResultsScreen
-from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.row_screen import ExplainedScreen, RowScreen
 from dbbstation.tui.start_screen import StartScreen
 
 if TYPE_CHECKING:

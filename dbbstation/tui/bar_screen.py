@@ -9,7 +9,7 @@ from textual.widgets import OptionList
 
 from dbbstation.errors import StationError
 from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.service.bar_stated import doubt_of
+from dbbstation.service.bar_calibration import doubt_of
 from dbbstation.service.front import NoNumberError
 from dbbstation.tui import texts
 from dbbstation.tui.questions import TypeQuestion

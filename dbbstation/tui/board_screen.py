@@ -11,7 +11,7 @@ from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, 
 from dbbstation.station.states import RECORDING, VERDICT
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.questions import GiveUpQuestion, ReasonQuestion
-from dbbstation.tui.reception import ExplainedScreen
+from dbbstation.tui.row_screen import ExplainedScreen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from textual.content import Content
 
-from dbbstation.service.choice import SetUpPart
-from dbbstation.service.order import Gate, Order
+from dbbstation.service.choice import Gate, Order, SetUpPart
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.bar_screen import BarScreen
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.held_line import ProbeOutcome
-    from dbbstation.tui.reception import StationDesk
+    from dbbstation.tui.row_screen import StationDesk
 
 _Kind = TypeVar("_Kind", Order, Gate)
 

@@ -19,8 +19,7 @@ from dbbstation.tui.now_line import OperatorNowLine, ProgressLine, TitleLine, ba
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import TypeQuestion, YesQuestion
 from dbbstation.tui.reading_panel import ReadingPanel
-from dbbstation.tui.reception import ExplainedScreen
-from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.row_screen import ExplainedScreen, RowScreen
 from dbbstation.tui.set_up_panel import JigMap, SetUpPanel, StepsPanel
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.operated import Answered, JobAnswer, Operated
-    from dbbstation.tui.reception import StationDesk
+    from dbbstation.tui.row_screen import StationDesk
 
 _NAME = 16
 

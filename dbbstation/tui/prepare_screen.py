@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.held_line import HeldLine
-    from dbbstation.tui.reception import StationDesk
+    from dbbstation.tui.row_screen import StationDesk
 
 _GOOD, _OPEN, _NOTE = "✓", "!", "·"
 """Signs: checked and good; unknown; note."""

@@ -21,11 +21,9 @@ from dbbstation.results.words import (
     visibility_sentences,
 )
 from dbbstation.service.after import USUAL
-from dbbstation.service.job import SessionTask
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import SessionTask, WorkProgress
 from dbbstation.tui import texts
-from dbbstation.tui.acceptance_lines import worst_lines
-from dbbstation.tui.acceptance_screen import AcceptanceScreen
+from dbbstation.tui.acceptance_screen import AcceptanceScreen, worst_lines
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import YesQuestion
 from dbbstation.tui.row_screen import RowScreen

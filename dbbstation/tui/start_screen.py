@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.session_list import SessionLine
-    from dbbstation.tui.reception import StationDesk
+    from dbbstation.tui.row_screen import StationDesk
 
 _NAME = 22
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.service.choice import SetUpPart
-from dbbstation.service.job import SessionTask
-from dbbstation.service.order import Gate, Order
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.choice import Gate, Order, SetUpPart
+from dbbstation.service.work import SessionTask, WorkProgress
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:

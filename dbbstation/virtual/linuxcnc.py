@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.source_text import text_of
 from dbbstation.machine.kinematics import forward
 from dbbstation.machine.rotation import Frames

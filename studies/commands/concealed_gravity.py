@@ -31,7 +31,7 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
     from dbbstation.tasks.diagnose import STAGES
     from studies.concealed_figure import concealed_figure
     from studies.concealed_gravity import concealed_gravity as experiment

@@ -66,7 +66,7 @@ def coverage(
     from dbbstation.cli.progress import progress_bar
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
     from studies.coverage import coverage as experiment
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")

@@ -44,7 +44,7 @@ def gravity(*, machines: int, seed: int, figure: Path | None, force: bool, as_js
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
     from studies.gravity import gravity_study
     from studies.gravity_figure import gravity_figure
 

@@ -39,7 +39,7 @@ def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:
     from dbbstation.cli.progress import stage_bar
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.places import shipped_folder
     from studies.platform_joints import MOST_ROUNDS, numbers
     from studies.platform_joints import platform_joints as experiment
 

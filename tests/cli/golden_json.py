@@ -13,7 +13,7 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 GOLDEN = Path(__file__).parent / "golden"
 

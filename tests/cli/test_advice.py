@@ -22,7 +22,6 @@ COMMAND = re.compile(r"`dbbstation ([a-z][^`]*)`")
 OF_READERS = {
     "files/recordings/foreign_csv.py": ["import", "jig sheet", "jig holders"],
     "files/recordings/cmm_sheet.py": ["jig sheet"],
-    "files/recordings/cmm_long.py": ["jig sheet"],
     "files/recordings/table_csv.py": ["mismatch", "predict"],
     "files/formats/number_language.py": ["mismatch", "predict", "import", "jig sheet"],
     "report/pdf.py": ["report"],

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.errors import InputError
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.tasks.load import load_sessions
 from tests.cli.test_help import LINES, found
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dbbstation.cli import FAILED
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 RUN = "runs/a-ccw-1.csv"
 

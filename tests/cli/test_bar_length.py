@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dbbstation.cli import DONE, FAILED
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"
 MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"

@@ -8,8 +8,8 @@ import click
 import pytest
 
 from dbbstation.cli.declared import Finite
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.run_csv import count_in
-from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call
 from tests.cli.test_help import LINES, found
 

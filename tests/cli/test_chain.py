@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 pytestmark = pytest.mark.usefixtures("answers_kept")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan

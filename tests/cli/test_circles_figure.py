@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation import __version__
 from dbbstation.cli import DONE, FAILED, USAGE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.conftest import call
 from tests.cli.test_figure_options import BEGINS
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 pytestmark = pytest.mark.usefixtures("answers_kept")

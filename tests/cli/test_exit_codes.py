@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 PROGRAM = [sys.executable, "-m", "dbbstation"]
 PATIENCE_S = 60

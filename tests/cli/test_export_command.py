@@ -13,8 +13,8 @@ import pytest
 from pyarrow import parquet
 
 from dbbstation.cli import DONE, FAILED, USAGE
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.trace.cut import cut
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record

@@ -9,7 +9,7 @@ import pytest
 import dbbstation as dbb
 from dbbstation.cli import FAILED
 from dbbstation.errors import OutputError
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.conftest import call
 
 SIMULATORS = shipped_folder("fixtures") / "simulators"

@@ -9,7 +9,7 @@ import pytest
 from dbbstation.errors import InputError
 from dbbstation.files.checking import SCHEMAS
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.files.formats.test_schemas import EXAMPLES
 
 

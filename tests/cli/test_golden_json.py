@@ -7,7 +7,7 @@ import json
 import pytest
 
 from dbbstation.results.schemas import RESULTS
-from dbbstation.service.job import SessionTask
+from dbbstation.service.work import SessionTask
 from dbbstation.tui.results_screen import result_lines
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
 from tests.cli.json_schema import faults

@@ -16,7 +16,7 @@ import pytest
 from dbbstation.cli import DONE, FAILED
 from dbbstation.cli.history import history
 from dbbstation.files.kept import index_file
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.history.trend import FALSE_ALARMS
 from dbbstation.tasks.session_figures import session_figures
 from tests.cli.conftest import call

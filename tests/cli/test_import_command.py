@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.report.conditions import conditions
 
 FIXTURES = shipped_folder("fixtures")

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.files.formats.jig import read_jig
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 FIXTURES = shipped_folder("fixtures")
 PLATE = FIXTURES / "jigs" / "reference-plate.yaml"

@@ -13,7 +13,7 @@ import pytest
 
 from dbbstation import __version__
 from dbbstation.cli import DONE, FAILED, USAGE, log
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 MODEL = shipped_folder("fixtures") / "models" / "small.yaml"

@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import lfilter
 
 from dbbstation.cli import DONE, FAILED, USAGE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.diagnosis.table import plant
 from tests.diagnosis.table.plant import Truth, record
 

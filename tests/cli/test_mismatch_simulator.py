@@ -7,7 +7,7 @@ import runpy
 import numpy as np
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.test_schemas_of_results import faults
 
 FOLDER = shipped_folder("fixtures") / "simulators"

@@ -6,7 +6,7 @@ import csv
 
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.test_report_command import Page
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"

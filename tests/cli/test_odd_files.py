@@ -12,7 +12,7 @@ import zlib
 import pytest
 
 from dbbstation.cli import USAGE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.conftest import call
 
 FIXTURES = shipped_folder("fixtures")

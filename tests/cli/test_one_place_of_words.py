@@ -8,8 +8,8 @@ import re
 import pytest
 
 from dbbstation.cli import DONE
-from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.job import SessionTask
+from dbbstation.files.places import shipped_folder
+from dbbstation.service.work import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.results_screen import result_lines
 

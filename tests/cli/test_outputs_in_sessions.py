@@ -15,10 +15,10 @@ import pytest
 from dbbstation.cli import FAILED, cli
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import refuse_existing, write_folder, write_text
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recorded_ground import session_around
 from dbbstation.files.recordings.new_session import write_session
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call
 
 FIXTURES, PLANS = shipped_folder("fixtures"), shipped_folder("protocols") / "plans"

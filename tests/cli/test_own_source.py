@@ -12,7 +12,7 @@ from dbbstation.cli import FAILED
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.own_sources import every_source
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted

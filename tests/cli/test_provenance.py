@@ -14,8 +14,8 @@ import pytest
 
 from dbbstation import __version__
 from dbbstation.cli import DONE
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.provenance import Provenance
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.text import load_yaml
 
 PROGRAM = f"dbbstation {__version__}"

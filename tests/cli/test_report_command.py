@@ -20,8 +20,8 @@ from scipy.optimize import brentq
 from scipy.stats import rice
 
 from dbbstation.cli import DONE, FAILED
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.run_csv import read_run
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.text.digits import with_uncertainty
 from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import RandomKinematics

@@ -13,10 +13,10 @@ import pytest
 from dbbstation.cli import main
 from dbbstation.errors import InputError
 from dbbstation.files.formats.session import RunState, SessionFile
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.seal import chained
 from dbbstation.files.recordings.sealing import seal_session, sealing
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
 from tests.plant.session import record

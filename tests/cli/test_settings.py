@@ -14,7 +14,7 @@ from dbbstation.cli.settings import built_in
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.settings_schema import SettingsFile
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.plan.tolerance import CircleFigure, Tolerance, worst
 

@@ -8,8 +8,8 @@ import pytest
 from dbbstation.cli import DONE
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.truth import random_kinematics

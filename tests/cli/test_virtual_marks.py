@@ -11,10 +11,10 @@ import yaml
 
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import input_book, virtual_so_far
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.tasks.session_figures import session_figures
 from tests.cli.conftest import call
 

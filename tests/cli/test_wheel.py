@@ -72,7 +72,7 @@ def run(installed, folder, *arguments, timeout_s=120):
 
 
 def shipped(installed, folder, name):
-    script = f"from dbbstation.files.shipped import shipped_folder; print(shipped_folder({name!r}))"
+    script = f"from dbbstation.files.places import shipped_folder; print(shipped_folder({name!r}))"
     return Path(run(installed, folder, "python", "-c", script).stdout.strip())
 
 

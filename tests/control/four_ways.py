@@ -20,7 +20,7 @@ from dbbstation.control.parameters import FITTED, TRIED, drawn_poses, refitted, 
 from dbbstation.demo.in_control import genhexkins, made_kins
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.machine.geometry import Hexapod
 from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.identified import IdentifiedModel

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.control.kinematics import component
 from dbbstation.control.parameters import tool_errors
-from dbbstation.files.shipped import package_text
+from dbbstation.files.places import package_text
 from dbbstation.machine.rotation import Frames
 from dbbstation.virtual.linuxcnc import installed_component
 

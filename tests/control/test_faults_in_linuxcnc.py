@@ -12,7 +12,7 @@ import pytest
 
 from dbbstation.control.kinematics import component
 from dbbstation.demo.in_control import made_kins
-from dbbstation.files.shipped import package_text
+from dbbstation.files.places import package_text
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources

@@ -11,7 +11,7 @@ import pytest
 
 from dbbstation.control.kinematics import component, settings
 from dbbstation.errors import ModelError, StationError
-from dbbstation.files.shipped import package_text
+from dbbstation.files.places import package_text
 from dbbstation.machine.kinematics import forward
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel

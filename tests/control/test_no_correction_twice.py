@@ -13,8 +13,8 @@ from dbbstation.errors import InputError, ModelError, StationError
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.new_session import write_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion

@@ -8,7 +8,7 @@ from dbbstation.calibration.checks.missing_physics import misfit_of
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.inference.held_out import HeldOut
 from dbbstation.inference.levels import DifferenceFound, Differs, Levels
 from dbbstation.inference.verdict import Verdict

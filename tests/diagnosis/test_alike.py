@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.gravity import Gravity
 from dbbstation.sources.contract import Fitted

@@ -13,7 +13,7 @@ from dbbstation.diagnosis.compare.pairs import NotComparable, at_common_angles, 
 from dbbstation.diagnosis.compare.set_up import ALIKE, JIG
 from dbbstation.errors import TraceError
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.inference.verdict import Verdict
 from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Direction

@@ -9,13 +9,12 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.figures import calibration_figures
-from dbbstation.calibration.reporting.identified import identified_model
+from dbbstation.calibration.reporting.figures import calibration_figures, identified_model
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import pose_errors, position_uncertainty_mm, predicted_poses
 from dbbstation.report.content import parameters

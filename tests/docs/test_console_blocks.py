@@ -15,7 +15,7 @@ import pytest
 from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.diagnosis.findings import Shift, SourceFinding, Unexplained
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.inference.levels import DifferenceFound, Differs, Levels
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.diagnosis import BeforeAfter, DiagnosisFigures

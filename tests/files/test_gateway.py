@@ -33,7 +33,7 @@ ROUND_IT = {
     "cli/settings.py": "reads a file of the package",
     "report/html.py": "reads a file of the package",
     "report/pdf.py": "reads what the browser has just printed",
-    "files/shipped.py": "reads a file of the package",
+    "files/places.py": "reads a file of the package",
     "simulators/program.py": "creates the file that it writes",
 }
 """Files that open files themselves, each with its reason."""

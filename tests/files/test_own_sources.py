@@ -13,7 +13,7 @@ import pytest
 from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.own_sources import every_source, sources_of
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.sources import registry
 from dbbstation.sources.contract import Owner
 from dbbstation.sources.registry import known_sources, sources_named

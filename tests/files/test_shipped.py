@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -38,7 +38,7 @@ def test_from_a_wheel(tmp_path: Path) -> None:
     assert {name.split("/sessions/")[1].split("/")[0] for name in names if "/sessions/" in name} == {"small"}
     assert size < 500_000
     program = (
-        "from dbbstation.files.shipped import shipped_folder\nfrom dbbstation.files.formats.plan import read_plan\n"
+        "from dbbstation.files.places import shipped_folder\nfrom dbbstation.files.formats.plan import read_plan\n"
         "print(shipped_folder('protocols'))\nprint(len(read_plan(shipped_folder('protocols') / 'plans/table2.yaml').tests))\n"
         "print(len(read_plan(shipped_folder('fixtures') / 'plans/every-key.yaml').tests))\n"
     )

@@ -7,7 +7,7 @@ import zipfile
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.fuzz.mutate import SOUND
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.sealing import seal_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call
 
 LOGGED = shipped_folder("fixtures") / "sessions" / "logged"

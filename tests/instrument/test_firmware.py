@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.instrument.codec import Decoder, decode, encode
 from dbbstation.instrument.doubt import Piece
 from dbbstation.instrument.library import load_instrument

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import dbbstation
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.machine import compiled as module
 from dbbstation.machine.compiled import NotKeptWarning, compiled
 

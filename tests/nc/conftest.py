@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.machine.geometry import Machine
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.dialect import Dialect

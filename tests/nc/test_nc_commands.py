@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from dbbstation.cli.programs import compensate, program
 from dbbstation.errors import InputError, ModelError, OutputError, StationError, TravelError
 from dbbstation.files.formats.model import write_model
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 
 PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"

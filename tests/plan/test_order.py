@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.plan import order
 from dbbstation.plan.order import LARGEST_LEAK, against_drift, by_holder, height_and_drift, mountings
 from dbbstation.plan.plan import Plan
-from dbbstation.service.order import Gate, Order, ordered
+from dbbstation.service.choice import Gate, Order, ordered
 
 TABLE2 = shipped_folder("protocols") / "plans" / "table2.yaml"
 HOLDERS = {"short": 0.0, "long": 142.0, "riser": 280.0}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.plan.sampling import UNDULATIONS, enough_feed_mm_min, sampling
 
 CIRCLE = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml").tests["a"].circle

@@ -12,9 +12,9 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import SessionDetails
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.judged import circles_of_plan
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, effects_of

@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.report.calibration_figure import _round, calibration_figure
 from dbbstation.virtual.truth import random_kinematics

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.browser import Browser, chromium
 from tests.cli.conftest import call
 from tests.report.checklist import certificate, figures

@@ -10,9 +10,9 @@ import pytest
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 from dbbstation.report.certificate import _dates, _lacking

@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from dbbstation.cli import DONE
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.browser import DESKTOP, PHONE, Browser, axe_script, chromium
 from tests.cli.conftest import call
 from tests.sessions_over_time import sessions_over_time

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from tests.cli.conftest import call
 
 if TYPE_CHECKING:

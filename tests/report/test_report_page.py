@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.path import Filter
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.report.polar import BINS, CIRCLE, MOST_DRAWN, REACH, SIZE, _points, polar, step_of
 from dbbstation.results.tolerances import Conformity, Size, conformity
 from dbbstation.tasks.circle_runs import load_circles

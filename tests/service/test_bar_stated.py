@@ -6,7 +6,7 @@ from datetime import date
 
 import pytest
 
-from dbbstation.service.bar_stated import doubt_of, fault_of
+from dbbstation.service.bar_calibration import doubt_of, fault_of
 
 TODAY = date(2026, 11, 24)
 

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan
 from dbbstation.service.board import Board, Mark, RunDecision, SequenceOpened, Weight

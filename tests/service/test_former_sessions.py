@@ -10,15 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import USUAL, After
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, keep_models
-from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.live_trace import last_traces
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import Call, SessionTask, WorkProgress
 from tests.plant.mechanisms.balls import CmmScatter
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import BEGUN, Program, record

@@ -18,22 +18,19 @@ from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.errors import InputError, TravelError
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.formats.session import Note
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import circle_s
 from dbbstation.service.after import After, Result
-from dbbstation.service.candidates import CandidateFormat, candidates
-from dbbstation.service.choice import Choice, SetUpPart
+from dbbstation.service.choice import Choice, Gate, Order, SetUpPart, ordered
 from dbbstation.service.front import Front
 from dbbstation.service.held_line import probe
-from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
-from dbbstation.service.order import Gate, Order, ordered
-from dbbstation.service.session_list import list_sessions
+from dbbstation.service.session_list import CandidateFormat, candidates, list_sessions
 from dbbstation.service.session_notes import add_note, shop_degc
-from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.service.work import BackgroundWork, Call, SessionTask, WorkProgress
 from dbbstation.tasks.declare import options_of
 from dbbstation.virtual.wire import VirtualInstrument
 from tests.cli.conftest import call

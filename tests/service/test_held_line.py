@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.instrument import driver
 from dbbstation.instrument.library import load_instrument
 from dbbstation.service import held_line

@@ -10,13 +10,12 @@ import pytest
 
 from dbbstation.errors import OutputError
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import After
-from dbbstation.service.job import Call, SessionTask
 from dbbstation.service.session_notes import give_verdict
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import Call, SessionTask, WorkProgress
 from dbbstation.station.commands import Judge
 
 if TYPE_CHECKING:

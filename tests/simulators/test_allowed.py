@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from dbbstation.cli import FAILED
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.simulators import allowed
 from tests.cli.conftest import call
 

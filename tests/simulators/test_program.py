@@ -9,7 +9,7 @@ from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.diagnosis.simulator.terms import Term, TermForm
 from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.simulator import parse_simulator
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.simulators import kept
 from dbbstation.simulators.loading import load_simulator
 from dbbstation.simulators.running import Runs

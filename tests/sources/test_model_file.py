@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import read_model, write_model
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Owner

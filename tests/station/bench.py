@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.instrument.library import at_rate, load_instrument
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.cell import VirtualCell

@@ -24,7 +24,7 @@ import numpy as np
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy, SessionDetails
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import at_rate, load_instrument
 from dbbstation.instrument.reading import Reading

@@ -16,8 +16,8 @@ import pytest
 from dbbstation.errors import InputError
 from dbbstation.files.formats.bar import read_bar
 from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.bar import Bar

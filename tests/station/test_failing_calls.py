@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 SOURCE = Path(__file__).with_name("failing_calls.c")
 

@@ -15,10 +15,10 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.order import Gate, Order, ordered
+from dbbstation.service.choice import Gate, Order, ordered
 from dbbstation.station.assembly import check_plan
 from dbbstation.trace.cut import cut
 from dbbstation.virtual.machine import Sizes

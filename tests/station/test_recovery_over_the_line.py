@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, calibrate
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.tasks.load import load_sessions
 from tests.station.bench import bench
 

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from dbbstation.errors import StationError
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.event_log import read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes that are forked")
 

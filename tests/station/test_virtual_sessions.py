@@ -13,9 +13,9 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.choice import Choice, prepare
 from dbbstation.service.front import line_to_go_on

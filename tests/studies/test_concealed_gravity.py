@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from studies import concealed_gravity
 from studies.concealed_figure import concealed_figure
 from tests.once import STUDIES, computed_once

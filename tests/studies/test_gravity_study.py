@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from dbbstation.errors import OutputError
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from studies.__main__ import study as studies
 from studies.gravity import (
     JOINT,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from studies.platform_joints import platform_joints
 
 

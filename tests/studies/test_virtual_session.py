@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import BAR_UNCERTAINTY_MM, draw_session

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 

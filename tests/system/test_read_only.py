@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 
 FIXTURES = shipped_folder("fixtures")
 NOBODY = 65534

@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from dbbstation.computing.processes import each
-from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.job import Call
-from dbbstation.service.work import BackgroundWork, WorkProgress
+from dbbstation.files.places import shipped_folder
+from dbbstation.service.work import BackgroundWork, Call, WorkProgress
 from dbbstation.system.children import python_module
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import InputError, ModelError, OutputError
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.tasks.calibrate import STAGES, calibrate
 from dbbstation.tasks.evaluate import evaluate
 from dbbstation.tasks.load import load

@@ -7,9 +7,9 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.journal import run_header, run_line
 from dbbstation.files.recordings.run_csv import parse_run
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.observation import Observation
 from dbbstation.model.simulation import setup_of
 from dbbstation.plan.circle import Direction

@@ -13,8 +13,7 @@ from textual.widgets import OptionList, Static
 from dbbstation.errors import InputError, Problem
 from dbbstation.service.after import After
 from dbbstation.service.former_sessions import BeforeAndNow
-from dbbstation.service.job import SessionTask
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import SessionTask, WorkProgress
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.help_screen import HelpScreen

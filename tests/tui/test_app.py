@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from textual.events import Key
 from textual.widgets import Input, Static
 
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Name, found
 from dbbstation.report.conditions import conditions

@@ -13,8 +13,8 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction

@@ -15,8 +15,8 @@ from click.testing import CliRunner
 from dbbstation.cli import COMMANDS
 from dbbstation.cli.measure import measure
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
-from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.order import Gate, Order, ordered
+from dbbstation.files.places import shipped_folder
+from dbbstation.service.choice import Gate, Order, ordered
 from tests.cli.conftest import call
 
 REAL = ["--plan", "p.yaml", "--machine", "m.yaml", "--instrument", "heidenhain-nd281b", "--port", "COM3", "--out", "s"]

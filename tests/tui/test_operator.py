@@ -21,19 +21,18 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import Note, SessionDetails
 from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.quality.conformity import Conformity
 from dbbstation.quality.finding import Name, found
 from dbbstation.service.board import Board, Message, RunDecision, Weight, message_of
 from dbbstation.service.front import Front
-from dbbstation.service.job import Call
 from dbbstation.service.memory import Memory
 from dbbstation.service.operated import SHIFT_S, Answered, JobAnswer, answer_of, read_operated
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import Call, WorkProgress
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Quit, Repeat
 from dbbstation.station.events import Fault

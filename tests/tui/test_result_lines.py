@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dbbstation.files.shipped import shipped_folder
-from dbbstation.service.job import SessionTask
+from dbbstation.files.places import shipped_folder
+from dbbstation.service.work import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.results_screen import result_lines
 from tests.cli.conftest import call

@@ -16,8 +16,8 @@ from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import InlinePlan, read_inline_plan
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
 from dbbstation.service.held_line import HeldLine

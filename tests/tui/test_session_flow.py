@@ -15,16 +15,15 @@ from textual.widgets import OptionList, Static
 
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import After
 from dbbstation.service.choice import SetUpPart
 from dbbstation.service.front import Front
-from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Memory
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import SessionTask, WorkProgress
 from dbbstation.station.programs import RunProgram
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp

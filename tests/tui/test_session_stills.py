@@ -20,18 +20,16 @@ import pytest
 
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.facts.serialise import plain
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.service.after import After, Result
 from dbbstation.service.bar_calibration import Calibrated
-from dbbstation.service.choice import Choice, Prepared
+from dbbstation.service.choice import Choice, Gate, Order, Prepared
 from dbbstation.service.former_sessions import BeforeAndNow, Former, InForce
 from dbbstation.service.front import Front
-from dbbstation.service.job import SessionTask
 from dbbstation.service.memory import Line, Memory, Remembered
-from dbbstation.service.order import Gate, Order
 from dbbstation.service.session_list import SessionLine
-from dbbstation.service.work import WorkProgress
+from dbbstation.service.work import SessionTask, WorkProgress
 from dbbstation.station.events import Sample
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_screen import AcceptanceScreen

@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.errors import MachineError
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.virtual.cell import VirtualCell

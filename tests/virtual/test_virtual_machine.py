@@ -8,7 +8,7 @@ import pytest
 
 from dbbstation.errors import MachineError
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.toolpath import ToolpathBuilder

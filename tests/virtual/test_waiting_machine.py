@@ -12,8 +12,8 @@ import pytest
 
 from dbbstation.cli.measure import VirtualHands
 from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.stamps import MachineTime
 from dbbstation.virtual.wire_clock import WaitingClock
 from tests.cli.conftest import call

@@ -10,9 +10,8 @@ import numpy as np
 
 from dbbstation.calibration.currents.channel import current_blocks, current_channel, current_start
 from dbbstation.calibration.currents.findings import MotorFindings, motor_findings
-from dbbstation.calibration.fit.directions import in_words, of_circles
+from dbbstation.calibration.fit.directions import Name, in_words, names_of, of_circles, prescribed
 from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
-from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import CalibrationError

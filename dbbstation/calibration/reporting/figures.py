@@ -18,7 +18,8 @@ from dbbstation.calibration.reporting.motors import CurrentsFigures, motor_curre
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.serialise import Absent, Array, plain
 from dbbstation.facts.value import Value
-from dbbstation.model.identified import known_u
+from dbbstation.model.identified import IdentifiedModel, known_u
+from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.layout import ParameterSet
     from dbbstation.calibration.reporting.evaluation import Evaluation
     from dbbstation.computing.arrays import Floats
-    from dbbstation.model.identified import IdentifiedModel
+
 
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost", "covariance"})
 """Parts of a result that a model file stores elsewhere."""
@@ -164,4 +165,25 @@ def _values(calibration: Calibration, term: ParameterSet, u: Floats) -> SourceVa
         parameters={
             parameter.name: Value(float(value), float(known), parameter.unit) for parameter, value, known in numbers
         },
+    )
+
+
+def identified_model(
+    calibration: Calibration, report: Mapping[str, Any], sessions: Mapping[str, str]
+) -> IdentifiedModel:
+    """Return the model to store, with the covariance of machine parameters and the origin of the data."""
+    machines = [term for term in calibration.layout.terms if term.source.belongs_to is Owner.MACHINE]
+    rows = np.concatenate([np.r_[term.columns] for term in machines])
+    names = calibration.layout.names
+    of_formulas = calibration.layout.formula_variance(calibration.x)[rows]
+    covariance = calibration.solution.covariance[np.ix_(rows, rows)] + np.diag(of_formulas)
+    return IdentifiedModel(
+        model=MachineModel(calibration.layout.machine, calibration.model.sources),
+        covariance_rows=tuple(names[row] for row in rows),
+        covariance=(covariance + covariance.T) / 2.0,
+        directions_lost=calibration.directions_lost,
+        report=report,
+        sessions=sessions,
+        null_space=calibration.null_space[:, rows],
+        formula_variance=of_formulas,
     )

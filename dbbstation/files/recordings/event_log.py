@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 EVENTS_FILE = "events.log"
 """Name of the log in the session folder."""
-
-_LINK_LENGTH = 64
 _LINE = re.compile(rb"([0-9a-f]{64})  (\{.*\})")
 
 

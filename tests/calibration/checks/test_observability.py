@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.simulation import setup_of
 from dbbstation.plan.plan import Plan

@@ -12,7 +12,7 @@ from dbbstation.calibration.checks.scatter import check_scatter, seats_of
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session

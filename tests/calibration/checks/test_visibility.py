@@ -9,7 +9,7 @@ from dbbstation.calibration.checks.visibility import indices, visibility
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.registry import sources_named
 from studies.virtual_session import draw_session

@@ -14,7 +14,7 @@ from dbbstation.calibration.layout import lay_out
 from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources

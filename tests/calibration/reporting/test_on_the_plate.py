@@ -8,9 +8,9 @@ import pytest
 from dbbstation.calibration.checks.scatter import seats_of
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.on_the_plate import SECTORS, ball_shifts, circle_tests
+from dbbstation.calibration.reporting.residual_map import CIRCLE_SECTORS, ball_shifts, circle_tests
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.circle import by_angle
@@ -31,7 +31,7 @@ def test_curves_are_the_recording_less_the_circle_and_less_the_model(fit):
     for k, observation in enumerate(fit.observations):
         raw = observation.raw
         (circle,) = (one for one in tests[observation.test].circles if one.direction is raw.circle.direction)
-        assert circle.theta_deg.shape == (SECTORS,)
+        assert circle.theta_deg.shape == (CIRCLE_SECTORS,)
         # Two samples a sector, from -X or +X on: pairs by hand.
         pairs = (1e3 * (raw.length_mm - raw.circle.bar_mm)).reshape(-1, 2).mean(axis=1)
         left = (1e3 * fit.machine_residual_mm[k]).reshape(-1, 2).mean(axis=1)

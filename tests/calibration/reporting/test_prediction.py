@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from dbbstation.calibration.reporting.prediction import predicted_circles, smooth_circularity_um
 from dbbstation.cli import cli
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources

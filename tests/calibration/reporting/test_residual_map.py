@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.calibration.reporting.residual_map import SECTORS, names_of_tests, residual_map
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from studies.virtual_session import draw_session

@@ -14,7 +14,7 @@ from dbbstation.errors import InputError, ModelError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import covariance_fault, read_model, write_model
 from dbbstation.files.own_sources import every_source
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Effect, ErrorSource, Fitted, Owner, Parameter

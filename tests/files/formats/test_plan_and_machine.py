@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import machine_data, read_machine
 from dbbstation.files.formats.plan import plan_data, read_inline_plan, read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.machine.geometry import JointAxes
 from dbbstation.machine.rotation import Rotation

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dbbstation.files.checking import SCHEMAS, json_schema
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.schema import FORMATS, keys_at
 from dbbstation.files.yaml.text import load_yaml
 

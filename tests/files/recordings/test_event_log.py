@@ -15,13 +15,13 @@ import pytest
 from dbbstation.cli import DONE, FAILED
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.session import Note, RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.amending import amend
 from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
 from dbbstation.files.recordings.seal import copy_faults
 from dbbstation.files.recordings.sealing import seal_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from tests.cli.conftest import call
 from tests.files.recordings.test_session_writer import BEGUN, COLUMNS, fill

@@ -14,10 +14,10 @@ from dbbstation.files.checking import check
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.lock import LOCK_FILE, SessionLock
 from dbbstation.files.recordings.session import unlisted_sealed
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from tests.files.recordings.test_session_writer import BEGUN, COLUMNS, fill
 

@@ -16,11 +16,11 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import SessionDetails
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.amending import amend
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.virtual.machine import VirtualMachine

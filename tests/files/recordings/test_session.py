@@ -12,8 +12,8 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.session import RunState
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"

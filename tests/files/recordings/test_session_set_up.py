@@ -12,9 +12,9 @@ import pytest
 from dbbstation.errors import InputError
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import SessionDetails
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.station.opening import open_session
 

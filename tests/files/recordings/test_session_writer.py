@@ -12,10 +12,10 @@ from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import RunState, SessionDetails
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 

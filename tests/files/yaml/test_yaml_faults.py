@@ -13,7 +13,7 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.text import load_yaml
 
 FIXTURES = shipped_folder("fixtures")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.places import shipped_folder
 from dbbstation.tasks.importing.splitting import longest_pause_s, parts_by_direction, parts_by_gaps
 
 UP = np.arange(-45.0, 405.0)

@@ -45,7 +45,7 @@ def test_help_has_an_example(command: click.Command) -> None:
 
 def test_help_loads_no_serial_library() -> None:
     code = (
-        "import sys; from dbbstation.cli import instruments, monitor, replay; "
+        "import sys; from dbbstation.cli import instruments, monitor; "
         "sys.exit(', '.join({'serial', 'pydantic', 'ruamel'} & set(sys.modules)) or None)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -174,6 +174,12 @@ def refusal(error: OSError) -> tuple[str, str]:
     return (error.strerror or str(error)).lower(), _REMEDIES.get(error.errno or 0, _OTHERWISE)
 
 
+def unwritable(error: OSError, where: object, done: str = "written") -> OutputError:
+    """Return the error of a write that the system refused."""
+    why, remedy = refusal(error)
+    return OutputError(f"cannot be {done}: {why}", where=str(where), remedy=remedy)
+
+
 def in_a_sentence(error: OSError) -> str:
     """Return reason and remedy as one sentence."""
     why, remedy = refusal(error)

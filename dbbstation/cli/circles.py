@@ -44,7 +44,7 @@ circles = command(task, show, CommandOutput("table", table=True, field="csv"), f
 
 def _print(result: CirclesResult, *, several: bool) -> None:
     from dbbstation.cli.output import EXPANDED, print_table
-    from dbbstation.results.circles import RunWithoutCircle
+    from dbbstation.results.circles import RunWithoutCircle, why_not
 
     echo(f"figures of {result.edition}, filter: {result.filter}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
@@ -113,7 +113,8 @@ def _print(result: CirclesResult, *, several: bool) -> None:
             )
         print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "U", "D", "U", "H", "U"], "at [deg]"], rows)
     echo("\nG, F and H exclude the contribution of noise; --budget states this contribution.")
-    _print_why_not(_with_budgets(result))
+    for line in why_not(result):
+        echo(line)
 
 
 def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
@@ -123,22 +124,6 @@ def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> 
     return with_uncertainty(value, expanded_uncertainty(run.uncertainty[name].u_um, COVERAGE_FACTOR))
 
 
-def _print_why_not(runs: Sequence[CircleFiguresResult | PairFigures]) -> None:
-    of: dict[str, dict[str, None]] = {}
-    for run in runs:
-        for quantity, budget in run.uncertainty.items():
-            if budget.why_not:
-                of.setdefault(budget.why_not, {})[quantity] = None
-    for why, figures in of.items():
-        echo(f"{', '.join(figures)}: {why}")
-
-
-def _with_budgets(result: CirclesResult) -> list[CircleFiguresResult | PairFigures]:
-    from dbbstation.results.circles import RunWithoutCircle
-
-    return [*(run for run in result.runs if not isinstance(run, RunWithoutCircle)), *result.pairs]
-
-
 def _noise(run: CircleFiguresResult) -> object:
     noise = run.noise_um.of_a_reading
     return "-" if noise is None else f"{noise:.2f}"
@@ -146,10 +131,10 @@ def _noise(run: CircleFiguresResult) -> object:
 
 def _print_budgets(result: CirclesResult) -> None:
     from dbbstation.cli.output import print_table
+    from dbbstation.results.circles import not_stated, with_budgets
 
     rows: list[list[object]] = []
-    missing: dict[str, None] = {}
-    for run in _with_budgets(result):
+    for run in with_budgets(result):
         for quantity, budget in run.uncertainty.items():
             name = [run.test, getattr(run, "direction", "both"), run.repeat, quantity]
             rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget.terms_um.items()]
@@ -158,10 +143,9 @@ def _print_budgets(result: CirclesResult) -> None:
             if budget.as_read_um != budget.value_um:
                 taken = abs(budget.as_read_um - budget.value_um)
                 rows.append([*name, "added by noise, taken off", f"{taken:.3f}"])
-            missing |= dict.fromkeys(budget.missing)
     echo("\nstandard uncertainties u [µm]")
     print_table(["test", "dir", "n", "figure", "term", "u"], rows)
-    echo(f"not stated, and therefore not in U: {', '.join(missing)}")
+    echo(f"not stated, and therefore not in U: {', '.join(not_stated(result))}")
 
 
 def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> None:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.output import echo
 from dbbstation.errors import OutputError
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
 
     from dbbstation.inference.cancelling import Cancelling
@@ -26,12 +26,6 @@ LIKELY = 0.5
 
 MOST_NAMES = 6
 """Greatest number of names that are printed in a row."""
-
-
-def first_names(names: Sequence[str]) -> str:
-    """Return the first names of a list as text, with the count of omitted names."""
-    shown = ", ".join(names[:MOST_NAMES])
-    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
 
 
 def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
@@ -65,7 +59,7 @@ def print_left(result: MismatchResult | SimulatorResult, beyond: str = "") -> No
     for verdict in ("not-testable", "ruled-out"):
         names = [f.name for f in result.findings if f.verdict == verdict]
         if names:
-            echo(f"{verdict}: {first_names(names)}")
+            echo(f"{verdict}: {listed(names, MOST_NAMES)}")
     if result.next:
         echo("\nmeasure next:")
         for step in result.next:

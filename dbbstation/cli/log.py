@@ -20,7 +20,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
-from dbbstation.errors import OutputError, refusal
+from dbbstation.errors import unwritable
 from dbbstation.files.recorded_ground import session_around
 from dbbstation.system.handles import open_nothing, open_private
 from dbbstation.text.printable import printable
@@ -217,8 +217,7 @@ def flush_output() -> None:
     except BrokenPipeError:
         raise
     except OSError as error:
-        why, remedy = refusal(error)
-        raise OutputError(f"cannot be written: {why}", where="standard output", remedy=remedy) from error
+        raise unwritable(error, "standard output") from error
 
 
 def drop_unwritable() -> None:

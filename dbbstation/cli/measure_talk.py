@@ -133,7 +133,7 @@ class Summary:
             state=run.state.value,
             file=f"runs/{run.path.name}",
         )
-        completed = self._completed.get(f"{run.test}-{run.direction}-{run.repeat}")
+        completed = self._completed.get(run.name)
         if completed is None:
             return recorded
         figures = completed.figures

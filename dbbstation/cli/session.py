@@ -56,7 +56,7 @@ def list_runs(folder: _Folder) -> Answer:
     missing, runs = _missing(read), repeats_in_order(read.runs)
     listed = tuple(
         ListedRun(
-            run=_name(run),
+            run=run.name,
             test=run.test,
             direction=run.direction.value,
             repeat=run.repeat,
@@ -71,7 +71,7 @@ def list_runs(folder: _Folder) -> Answer:
     )
     rows = [
         [
-            _name(run),
+            run.name,
             _at(run.started),
             "" if run.mounting is None else run.mounting,
             run.state.value,
@@ -140,7 +140,7 @@ def take_in(folder: _Folder) -> Answer:
     from dbbstation.files.recordings.session_writer import SessionWriter
 
     with SessionWriter.open(folder, PATIENCE_S) as writer:
-        taken = [_name(writer.take_in(path)) for path in unlisted_sealed(writer.session)]
+        taken = [writer.take_in(path).name for path in unlisted_sealed(writer.session)]
     words = [f"{name}: complete, accept or reject it" for name in taken]
     return Answer({"session": str(folder), "taken_in": taken}, words or ["the session lists every sealed run already"])
 
@@ -270,10 +270,6 @@ def _at(moment: datetime | None) -> str:
     return "" if moment is None else moment.strftime("%Y-%m-%d %H:%M:%S %Z").strip()
 
 
-def _name(run: RunEntry) -> str:
-    return f"{run.test}-{run.direction}-{run.repeat}"
-
-
 def _told(name: str, run: RunEntry) -> Answer:
     state, reason = run.state.value, run.reason
     words = [f"{name}: {state}" + (f" ({reason})" if reason else "")]
@@ -304,7 +300,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
     from dbbstation.files.recordings.session_writer import SessionWriter
 
     with SessionWriter.open(folder, PATIENCE_S) as writer:
-        entries = {_name(entry): entry for entry in writer.runs}
+        entries = {entry.name: entry for entry in writer.runs}
         if run not in entries:
             near = difflib.get_close_matches(run, entries, n=1, cutoff=0.6)
             remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"

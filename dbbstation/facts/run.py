@@ -13,6 +13,16 @@ class OfRun:
     direction: str
     repeat: int
 
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """Return what tells the run from the others of its session."""
+        return self.test, self.direction, self.repeat
+
+    @property
+    def label(self) -> str:
+        """Return the name for messages and file, such as `a-ccw-1`."""
+        return f"{self.test}-{self.direction}-{self.repeat}"
+
 
 @dataclass(frozen=True)
 class OfRunInSession:

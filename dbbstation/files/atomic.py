@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
-from dbbstation.errors import OutputError, refusal
+from dbbstation.errors import OutputError, unwritable
 from dbbstation.files.inputs import was_read
 from dbbstation.files.places import real_path
 from dbbstation.files.recorded_ground import refuse_recorded
@@ -154,8 +154,7 @@ def _refuse_unfit(path: Path, *, force: bool) -> None:
         what = f"cannot be written: there is no folder {path.parent}"
         raise OutputError(what, where=str(path), remedy="make the folder, or name another")
     if not may_write(path.parent):
-        why, remedy = refusal(PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
-        raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy)
+        raise unwritable(PermissionError(errno.EACCES, os.strerror(errno.EACCES)), path)
 
 
 def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
@@ -294,5 +293,4 @@ def _told(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        why, remedy = refusal(error)
-        raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy) from error
+        raise unwritable(error, path) from error

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS, Hexapod
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -56,8 +57,7 @@ def differences(one: Machine, other: Machine) -> tuple[Difference, ...]:
 
 def in_words(found: Sequence[Difference], most: int = 4) -> str:
     """Return the first differences in words, with the count of others."""
-    more = f" and {len(found) - most} more" if len(found) > most else ""
-    return "; ".join(difference.text for difference in found[:most]) + more
+    return listed([difference.text for difference in found], most, between="; ")
 
 
 def check_model_is_of(machine: Machine, calibrated: Machine) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import CLOCK_S, impossible_day, sealed_at
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -31,9 +32,7 @@ class Certified:
         """Return `Certificate of circular tests`, or `Not a certificate` with the missing facts."""
         if not self.lacking:
             return "Certificate of circular tests"
-        more = len(self.lacking) - MOST_NAMED
-        named = ", ".join(self.lacking[:MOST_NAMED])
-        return f"Not a certificate: {named}{f' and {more} more' if more > 0 else ''}"
+        return f"Not a certificate: {listed(self.lacking, MOST_NAMED)}"
 
 
 def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolerances: bool) -> Certified:
@@ -79,7 +78,7 @@ def sealed_after(session: SessionFolder) -> list[tuple[RunEntry, timedelta]]:
     """Return accepted runs with the time from start to seal; a virtual machine has a separate clock."""
     at = {} if session.virtual or session.seal is None else sealed_at(session.folder)
     runs = session.in_state(RunState.ACCEPTED) if at else ()
-    dated = [(run, run.started, at.get((run.test, run.direction.value, run.repeat))) for run in runs]
+    dated = [(run, run.started, at.get(run.key)) for run in runs]
     return [(run, sealed - began) for run, began, sealed in dated if began is not None and sealed is not None]
 
 

@@ -15,7 +15,7 @@ from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, TitledPolar, cured_polars, polar
 from dbbstation.report.shown import ReportContent, ShownBudget, ShownFindings, ShownModel, ShownSession
-from dbbstation.results.circles import RunWithoutCircle, circles_result
+from dbbstation.results.circles import RunWithoutCircle, circles_result, not_stated, why_not
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.report import (
     CertificateState,
@@ -35,7 +35,6 @@ from dbbstation.text.digits import to_its_place
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from dbbstation.circles.budget import Budget
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
@@ -184,8 +183,8 @@ def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance
         before_name="" if reported.before is None else reported.before.sessions[0].name,
         several=len(found.sessions) > 1,
         findings=_findings(found),
-        not_stated=_not_stated(numbers.circles),
-        why_not=_why_not(numbers.circles),
+        not_stated=not_stated(numbers.circles),
+        why_not=why_not(numbers.circles),
         tolerances_from=reported.settings.tolerances_from,
         modelled=None
         if modelled is None
@@ -270,12 +269,6 @@ def _findings(found: Circled) -> ShownFindings:
     return ShownFindings(wrong, [(name, text, runs) for (name, text), runs in undecided.items()], good)
 
 
-def _budgets(circles: CirclesResult) -> Iterable[tuple[str, Budget]]:
-    for one in (*circles.runs, *circles.pairs):
-        if not isinstance(one, RunWithoutCircle):
-            yield from one.uncertainty.items()
-
-
 def _budget(circles: CirclesResult) -> ShownBudget | None:
     runs = [one for one in circles.runs if not isinstance(one, RunWithoutCircle)]
     if not runs:
@@ -289,18 +282,6 @@ def _budget(circles: CirclesResult) -> ShownBudget | None:
     ]
     rows.append(("u, all together", [budget.u_um for budget in budgets]))
     return ShownBudget(f"{run.test} {run.direction} {run.repeat}", list(run.uncertainty), rows)
-
-
-def _not_stated(circles: CirclesResult) -> list[str]:
-    return list(dict.fromkeys(cause for _, budget in _budgets(circles) for cause in budget.missing))
-
-
-def _why_not(circles: CirclesResult) -> list[str]:
-    of: dict[str, dict[str, None]] = {}
-    for figure, budget in _budgets(circles):
-        if budget.why_not:
-            of.setdefault(budget.why_not, {})[figure] = None
-    return [f"{', '.join(figures)}: {why}" for why, figures in of.items()]
 
 
 def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:

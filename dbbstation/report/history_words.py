@@ -6,6 +6,8 @@ from collections import Counter
 from math import floor, log10
 from typing import TYPE_CHECKING
 
+from dbbstation.text.counting import listed
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -64,9 +66,8 @@ def changes_in_words(machine: MachineHistoryResult, coverage_factor: float) -> I
         when = f"{found.name} ({found.date})"
         where = "" if since.name == found.name else f", since {since.name} ({since.date})"
         beside = f"; {', '.join(change.beside)}" if change.beside else ""
-        sizes = [f"{one.quantity} {changed_in_words(one, coverage_factor)}" for one in change.quantities[:MOST_NAMED]]
-        more = len(change.quantities) - MOST_NAMED
-        yield f"{change.verdict}: {when}{where}{beside}: {', '.join(sizes)}" + (f" and {more} more" if more > 0 else "")
+        sizes = [f"{one.quantity} {changed_in_words(one, coverage_factor)}" for one in change.quantities]
+        yield f"{change.verdict}: {when}{where}{beside}: {listed(sizes, MOST_NAMED)}"
 
 
 def changed_in_words(one: ChangedQuantity, coverage_factor: float) -> str:

@@ -256,6 +256,27 @@ class CirclesResult(Framed):
         return [run.row() for run in self.runs]
 
 
+def with_budgets(result: CirclesResult) -> list[CircleFiguresResult | PairFigures]:
+    """Return the runs that show a circle, and the pairs."""
+    return [*(run for run in result.runs if not isinstance(run, RunWithoutCircle)), *result.pairs]
+
+
+def not_stated(result: CirclesResult) -> list[str]:
+    """Return the causes of uncertainty that nobody stated."""
+    budgets = (budget for one in with_budgets(result) for budget in one.uncertainty.values())
+    return list(dict.fromkeys(cause for budget in budgets for cause in budget.missing))
+
+
+def why_not(result: CirclesResult) -> list[str]:
+    """Return a sentence per reason why figures have no uncertainty."""
+    of: dict[str, dict[str, None]] = {}
+    for one in with_budgets(result):
+        for figure, budget in one.uncertainty.items():
+            if budget.why_not:
+                of.setdefault(budget.why_not, {})[figure] = None
+    return [f"{', '.join(figures)}: {why}" for why, figures in of.items()]
+
+
 def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) -> CirclesResult:
     """Return the figures of circles."""
     return CirclesResult(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.inference.levels import RUN, TIME, Differs, FollowsAnswer
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -159,9 +160,8 @@ def _numbers(values: Mapping[str, Value]) -> str:
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    more = len(names) - MOST_LISTED
-    if more > 0:
-        return f"{', '.join(names[:MOST_LISTED])} and {more} more"
+    if len(names) > MOST_LISTED:
+        return listed(names, MOST_LISTED)
     return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"  # noqa: PLR2004 - a pair
 
 

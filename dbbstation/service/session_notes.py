@@ -55,9 +55,9 @@ def give_verdict(folder: Path, command: Judge) -> None:
         OutputError: no such run, another process writes into the session, or the disk refuses.
     """
     with SessionWriter.open(folder, RELEASE_S) as writer:
-        key = (command.test, command.direction, command.repeat)
-        run = next((one for one in writer.runs if (one.test, one.direction, one.repeat) == key), None)
+        run = next((one for one in writer.runs if one.key == command.key), None)
         if run is None:
-            name = f"{command.test}-{command.direction}-{command.repeat}"
-            raise OutputError(f"the session has no run {name}", where=str(folder), remedy="choose one that it has")
+            raise OutputError(
+                f"the session has no run {command.label}", where=str(folder), remedy="choose one that it has"
+            )
         writer.judge(run, accepted=command.accepted, reason=command.reason)

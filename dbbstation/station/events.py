@@ -35,11 +35,6 @@ class RunId(OfRun):
     direction: Direction
     mounting: int
 
-    @property
-    def label(self) -> str:
-        """Return the name for messages and file, such as `a-ccw-1`."""
-        return f"{self.test}-{self.direction}-{self.repeat}"
-
 
 @dataclass(frozen=True)
 class Sample:

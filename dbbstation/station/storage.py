@@ -147,8 +147,7 @@ class Storage:
             )
 
     def _entry(self, run: events.RunId) -> RunEntry:
-        key = (run.test, run.direction, run.repeat)
-        return next(entry for entry in self._writer.runs if (entry.test, entry.direction, entry.repeat) == key)
+        return next(entry for entry in self._writer.runs if entry.key == run.key)
 
     def _append(self, samples: tuple[events.Sample, ...]) -> None:
         if self._journal is None:

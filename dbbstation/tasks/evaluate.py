@@ -63,7 +63,6 @@ def evaluate(
     """
     from dbbstation.calibration.reporting import evaluation
     from dbbstation.calibration.reporting.evaluation import (
-        LowPassedCircularity,
         evaluated_tolerances,
         plane_figures,
         plane_uncertainty_um,
@@ -84,15 +83,7 @@ def evaluate(
     check_model_is_of(recorded.machine, identified.model.machine)
     found = evaluation.evaluate(identified.model, recorded.observations)
     circles = predicted_circles(identified.model, recorded.observations, telling.counted("predicting runs"))
-    runs = tuple(
-        replace(
-            run,
-            circularity_30_upr_um=LowPassedCircularity(
-                circle.measured_um, circle.predicted_um, circle.before_um, circle.after_um
-            ),
-        )
-        for run, circle in zip(found.runs, circles, strict=True)
-    )
+    runs = tuple(replace(run, circularity_30_upr_um=circle) for run, circle in zip(found.runs, circles, strict=True))
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
     plane = plane_figures(identified.model, height_mm)
     flatness_u_um, parallelism_u_um = plane_uncertainty_um(identified, height_mm)

@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.machine.difference import NOT_PREDICTED, differences, in_words
 from dbbstation.results.fleet import FleetComparison, Scored, SharedCause
 from dbbstation.sisters.unlike import FEWEST, held_against_sisters
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,7 +114,7 @@ def _geometries(sisters: Sequence[Sister]) -> tuple[list[int], list[str]]:
         names = [sister.name for sister, of in zip(sisters, kinds, strict=True) if of == kind]
         unlike = in_words(_unlike(sisters[first[0]].machine, sisters[place].machine), 2)
         notes.append(
-            f"{_named(names)}: another nominal machine than {sisters[first[0]].name} ({unlike}): compared with the others in "
+            f"{listed(names, MOST_NAMED)}: another nominal machine than {sisters[first[0]].name} ({unlike}): compared with the others in "
             "figures only, parameters are departures from the nominal machine"
         )
     return kinds, notes
@@ -127,12 +128,7 @@ def _alone(keys: Sequence[_Key]) -> list[str]:
     if not keys:
         return []
     names = list(dict.fromkeys(key[1] for key in keys))
-    return [f"fewer than {FEWEST} machines have these, which are not compared: {_named(names)}"]
-
-
-def _named(names: Sequence[str]) -> str:
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return [f"fewer than {FEWEST} machines have these, which are not compared: {listed(names, MOST_NAMED)}"]
 
 
 def _causes(sisters: Sequence[Sister]) -> tuple[SharedCause, ...]:

@@ -25,6 +25,7 @@ from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
 from dbbstation.results.history import history_result
 from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -268,11 +269,7 @@ def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
     for one in sessions:
         for note in one.notes:
             by_text.setdefault(note, []).append(one.name)
-    notes = []
-    for note, names in by_text.items():
-        more = len(names) - MOST_NAMED
-        notes.append(f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}: {note}")
-    return notes
+    return [f"{listed(names, MOST_NAMED)}: {note}" for note, names in by_text.items()]
 
 
 def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], list[str]]:

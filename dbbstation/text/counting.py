@@ -1,4 +1,4 @@
-"""Sort names and runs as people count."""
+"""Sort names and runs as people count, and list the first ones."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import defaultdict
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 _NUMBER = re.compile(r"(\d+)")
 
@@ -16,6 +16,11 @@ def natural(name: str) -> tuple[tuple[int, int, str], ...]:
     """Return a sort key: `w9` before `w10`."""
     parts = (part for part in _NUMBER.split(name) if part)
     return tuple((0, int(part), "") if part.isdecimal() else (1, 0, part) for part in parts)
+
+
+def listed(names: Sequence[str], most: int, *, between: str = ", ") -> str:
+    """Return the first names of a list as text, with the count of the others."""
+    return between.join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 class Repeated(Protocol):

@@ -335,8 +335,7 @@ class StationApp(App[None]):
         def written(_: None) -> None:
             word = "accepted" if command.accepted else "rejected"
             why = f": {command.reason}" if command.reason else ""
-            run = f"{command.test}-{command.direction}-{command.repeat}"
-            self.board.messages.append(Message(Weight.NOTE, f"{run} {word}{why}"))
+            self.board.messages.append(Message(Weight.NOTE, f"{command.label} {word}{why}"))
             runner.start()
 
         self.do(write, written, self._note_fault)

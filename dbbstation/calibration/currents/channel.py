@@ -15,6 +15,7 @@ from dbbstation.machine.compiled import in_parallel
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.motors import motor_currents
 from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
+from dbbstation.text.counting import listed
 from dbbstation.trace.circle import averaged
 from dbbstation.trace.columns import currents
 
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 FEWEST = 20
 """Fewest usable readings of a motor."""
+
+MOST_NAMED = 3
+"""Greatest number of motors that a note names."""
 
 CLIPPED_SAMPLES = 20
 CLIPPED_RATIO = 5.0
@@ -72,7 +76,9 @@ def _of_motor(name: str, labels: Sequence[str], current: Sequence[Floats]) -> li
         return [f"{name}: its current was not logged; nothing is said of its drive, the other motors count"]
     notes = []
     if len(logged) < len(labels):
-        notes.append(f"{name}: not logged in {_listed([label for k, label in enumerate(labels) if k not in logged])}")
+        notes.append(
+            f"{name}: not logged in {listed([label for k, label in enumerate(labels) if k not in logged], MOST_NAMED)}"
+        )
     dead = [k for k in logged if np.nanmax(current[k]) == np.nanmin(current[k])]
     if len(dead) == len(logged):
         stands = (
@@ -80,7 +86,9 @@ def _of_motor(name: str, labels: Sequence[str], current: Sequence[Floats]) -> li
         )
         notes.append(f"{stands} or not connected; nothing is said of its drive, the other motors count")
     elif dead:
-        notes.append(f"{name}: its current stands still in {_listed([labels[k] for k in dead])}; left out there")
+        notes.append(
+            f"{name}: its current stands still in {listed([labels[k] for k in dead], MOST_NAMED)}; left out there"
+        )
     for k in dead:
         current[k][:] = np.nan
     every = np.concatenate([values[np.isfinite(values)] for values in current])
@@ -101,11 +109,6 @@ def _limits(values: Floats) -> list[float]:
         return []
     ends = ((levels[-1], count[-1], count[-2]), (levels[0], count[0], count[1]))
     return [float(at) for at, there, next_to in ends if there >= CLIPPED_SAMPLES and there > CLIPPED_RATIO * next_to]
-
-
-def _listed(labels: Sequence[str]) -> str:
-    most = 3
-    return ", ".join(labels) if len(labels) <= most else f"{', '.join(labels[:most])} and {len(labels) - most} more"
 
 
 MOST_STEPS = 20

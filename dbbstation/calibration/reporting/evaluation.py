@@ -52,7 +52,11 @@ class CircleDeviations:
 
 @dataclass(frozen=True)
 class LowPassedCircularity:
-    """Circular deviation G, low-passed at 30 undulations per revolution [µm]."""
+    """Circular deviation G, low-passed at 30 undulations per revolution [µm].
+
+    Attributes:
+        before: of the nominal residual; for a plain circle as measured.
+    """
 
     measured: float
     predicted: float

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.calibration.reporting.evaluation import LowPassedCircularity
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth_of
 from dbbstation.model.machine_model import MachineModel
@@ -26,26 +26,12 @@ UNDULATIONS = 30
 SAMPLES_PER_UNDULATION = 4
 
 
-@dataclass(frozen=True)
-class PredictedCircle:
-    """One run.
-
-    Attributes:
-        before_um: circularity of the nominal residual; for a plain circle as measured.
-    """
-
-    measured_um: float
-    predicted_um: float
-    before_um: float
-    after_um: float
-
-
 @with_one_thread
 def predicted_circles(
     model: MachineModel,
     observations: Sequence[Observation],
     progress: Callable[[int, int], None] = lambda _done, _of: None,
-) -> tuple[PredictedCircle, ...]:
+) -> tuple[LowPassedCircularity, ...]:
     """Compare measured and predicted circularity.
 
     Raises:
@@ -54,14 +40,14 @@ def predicted_circles(
     """
     nominal = residuals(MachineModel(model.machine), observations)
     left = residuals(model.of_the_machine(), observations)
-    circles: list[PredictedCircle] = []
+    circles: list[LowPassedCircularity] = []
     for o, before, after in zip(observations, nominal, left, strict=True):
         progress(len(circles), len(observations))
-        circle = PredictedCircle(
-            measured_um=smooth_circularity_um(o.raw, o.raw.length_mm),
-            predicted_um=smooth_circularity_um(o.raw, o.raw.length_mm - after),
-            before_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + before),
-            after_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + after),
+        circle = LowPassedCircularity(
+            measured=smooth_circularity_um(o.raw, o.raw.length_mm),
+            predicted=smooth_circularity_um(o.raw, o.raw.length_mm - after),
+            before=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + before),
+            after=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + after),
         )
         circles.append(circle)
     progress(len(circles), len(observations))

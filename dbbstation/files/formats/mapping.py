@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from dbbstation.facts.quantities import Quantity
 from dbbstation.files.atomic import write_text
-from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
+from dbbstation.files.formats.number_language import number_language
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from typing import Self
 
     from dbbstation.errors import Problem
+    from dbbstation.files.formats.number_language import NumberLanguage
 
 INCH_MM = 25.4
 """One inch [mm], exactly [ISO 31-1]."""
@@ -55,8 +56,6 @@ UNITS: dict[str, dict[str, float]] = {
 
 MEANINGS = (*UNITS, columns.STATUS, *OF_RUNS, IGNORED)
 """All meanings of columns."""
-
-_SEPARATORS = {name: sign for sign, name in SEPARATORS.items()}
 
 
 def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
@@ -183,11 +182,7 @@ class MappingFile(Schema):
     @property
     def numbers(self) -> NumberLanguage | None:
         """Return the number format; None if not stated."""
-        if self.separator is None and self.decimal is None:
-            return None
-        decimal = self.decimal or PLAIN.decimal
-        usual = ";" if decimal == "," else PLAIN.separator
-        return NumberLanguage(decimal, usual if self.separator is None else _SEPARATORS[self.separator])
+        return number_language(self.decimal, self.separator)
 
     def column(self, meaning: str) -> str | None:
         """Return the column with a meaning, or None."""

@@ -151,6 +151,16 @@ class RunEntry(Record):
     """The NC program, if not the plan's nominal circle."""
 
     @property
+    def key(self) -> tuple[str, str, int]:
+        """Return what tells the run from the others of its session."""
+        return self.test, self.direction, self.repeat
+
+    @property
+    def name(self) -> str:
+        """Return the name of the run's file without its ending."""
+        return f"{self.test}-{self.direction}-{self.repeat}"
+
+    @property
     def label(self) -> str:
         """Return the name of the run for messages."""
         return f"{self.test} {self.direction} {self.repeat}"

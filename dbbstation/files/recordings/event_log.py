@@ -15,7 +15,7 @@ from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.errors import OutputError, Problem, refusal
+from dbbstation.errors import OutputError, Problem, unwritable
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.gateway import content_of
 from dbbstation.files.recorded_ground import RUNS
@@ -185,7 +185,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
             remedy=f"restore it; then move the runs of {log.path.parent / RUNS} into its folder {RUNS}, where they replace a .part of the same run",
         ) from error
     except OSError as error:
-        raise _refused(log, error) from error
+        raise unwritable(error, log.path) from error
     try:
         _refuse_another(log, handle)
         if os.fstat(handle).st_nlink > 1:
@@ -200,7 +200,7 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
         except OSError as error:
             with contextlib.suppress(OSError):
                 os.ftruncate(handle, log.end)
-            raise _refused(log, error) from error
+            raise unwritable(error, log.path) from error
     finally:
         with contextlib.suppress(OSError):  # it is on the disk, or the reason is told already
             os.close(handle)
@@ -215,7 +215,7 @@ def _parted(log: EventLog, handle: int) -> int:
         write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
         return open_to_change(log.path)
     except OSError as error:
-        raise _refused(log, error) from error
+        raise unwritable(error, log.path) from error
 
 
 def set_back(log: EventLog) -> list[str]:
@@ -267,11 +267,6 @@ _LONGEST_LAST = 1_000_000
 
 def _ends_with(line: bytes, last: str) -> bool:
     return line.startswith(last.encode()) or len(line) >= _LONGEST_LAST
-
-
-def _refused(log: EventLog, error: OSError) -> OutputError:
-    why, remedy = refusal(error)
-    return OutputError(f"cannot be written: {why}", where=str(log.path), remedy=remedy)
 
 
 def runs_told(event: LoggedEvent) -> str:

@@ -13,7 +13,7 @@ import zlib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, OutputError, refusal
+from dbbstation.errors import InputError, OutputError, refusal, unwritable
 from dbbstation.files.atomic import set_read_only
 from dbbstation.files.formats.session import PART
 from dbbstation.files.gateway import digest_of
@@ -250,5 +250,4 @@ class RunWriter(Closing):
             what = "this run is being recorded, or was when the station died"
             raise OutputError(what, where=str(self.path), remedy="take the next repeat") from error
         except OSError as error:
-            why, remedy = refusal(error)
-            raise OutputError(f"cannot be written: {why}", where=str(self.path), remedy=remedy) from error
+            raise unwritable(error, self.path) from error

@@ -11,7 +11,7 @@ import socket
 import time
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import OutputError, refusal
+from dbbstation.errors import OutputError, unwritable
 from dbbstation.system.handles import Closing, open_to_change, read_at, write_at
 from dbbstation.system.locks import lock
 
@@ -66,8 +66,7 @@ class SessionLock(Closing):
         try:
             self._file = open_to_change(path, create=True)
         except OSError as error:
-            why, remedy = refusal(error)
-            raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy) from error
+            raise unwritable(error, path) from error
 
     def _in_place(self, folder: Path) -> bool:
         if self._file is None:
@@ -96,5 +95,4 @@ class SessionLock(Closing):
                 ) from error
             except OSError as error:
                 self.close()
-                why, remedy = refusal(error)
-                raise OutputError(f"cannot be locked: {why}", where=str(folder), remedy=remedy) from error
+                raise unwritable(error, folder, "locked") from error

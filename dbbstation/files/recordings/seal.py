@@ -20,6 +20,7 @@ from dbbstation.files.formats.session import Seal
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted
 from dbbstation.files.yaml.text import load_yaml
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -232,8 +233,7 @@ def _changed_keys(before: Path, after: Path) -> str:
     if documents[0] is None or documents[1] is None:
         return ""
     found = changes(documents[0].data, documents[1].data)
-    more = f" and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
-    return ", ".join(found[:_MOST_NAMED]) + more if found else "no value differs, only how it is written"
+    return listed(found, _MOST_NAMED) or "no value differs, only how it is written"
 
 
 def chain_faults(folder: Path, seal: Seal, runs: Sequence[RunEntry]) -> Iterator[tuple[str, str]]:

@@ -186,7 +186,7 @@ def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, t
     for node, run in zip(_runs(text, path), runs, strict=True):
         if run.chain_sha256 and _entry(node, "chain_sha256") is None:
             additions.append(_behind(node, "sha256", f"chain_sha256: {run.chain_sha256}", text))
-            named.append(f"{run.test}-{run.direction}-{run.repeat}")
+            named.append(run.name)
     return _added(text, additions), tuple(named)
 
 

@@ -12,6 +12,7 @@ from dbbstation.files.recordings.run_csv import changed
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted, read_document, validate
 from dbbstation.plan.circle import USUAL_STROKE_MM
+from dbbstation.text.counting import listed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -92,9 +93,7 @@ def unlike_bar(length_mm: float, stroke_mm: float | None, plan: Plan) -> tuple[s
     if not out:
         return None
     radii = ", ".join(f"{radius:g}" for radius in sorted(set(out.values())))
-    names = ", ".join(list(out)[:_MOST_NAMED]) + (
-        f" and {len(out) - _MOST_NAMED} more" if len(out) > _MOST_NAMED else ""
-    )
+    names = listed(list(out), _MOST_NAMED)
     source = "" if stroke_mm is not None else ", as none is stated"
     what = (
         f"a bar of {length_mm:g} mm with a stroke of {stroke:g} mm either way{source} cannot run circles of radius_mm "

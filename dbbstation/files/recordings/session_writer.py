@@ -226,9 +226,7 @@ class SessionWriter(Closing):
         }:
             what = "the file does not say which run of this plan it is"
             raise InputError.of(file, what, "its first lines name test, direction and repeat", line=1)
-        if any(
-            (run.test, run.direction, run.repeat) == (found.test, found.direction, found.repeat) for run in self.runs
-        ):
+        if any(run.key == found.key for run in self.runs):
             what = f"the session lists another run {found.label}"
             raise InputError.of(file, what, "give one of them another repeat", line=1)
         digest = sha256_of(path)
@@ -258,14 +256,13 @@ class SessionWriter(Closing):
         self._session = replace(session, runs=runs, seal=sealed_over(found, runs))
 
     def _put(self, entry: RunEntry) -> RunEntry:
-        key = (entry.test, entry.direction, entry.repeat)
-        runs = tuple(({(run.test, run.direction, run.repeat): run for run in self.runs} | {key: entry}).values())
+        runs = tuple(({run.key: run for run in self.runs} | {entry.key: entry}).values())
         seal = self._session.seal
         if seal is not None:
             runs = chained(runs)
             seal = sealed_over(seal.files, runs)
         self._session = replace(self._session, runs=runs, seal=seal)
-        return next(run for run in runs if (run.test, run.direction, run.repeat) == key)
+        return next(run for run in runs if run.key == entry.key)
 
     def _write(self, what: str) -> None:
         try:

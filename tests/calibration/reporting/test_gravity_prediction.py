@@ -75,7 +75,7 @@ def off(folder, calibration):
     circles = predicted_circles(calibration.model, held_out)
     assert len(circles) == 2 * len(HELD_OUT)
     return {
-        run.label: abs(circle.predicted_um - circle.measured_um) / max(1.0, 0.1 * circle.measured_um)
+        run.label: abs(circle.predicted - circle.measured) / max(1.0, 0.1 * circle.measured)
         for run, circle in zip(held_out, circles, strict=True)
     }
 
@@ -102,8 +102,8 @@ def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predi
     held_out = load_sessions([folder / "conditions"], ["A", "B"]).observations
     circles = predicted_circles(calibration.model, held_out)
     for one, other in zip(circles[::2], circles[1::2], strict=True):
-        measured = (one.measured_um + other.measured_um) / 2.0
-        assert one.predicted_um == pytest.approx(measured, rel=0.1, abs=1.0)
+        measured = (one.measured + other.measured) / 2.0
+        assert one.predicted == pytest.approx(measured, rel=0.1, abs=1.0)
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(machines):
         for machine in (seen.machine, replace(seen.machine, masses=masses))
     )
     for one, other in zip(predicted_circles(right, held_out), predicted_circles(heavy, held_out), strict=True):
-        assert other.predicted_um == pytest.approx(one.predicted_um, abs=0.02)
+        assert other.predicted == pytest.approx(one.predicted, abs=0.02)
     with pytest.raises(ModelError, match=r"gravity needs .* a weight from the drawing is enough"):
         calibrate(replace(seen.machine, masses=None), seen.observations, names)
 

@@ -6,8 +6,7 @@ import errno
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.text.counting import natural
-from dbbstation.text.printable import on_one_line
+from dbbstation.text.written import natural, on_one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

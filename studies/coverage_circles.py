@@ -11,8 +11,8 @@ from scipy.stats import binom
 
 from dbbstation.circles.analysis import CircleAnalysis, analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import RANGES, Budget, SetUpKnowledge, budgets, pair_budgets
+from dbbstation.circles.estimates import ABSOLUTE, BudgetQuantity
 from dbbstation.circles.path import Filter
-from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from dbbstation.circles.quick_look import quick_look
 from dbbstation.circles.signatures import Signature
 from dbbstation.plan.bar import Bar

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse, analyse_pair
 from dbbstation.circles.budget import SetUpKnowledge, budgets, pair_budgets
-from dbbstation.circles.quantity import BudgetQuantity
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.circle import RawCircle
 from studies.coverage_rows import row_of

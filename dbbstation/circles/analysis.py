@@ -15,7 +15,7 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace.analysis import figures, passes_of
 from dbbstation.trace.cut import edges_of, overlap_feed_under
-from dbbstation.trace.loss import lost_samples
+from dbbstation.trace.recording import lost_samples
 
 if TYPE_CHECKING:
     from dbbstation.circles.noise import CircleNoise

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from dbbstation.circles.estimates import estimate_of, pair_estimate, slow_noise_um
+from dbbstation.circles.estimates import ABSOLUTE, FIRST, BudgetQuantity, estimate_of, pair_estimate, slow_noise_um
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
-from dbbstation.circles.quantity import ABSOLUTE, FIRST, BudgetQuantity
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.serialise import Kept, OrNull
 from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, coefficients

@@ -1,8 +1,9 @@
-"""Estimate G, F, H and G(b) without the contribution of noise."""
+"""Figures of circles that have an uncertainty; G, F, H and G(b) without the contribution of noise."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -20,7 +21,6 @@ from dbbstation.circles.extremes import (
 )
 from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
-from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.circles.strip import strip_widths
 from dbbstation.plan.circle import FULL_TURN_DEG
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.form import FormAndNoise
     from dbbstation.circles.path import Filter
     from dbbstation.computing.arrays import Floats
+
 
 CLEAR = 2.0
 """Standard uncertainties above which a drift over the turn counts as form, not noise."""
@@ -167,3 +168,29 @@ def _hysteresis(pair: PairAnalysis) -> Estimate:
     passed = chosen.passed(np.arange(len(theta_deg) // 2 + 1.0))
     own = replace(apart, form_um=_filtered(apart.form_um, chosen))
     return estimated(drawn_paths(own, theta_deg, passed, 2), farthest_of, pair.h_um)
+
+
+class BudgetQuantity(StrEnum):
+    """Figures with a budget."""
+
+    G = "G"
+    G_LS = "G(LS)"
+    F_MAX = "Fmax"
+    F_MIN = "Fmin"
+    RADIUS = "radius"
+    MEAN_RADIAL = "mean radial error"
+    X = "X"
+    Y = "Y"
+    G_BOTH = "G(b)"
+    G_BOTH_LS = "G(b)(LS)"
+    D = "D"
+    H = "H"
+
+
+ABSOLUTE = frozenset(
+    {BudgetQuantity.F_MAX, BudgetQuantity.F_MIN, BudgetQuantity.RADIUS, BudgetQuantity.MEAN_RADIAL, BudgetQuantity.D}
+)
+"""Figures that depend on the bar's absolute length."""
+
+FIRST = 2
+"""First undulation of form: one per revolution is the centre."""

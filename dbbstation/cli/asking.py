@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.output import echo
-from dbbstation.text.printable import on_one_line
+from dbbstation.text.written import on_one_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

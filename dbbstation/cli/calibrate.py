@@ -8,7 +8,7 @@ from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.output import echo, print_table
 from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, use_sentence, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
-from dbbstation.text.digits import to_its_place
+from dbbstation.text.written import to_its_place
 
 if TYPE_CHECKING:
     from dbbstation.calibration.checks.scatter import ScatterCheck
@@ -88,7 +88,7 @@ def show(result: CalibrationResult) -> None:
 
 def _print_parameters(result: CalibrationResult) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
-    from dbbstation.text.digits import decimals_of
+    from dbbstation.text.written import decimals_of
 
     rows = []
     for source in result.sources:

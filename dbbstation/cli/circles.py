@@ -119,7 +119,7 @@ def _print(result: CirclesResult, *, several: bool) -> None:
 
 def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
     from dbbstation.cli.output import COVERAGE_FACTOR
-    from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
+    from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
     return with_uncertainty(value, expanded_uncertainty(run.uncertainty[name].u_um, COVERAGE_FACTOR))
 
@@ -179,7 +179,7 @@ def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> N
 
 def _print_quick_looks(looks: Sequence[QuickLookResult]) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
-    from dbbstation.text.digits import with_uncertainty
+    from dbbstation.text.written import with_uncertainty
 
     rows: list[list[object]] = []
     for look in looks:

@@ -10,7 +10,7 @@ from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table, 
 from dbbstation.results.words import ending_sentences, mismatch_sentence, outlier_sentence
 from dbbstation.tasks.declare import Option
 from dbbstation.tasks.diagnose import diagnose as task
-from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
+from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

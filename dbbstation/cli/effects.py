@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.output import echo
 from dbbstation.errors import OutputError
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from pathlib import Path

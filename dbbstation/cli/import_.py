@@ -14,7 +14,7 @@ from dbbstation.cli.output import echo, echo_line, print_result
 from dbbstation.cli.session_options import SessionOptions
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
-from dbbstation.text.printable import printable
+from dbbstation.text.written import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -161,7 +161,7 @@ def _read(
     from dbbstation.files.formats.session import Note
     from dbbstation.tasks.importing.runs import Reader
     from dbbstation.tasks.importing.session import originals
-    from dbbstation.text.counting import repeats_in_order
+    from dbbstation.text.written import repeats_in_order
 
     tables = read_tables(files, of_mapping)
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)

@@ -92,7 +92,7 @@ def spying(path: Path | None, protocol: Protocol, port: str, *, force: bool = Fa
     Raises:
         OutputError: the file exists, lies in a session, or cannot be written.
     """
-    from dbbstation.files.recorded_ground import refuse_recorded
+    from dbbstation.files.places import refuse_recorded
     from dbbstation.instrument.bytelog import ByteLog
 
     if path is None:

@@ -21,9 +21,9 @@ import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
 from dbbstation.errors import unwritable
-from dbbstation.files.recorded_ground import session_around
+from dbbstation.files.places import session_around
 from dbbstation.system.handles import open_nothing, open_private
-from dbbstation.text.printable import printable
+from dbbstation.text.written import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

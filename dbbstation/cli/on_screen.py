@@ -93,7 +93,7 @@ def _shipped(what: str) -> Path:
 
 def _measured(asked: Asked, *, virtual: bool) -> int:
     from dbbstation.cli.measure_talk import Log
-    from dbbstation.files.recorded_ground import SESSION_FILE
+    from dbbstation.files.places import SESSION_FILE
     from dbbstation.files.recordings.session import read_session
     from dbbstation.service.held_line import HeldLine
     from dbbstation.service.runner import opener

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.text.printable import on_one_line, printable
+from dbbstation.text.written import on_one_line, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import click
 
 from dbbstation.cli.output import say
-from dbbstation.text.printable import on_one_line
+from dbbstation.text.written import on_one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

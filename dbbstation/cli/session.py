@@ -50,7 +50,7 @@ def list_runs(folder: _Folder) -> Answer:
     from dbbstation.cli.output import print_table
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.sessions import ListedRun, ListedSession
-    from dbbstation.text.counting import repeats_in_order
+    from dbbstation.text.written import repeats_in_order
 
     read = read_session(folder)
     missing, runs = _missing(read), repeats_in_order(read.runs)

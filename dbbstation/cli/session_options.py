@@ -188,7 +188,7 @@ class RecordingOptions(SessionOptions):
         """
         from datetime import UTC, datetime
 
-        from dbbstation.files.recorded_ground import SESSION_FILE
+        from dbbstation.files.places import SESSION_FILE
         from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 
         if job.details.bar_waiver or (job.folder / SESSION_FILE).is_file():

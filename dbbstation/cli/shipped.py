@@ -10,7 +10,7 @@ import click
 from dbbstation.cli.declared import Answer, made
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
-from dbbstation.text.printable import on_one_line
+from dbbstation.text.written import on_one_line
 
 _FIXTURES = (
     "bars",

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from dbbstation.errors import OutputError, unwritable
 from dbbstation.files.inputs import was_read
-from dbbstation.files.places import real_path
-from dbbstation.files.recorded_ground import refuse_recorded
+from dbbstation.files.places import real_path, refuse_recorded
 from dbbstation.system.handles import may_write, open_private
 from dbbstation.system.replacing import remove, remove_tree, rename, replace, sync_folder
 

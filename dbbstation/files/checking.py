@@ -21,7 +21,7 @@ from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.formats.simulator import SimulatorFile, parse_simulator
 from dbbstation.files.inputs import note_virtual
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.event_log import SHORTEST, anchor_of, read_event_log, set_back
 from dbbstation.files.recordings.judged import JUDGED, judge_session
@@ -32,7 +32,7 @@ from dbbstation.files.yaml.schema import format_of
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.plan.bar import BAR_LENGTH
 from dbbstation.quality.finding import Name
-from dbbstation.trace.loss import lost_samples
+from dbbstation.trace.recording import lost_samples
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import is_number
-from dbbstation.text.printable import printable
+from dbbstation.text.written import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

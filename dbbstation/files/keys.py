@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation import __version__
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import content_of, digest_of
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

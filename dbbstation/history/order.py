@@ -6,7 +6,7 @@ from bisect import bisect_left
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dbbstation.text.counting import natural
+from dbbstation.text.written import natural
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

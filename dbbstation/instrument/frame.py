@@ -10,10 +10,18 @@ from pydantic import Field
 
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.checksum_part import Checksum
-from dbbstation.instrument.fields import ChoiceField, Flags, FrameParts, Literally, SignField, SkipField
+from dbbstation.instrument.fields import (
+    ChoiceField,
+    ErrorTable,
+    Flags,
+    FrameParts,
+    Literally,
+    SignField,
+    SkipField,
+    Text,
+)
 from dbbstation.instrument.numbers import DecimalText, Ieee, Integer
 from dbbstation.instrument.reading import SaidStatus  # noqa: TC001 (pydantic needs it at run time)
-from dbbstation.instrument.telling import ErrorTable, Text
 
 if TYPE_CHECKING:
     from dbbstation.instrument.fields import Bit, Code, Content

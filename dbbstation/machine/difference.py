@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS, Hexapod
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -15,7 +15,7 @@ from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, joined, quantile, scale_of
 from dbbstation.quality.spike import spike
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE, edges_of, feed_off
-from dbbstation.trace.loss import AFTER_LOSS, share_lost
+from dbbstation.trace.recording import AFTER_LOSS, share_lost
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

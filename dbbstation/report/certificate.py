@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import CLOCK_S, impossible_day, sealed_at
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

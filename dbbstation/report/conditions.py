@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import anchor_of
 from dbbstation.report.certificate import sealed_after
-from dbbstation.text.digits import to_its_place
+from dbbstation.text.written import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

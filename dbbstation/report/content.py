@@ -30,7 +30,7 @@ from dbbstation.results.report_verdict import verdict_of
 from dbbstation.results.tolerances import tolerated_circles, tolerated_pairs
 from dbbstation.results.words import unseen_sentence, weak_sentence
 from dbbstation.sources.contract import Owner
-from dbbstation.text.digits import to_its_place
+from dbbstation.text.written import to_its_place
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.report.history_words import DASH
 from dbbstation.report.html import environment
-from dbbstation.text.digits import decimals_of
+from dbbstation.text.written import decimals_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

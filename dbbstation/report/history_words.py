@@ -6,7 +6,7 @@ from collections import Counter
 from math import floor, log10
 from typing import TYPE_CHECKING
 
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from matplotlib.patches import Circle as Ring
 
-from dbbstation.circles.quantity import FIRST
+from dbbstation.circles.estimates import FIRST
 from dbbstation.plan.circle import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
 from dbbstation.report.polar import CIRCLE, REACH, SIZE, step_of, thinned

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.calibration.reporting.prediction import smooth_lengths_mm
-from dbbstation.circles.quantity import BudgetQuantity
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.trace.analysis import horizontal_radius_mm, path_about_ball
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.circles.analysis import EDITION
 from dbbstation.circles.budget import Budget, budget_of, budgets, pair_budgets, spectrum_of
-from dbbstation.circles.quantity import BudgetQuantity
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.quick_look import Symptom, quick_look
 from dbbstation.circles.reversals import Harmonic, ReversalStep
 from dbbstation.facts.run import OfRunInSession

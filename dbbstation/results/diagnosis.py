@@ -13,7 +13,6 @@ from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.diagnosis.effects import CauseEffect
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError
-from dbbstation.facts.by_name import ByName
 from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
@@ -24,7 +23,7 @@ from dbbstation.inference.levels import Levels
 from dbbstation.inference.limit_reached import LimitReached
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.model.identified import IdentifiedModel
-from dbbstation.results.frame import Framed, of_facts
+from dbbstation.results.frame import ByName, Framed, of_facts
 from dbbstation.results.levels_text import bars, level_sentences, short_sentences
 from dbbstation.trace.analysis import figures
 

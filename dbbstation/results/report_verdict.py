@@ -9,7 +9,7 @@ from dbbstation.facts.held import ReportVerdict
 from dbbstation.quality.conformity import Conformity
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.words import evaluated_sentence
-from dbbstation.text.digits import expanded_uncertainty, with_uncertainty
+from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -9,14 +9,14 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse_pair, refiltered
 from dbbstation.circles.budget import budgets, pair_budgets
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.extremes import without_noise
 from dbbstation.circles.path import TOLERATED, Filter
-from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
-from dbbstation.text.digits import expanded_uncertainty
+from dbbstation.text.written import expanded_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -11,7 +11,7 @@ from dbbstation.files.formats.bar import read_bar
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy, SessionDetails
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import circles_s
 from dbbstation.plan.order import LARGEST_LEAK, against_drift, by_holder, height_and_drift, mountings

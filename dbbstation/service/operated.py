@@ -15,8 +15,7 @@ from dbbstation.files.formats.job import JobFile, read_job
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.gateway import content_of
-from dbbstation.files.places import unused_path
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE, unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_of, read_document, validate

@@ -10,7 +10,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.machine import machine_data
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.session import RunState
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import CLOCK_S, EVENTS_FILE
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.station.commands import AddNote

@@ -16,8 +16,7 @@ from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
 from dbbstation.trace.cut import cut, unusable_on_turn
 from dbbstation.trace.cut import lost_on_turn as shown_lost
-from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
-from dbbstation.trace.recording import Recording
+from dbbstation.trace.recording import AFTER_LOSS, Recording, too_many_lost
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -15,9 +15,8 @@ from dbbstation.files.fleet_folder import FleetFolder
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book, note_known
 from dbbstation.files.keys import files_of_session, key_of, program_identity
-from dbbstation.files.places import real_path, text_of_name
+from dbbstation.files.places import SESSION_FILE, real_path, text_of_name
 from dbbstation.files.provenance import from_python, write_table
-from dbbstation.files.recorded_ground import SESSION_FILE
 from dbbstation.files.recordings.former import files_of, reason_of
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.table_csv import table_csv
@@ -30,7 +29,7 @@ from dbbstation.tasks.exporting import pyarrow_for
 from dbbstation.tasks.fleet_compare import Sister, compared
 from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked, worked
 from dbbstation.tasks.telling import Telling, never, silent
-from dbbstation.text.counting import natural
+from dbbstation.text.written import natural
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.machine.difference import NOT_PREDICTED, differences, in_words
 from dbbstation.results.fleet import FleetComparison, Scored, SharedCause
 from dbbstation.sisters.unlike import FEWEST, held_against_sisters
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -17,7 +17,7 @@ from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
 from dbbstation.files.kept import Kept, NotedAnchor, Stamp, stamp_of
 from dbbstation.files.keys import key_of
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import SHORTEST, links_of
 from dbbstation.files.recordings.former import files_of, reason_of
 from dbbstation.history.order import date_faults
@@ -25,7 +25,7 @@ from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
 from dbbstation.results.history import history_result
 from dbbstation.tasks.telling import Telling, never, silent
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

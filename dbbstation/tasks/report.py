@@ -99,8 +99,7 @@ def report(
     from dbbstation.files.recordings.session import read_session
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
-    from dbbstation.report.html import report_html
-    from dbbstation.report.pdf import chromium, printed
+    from dbbstation.report.html import chromium, printed, report_html
     from dbbstation.tasks.circle_runs import load_circles
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of

@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import budgets
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.path import TOLERATED
-from dbbstation.circles.quantity import BudgetQuantity
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, cast
 from rich import control
 from textual import content
 
-from dbbstation.text.printable import TEXT
+from dbbstation.text.written import TEXT
 from dbbstation.tui.braille import BLANK
 
 if TYPE_CHECKING:

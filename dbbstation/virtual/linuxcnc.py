@@ -31,8 +31,7 @@ from dbbstation.machine.kinematics import forward
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
 from dbbstation.system.children import end_tree, is_root
-from dbbstation.system.handles import open_to_change
-from dbbstation.system.locks import lock
+from dbbstation.system.handles import lock, open_to_change
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.budget import NOT_STATED, Budget, BudgetTerm, SetUpKnowledge, _with_form
-from dbbstation.circles.quantity import BudgetQuantity
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.sources.contract import Setup
 from dbbstation.tasks import circle_runs as circled
 

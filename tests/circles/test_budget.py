@@ -11,8 +11,8 @@ from scipy.stats import binom
 
 from dbbstation.circles.analysis import analyse, analyse_pair
 from dbbstation.circles.budget import OF_ONE, BudgetTerm, SetUpKnowledge, budgets, pair_budgets
+from dbbstation.circles.estimates import ABSOLUTE, BudgetQuantity
 from dbbstation.circles.path import Filter
-from dbbstation.circles.quantity import ABSOLUTE, BudgetQuantity
 from tests.circles.test_analysis import CCW, CW, PHI, measured
 
 KNOWN = SetUpKnowledge(u_bar_um=0.5, u_temperature_um=0.6, u_ball_um=1.2, u_ball_z_um=2.0)

@@ -24,7 +24,7 @@ OF_READERS = {
     "files/recordings/cmm_sheet.py": ["jig sheet"],
     "files/recordings/table_csv.py": ["mismatch", "predict"],
     "files/formats/number_language.py": ["mismatch", "predict", "import", "jig sheet"],
-    "report/pdf.py": ["report"],
+    "report/html.py": ["report"],
     "simulators/allowed.py": ["mismatch"],
     "simulators/running.py": ["mismatch"],
 }
@@ -74,7 +74,7 @@ def test_every_option_that_a_text_names_exists():
     ]
     assert len(named) > 300
     assert [
-        one for one in named if one[1] not in EVERY | OTHERS and not one[0].startswith(("report/pdf", "cli/lazy"))
+        one for one in named if one[1] not in EVERY | OTHERS and not one[0].startswith(("report/html", "cli/lazy"))
     ] == []
 
 

@@ -15,8 +15,7 @@ import pytest
 from dbbstation.cli import FAILED, cli
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import refuse_existing, write_folder, write_text
-from dbbstation.files.places import shipped_folder
-from dbbstation.files.recorded_ground import session_around
+from dbbstation.files.places import session_around, shipped_folder
 from dbbstation.files.recordings.new_session import write_session
 from dbbstation.files.recordings.session import read_session
 from tests.cli.conftest import call

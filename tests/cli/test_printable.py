@@ -17,7 +17,7 @@ import pytest
 import dbbstation
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.places import shipped_folder
-from dbbstation.text.printable import on_one_line, printable
+from dbbstation.text.written import on_one_line, printable
 from tests.cli.conftest import call
 from tests.fuzz.seeds import SEEDS
 from tests.fuzz.worker import place

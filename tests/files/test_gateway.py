@@ -31,8 +31,7 @@ ROUND_IT = {
     "system/ports.py": "asks the system in /proc who holds a port, and reads the mark that it wrote beside one",
     "system/mounts.py": "asks the system in /proc what is mounted",
     "cli/settings.py": "reads a file of the package",
-    "report/html.py": "reads a file of the package",
-    "report/pdf.py": "reads what the browser has just printed",
+    "report/html.py": "reads a file of the package, and what the browser has just printed",
     "files/places.py": "reads a file of the package",
     "simulators/program.py": "creates the file that it writes",
 }

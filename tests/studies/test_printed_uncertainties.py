@@ -11,7 +11,7 @@ import pytest
 import dbbstation
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.circles.budget import OF_BOTH, OF_ONE, RANGES
-from dbbstation.circles.quantity import BudgetQuantity
+from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.signatures import Signature
 from dbbstation.plan.tolerance import CircleFigure
 from studies import coverage_calibration, coverage_feed

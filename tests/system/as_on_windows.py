@@ -16,7 +16,7 @@ from dbbstation.files.recordings.lock import SessionLock
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import load_instrument
 from dbbstation.service.held_line import probe
-from dbbstation.system import locks, pseudo_terminal, replacing, signals
+from dbbstation.system import handles, pseudo_terminal, replacing, signals
 from tests.station.bench import STREAM, bench, lines_of, wait_for
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def test_the_program_sees_what_windows_has() -> None:
         assert hasattr(space[module], there)
     with pytest.raises(ModuleNotFoundError):
         exec("import fcntl", space)  # noqa: S102 - the same
-    assert not locks.HAS_FLOCK
+    assert not handles.HAS_FLOCK
     assert not pseudo_terminal.HAS_PTY
     assert signals.CLOSED == ()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.text.counting import natural, repeats_in_order
+from dbbstation.text.written import natural, repeats_in_order
 
 
 @dataclass(frozen=True)

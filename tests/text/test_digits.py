@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.facts.value import Value
-from dbbstation.text.digits import to_its_place
+from dbbstation.text.written import to_its_place
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,7 @@ import pytest
 
 from dbbstation.errors import TraceError
 from dbbstation.trace.cut import cut, lost_on_turn
-from dbbstation.trace.loss import lost_samples, too_many_lost
-from dbbstation.trace.recording import Recording
+from dbbstation.trace.recording import Recording, lost_samples, too_many_lost
 from tests.trace.test_cut import CIRCLE, trace
 
 PERIOD_S = 0.004

@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
-from dbbstation.calibration.currents.channel import current_blocks, current_channel, current_start
-from dbbstation.calibration.currents.findings import MotorFindings, motor_findings
+from dbbstation.calibration.currents import (
+    MotorFindings,
+    current_blocks,
+    current_channel,
+    current_start,
+    motor_findings,
+)
 from dbbstation.calibration.fit.directions import Name, in_words, names_of, of_circles, prescribed
 from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
 from dbbstation.calibration.layout import Layout, lay_out

@@ -16,7 +16,7 @@ from dbbstation.sources.causes.drive_friction import PER_MOTOR, of_motor
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
-    from dbbstation.calibration.currents.findings import MotorFindings
+    from dbbstation.calibration.currents import MotorFindings
     from dbbstation.calibration.fit.calibrate import Calibration
 
 N_PER_KN = 1e3

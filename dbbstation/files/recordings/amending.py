@@ -11,7 +11,7 @@ from dbbstation.files.atomic import set_read_only, write_bytes, write_folder
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.plan import plan_text, read_inline_plan
 from dbbstation.files.formats.session import Amendment
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (

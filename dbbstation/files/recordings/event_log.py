@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.errors import OutputError, Problem, unwritable
 from dbbstation.files.atomic import write_bytes
 from dbbstation.files.gateway import content_of
-from dbbstation.files.recorded_ground import RUNS
+from dbbstation.files.places import RUNS
 from dbbstation.files.source_text import read_bytes
 from dbbstation.system.handles import open_to_change, read_at, write_at
 from dbbstation.system.replacing import sync_folder

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import head_of
-from dbbstation.files.places import real_path, text_of_name
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE, real_path, text_of_name
 from dbbstation.files.recordings.session import parse_session
 from dbbstation.machine.difference import differences
 

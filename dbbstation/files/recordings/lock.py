@@ -12,8 +12,7 @@ import time
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError, unwritable
-from dbbstation.system.handles import Closing, open_to_change, read_at, write_at
-from dbbstation.system.locks import lock
+from dbbstation.system.handles import Closing, lock, open_to_change, read_at, write_at
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,7 @@ from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
 from dbbstation.files.formats.session import CommandedProgram, RunEntry, RunState, SessionDetails, SessionFile
-from dbbstation.files.recorded_ground import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE, refuse_recorded
+from dbbstation.files.places import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE, refuse_recorded
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import run_header, run_line, run_name
 from dbbstation.files.recordings.seal import chained, copy_name, is_copy, sealed_over

@@ -20,7 +20,7 @@ from dbbstation.files.formats.session import Seal
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted
 from dbbstation.files.yaml.text import load_yaml
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,7 +11,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.session import LogMark, Seal, SessionFile
 from dbbstation.files.gateway import digest_of
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import impossible_day, read_event_log
 from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (

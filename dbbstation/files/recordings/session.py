@@ -16,8 +16,7 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.session import PART, RunEntry, RunState, SessionDetails, SessionFile
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_virtual
-from dbbstation.files.places import name_of
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE, name_of
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.run_csv import (
     RunFile,
@@ -34,9 +33,9 @@ from dbbstation.files.yaml.schema import validate
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
-from dbbstation.text.counting import natural, repeats_in_order
+from dbbstation.text.written import natural, repeats_in_order
 from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
-from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
+from dbbstation.trace.recording import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -12,7 +12,7 @@ from dbbstation.files.recordings.run_csv import changed
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted, read_document, validate
 from dbbstation.plan.circle import USUAL_STROKE_MM
-from dbbstation.text.counting import listed
+from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
     from pathlib import Path

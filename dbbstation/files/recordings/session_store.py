@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import write_folder, write_text
 from dbbstation.files.formats.session import SessionFile
-from dbbstation.files.recorded_ground import SESSION_FILE
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.event_log import (
     EVENTS_FILE,
     EventLog,

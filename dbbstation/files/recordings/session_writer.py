@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.atomic import remove_leftovers, write_bytes
 from dbbstation.files.formats.session import CommandedProgram, LogMark, Note, RunEntry, RunState, SessionDetails
-from dbbstation.files.recorded_ground import PROGRAMS, RUNS, SESSION_FILE
+from dbbstation.files.places import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import RunWriter, run_name
 from dbbstation.files.recordings.lock import SessionLock

@@ -1,1 +1,0 @@
-"""Motor currents as a second channel of a fit."""

@@ -29,7 +29,8 @@ MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
     "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),
     "STICKING_HALVES": (shapes, "STICKING_HALVES", (4, 6), 23),
-    "OTHERS": (unlike_struts, "OTHERS", ((0.71, 1.41), (0.35, 0.5, 0.71, 1.41, 2.0, 2.8)), 32),
+    "UNLIKE": (unlike_struts, "UNLIKE", (1.5, 3.0), 32),
+    "HALVES": (unlike_struts, "HALVES", ((0.71, 1.41), (0.35, 0.5, 0.71, 1.41, 2.0, 2.8)), 4),
     "USUAL_MS": (servo_lag, "USUAL_MS", (0.1, 1.0), 52),
 }
 """By constant: its module and name, other values, and the session on which it decides most."""
@@ -73,7 +74,7 @@ def main() -> None:
             sys.stderr.write(f"{key}: {columns[key]}\n")
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
-        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5, 0.5 to 2 and 0.3 ms.",
+        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5, 2, 0.5 to 2 and 0.3 ms.",
         "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,

@@ -18,7 +18,7 @@ from studies import coverage_calibration, coverage_feed
 from studies.coverage_circles import CELLS, GAUSSIAN, SHARP, _drawn
 
 MODULES = (
-    *(f"results/{name}" for name in ("circle_figures", "circles", "report", "prediction", "evaluation")),
+    *(f"results/{name}" for name in ("circles", "report", "prediction", "evaluation")),
     "diagnosis/effects",
     *(f"circles/{name}" for name in ("reversals", "budget", "quick_look")),
     *(
@@ -50,10 +50,10 @@ PREDICTED = ["predicted X", "predicted Y", "predicted Z"]
 
 PRINTED = {
     "reversals.ReversalStep.u_um": ["reversal step", "closure"],
-    "circle_figures.ShownFeed.u": [coverage_feed.FIGURE],
+    "circles.ShownFeed.u": [coverage_feed.FIGURE],
     "budget.Budget.u_um": BUDGETED,
-    "circle_figures.CircleFiguresResult.uncertainty": BUDGETED,
-    "circle_figures.PairFigures.uncertainty": BUDGETED,
+    "circles.CircleFiguresResult.uncertainty": BUDGETED,
+    "circles.PairFigures.uncertainty": BUDGETED,
     "quick_look.Symptom.u": [str(one) for one in Signature],
     "quick_look.Symptom.below": [f"{Signature.CYCLIC}, not seen: below"],
     "report.MeasuredSize.u_um": [row for rows in OF_TOLERANCES.values() for row in rows],

@@ -20,7 +20,7 @@ from dbbstation.sources.contract import (
 )
 from dbbstation.sources.laws.dahl import WoundState, wound, wound_up
 from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
-from dbbstation.sources.laws.unlike_struts import of_own_lengths
+from dbbstation.sources.laws.unlike_struts import of_several_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -138,7 +138,7 @@ class _WoundUp(SourceWithHistory):
         return Effect(strut_mm=np.concatenate([own, (width * is_stated * by_length)[:, :, None]], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        return of_own_lengths(self, motion, machine, values)
+        return of_several_lengths(self, motion, machine, values)
 
 
 def _lengths(values: Floats) -> tuple[Floats, NDArray[np.bool_]]:

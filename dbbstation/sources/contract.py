@@ -220,6 +220,11 @@ def of_each_strut(
     )
 
 
+def of_own_strut(by_amplitude: Floats) -> Floats:
+    """Return changes of the struts by each strut's own amplitude, shape (n, 6, 6), from those along each, shape (n, 6)."""
+    return by_amplitude[:, :, None] * np.eye(STRUTS)
+
+
 @dataclass(frozen=True)
 class Effect:
     """A source's effect, or its derivative by parameters (last axis of length p).

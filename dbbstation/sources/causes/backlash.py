@@ -17,6 +17,7 @@ from dbbstation.sources.contract import (
     SourceWithHistory,
     Texts,
     of_each_strut,
+    of_own_strut,
 )
 from dbbstation.sources.laws.dahl import WoundState, wound, wound_up
 from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
@@ -77,7 +78,7 @@ class Backlash(SourceWithHistory):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, by_width, _ = self._lag(motion, machine, values, self.begin(motion, machine, values))
-        return Effect(strut_mm=MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS))
+        return Effect(strut_mm=of_own_strut(MM_PER_UM * by_width))
 
     def _lag(
         self, motion: Motion, machine: Machine, values: Floats, state: PlayState
@@ -134,7 +135,7 @@ class _WoundUp(SourceWithHistory):
         start = self.begin(motion, machine, values)
         side, by_length, _ = wound_up(motion.struts(machine).length_mm, length, start)
         longer = np.where(is_stated, 0.0, AHEAD * np.sign(width))
-        own = MM_PER_UM * (side + width * longer * by_length)[:, :, None] * np.eye(STRUTS)
+        own = of_own_strut(MM_PER_UM * (side + width * longer * by_length))
         return Effect(strut_mm=np.concatenate([own, (width * is_stated * by_length)[:, :, None]], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:

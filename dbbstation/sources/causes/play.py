@@ -28,6 +28,7 @@ from dbbstation.sources.contract import (
     SourceWithHistory,
     Texts,
     of_each_strut,
+    of_own_strut,
 )
 from dbbstation.sources.laws.play_operator import PlayState, leaning
 from dbbstation.sources.laws.weights import platform_masses
@@ -100,7 +101,7 @@ class Play(SourceWithHistory):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, by_width, _ = self._places(motion, machine, values, self.begin(motion, machine, values))
-        by_play = MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS)
+        by_play = of_own_strut(MM_PER_UM * by_width)
         return Effect(strut_mm=np.concatenate([by_play, np.zeros((*by_width.shape, 1))], axis=2))
 
     def _places(
@@ -143,7 +144,7 @@ class _Shaken(ErrorSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         ratio = _tensions(motion, machine) / _spread_n(values)
-        by_play = 0.5 * MM_PER_UM * erf(ratio)[:, :, None] * np.eye(STRUTS)
+        by_play = of_own_strut(0.5 * MM_PER_UM * erf(ratio))
         steep = -np.sqrt(2.0) / _spread_n(values) * 2.0 / np.sqrt(np.pi) * ratio * np.exp(-np.square(ratio))
         by_force = 0.5 * MM_PER_UM * values[:STRUTS] * steep
         return Effect(strut_mm=np.concatenate([by_play, by_force[:, :, None]], axis=2))

@@ -18,6 +18,7 @@ from dbbstation.sources.contract import (
     Parameter,
     Texts,
     of_each_strut,
+    of_own_strut,
 )
 from dbbstation.sources.laws.turning import TURNED_MM, since_turning_in_time
 from dbbstation.sources.laws.unlike_struts import of_own_lengths
@@ -106,7 +107,7 @@ class ReversalSpike(ErrorSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         _, by_height, by_length = self._along(motion, machine, values)
-        own = MM_PER_UM * by_height[:, :, None] * np.eye(STRUTS)
+        own = of_own_strut(MM_PER_UM * by_height)
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:

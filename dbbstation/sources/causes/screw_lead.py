@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    LinearSource,
+    Motion,
+    Owner,
+    Texts,
+    of_each_strut,
+    of_own_strut,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -49,7 +55,7 @@ class ScrewLead(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         travel = motion.struts(machine).length_mm - _middle_mm(machine)
-        return Effect(strut_mm=MM_PER_UM_M * travel[:, :, None] * np.eye(STRUTS))
+        return Effect(strut_mm=of_own_strut(MM_PER_UM_M * travel))
 
     def c_form(self, machine: Machine, values: Floats, thermometers: Collection[str] = ()) -> CForm:  # noqa: ARG002
         body = "EACH e->strut[i] += 1e-6 * v[i] * (at->length[i] - middle);"

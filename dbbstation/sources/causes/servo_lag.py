@@ -8,7 +8,17 @@ import numpy as np
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    ErrorSource,
+    Motion,
+    Need,
+    Owner,
+    Texts,
+    of_each_strut,
+    of_own_strut,
+)
 from dbbstation.sources.laws.loop import STANDING, LoopState, driven, undone
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 
@@ -85,7 +95,7 @@ class ServoLag(ErrorSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_constant = self._lag(motion, machine, values)[1]
-        own = [S_PER_MS * np.tensordot(by_constant, more, (1, 0))[:, :, None] * np.eye(STRUTS) for more in self._more]
+        own = [of_own_strut(S_PER_MS * np.tensordot(by_constant, more, (1, 0))) for more in self._more]
         return Effect(strut_mm=np.concatenate(own, axis=2))
 
     def _constants_s(self, values: Floats) -> Floats:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import Effect
+from dbbstation.sources.contract import Effect, of_own_strut
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -29,7 +29,7 @@ def of_own_lengths(source: ErrorSource, motion: Motion, machine: Machine, values
         values: one per strut, then the common length, shape (7,).
     """
     longer, shorter = (_of_times(source, motion, machine, values, times) for times in (UNLIKE, 1.0 / UNLIKE))
-    return Effect(strut_mm=0.5 * (longer - shorter)[:, :, None] * np.eye(STRUTS))
+    return Effect(strut_mm=of_own_strut(0.5 * (longer - shorter)))
 
 
 def of_several_lengths(source: ErrorSource, motion: Motion, machine: Machine, values: Floats) -> Effect:
@@ -43,7 +43,7 @@ def of_several_lengths(source: ErrorSource, motion: Motion, machine: Machine, va
     """
     common = _of_times(source, motion, machine, values, 1.0)
     others = [_of_times(source, motion, machine, values, times) - common for times in HALVES]
-    return Effect(strut_mm=np.concatenate([other[:, :, None] * np.eye(STRUTS) for other in others], axis=2))
+    return Effect(strut_mm=np.concatenate([of_own_strut(other) for other in others], axis=2))
 
 
 def _of_times(source: ErrorSource, motion: Motion, machine: Machine, values: Floats, times: float) -> Floats:

@@ -23,7 +23,7 @@ from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.bounds import BOUNDS, CIRCLES
 from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, other_laws, search
-from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.model_comparison import SCALES, all_columns
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -357,7 +357,7 @@ def _lay_out(
     sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
     for _ in range(BOUNDS.steps_of_rivals if rival.variant.nonlinear else 1):
         hypothesis = Hypothesis((*others, rival), 0.0)
-        own = np.unique(np.concatenate([m.columns for m in hypothesis.members]))
+        own = np.unique(all_columns(hypothesis.members))
         values = _estimated(channel, beside.comparison(target, own), hypothesis)[-1]
         if values is None or not values.any():
             return

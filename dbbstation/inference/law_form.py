@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -145,7 +145,7 @@ def _scores(
 ) -> dict[str, Floats]:
     """Return each candidate's conditional log evidence of the parts, relative to no candidate, shape (parts,)."""
     bank = settled.bank
-    every = np.unique(np.concatenate([m.columns for ms in (others, *candidates.values()) for m in ms]))
+    every = np.unique(all_columns((*others, *chain.from_iterable(candidates.values()))))
     whole = bank.beside().comparison(bank.target, every)
     found: dict[str, list[float]] = {name: [] for name in candidates}
     for rows in parts:
@@ -162,12 +162,9 @@ def _contains(settled: Settled, one: Sequence[Member], other: Sequence[Member], 
     own = all_columns(other)
     effect = bank.fitted(own) @ settled.comparison.estimates([*other, *others]).values[: len(own)]
     law = bank.laws.get(one[0].name) if len(one) == 1 else None
-    corners = product(*((grid[0], grid[-1]) for grid in law.grids)) if law is not None and law.grids else ()
-    parts = [
-        bank.base,
-        bank.fitted(all_columns((*others, *one))),
-        *(bank.whitened(law.columns(point)) for point in corners if law is not None),
-    ]
+    parts = [bank.base, bank.fitted(all_columns((*others, *one)))]
+    if law is not None and law.grids:
+        parts += [bank.whitened(law.columns(point)) for point in product(*((grid[0], grid[-1]) for grid in law.grids))]
     widths = [part.shape[1] for part in parts]
     beside = widths[0] + len(all_columns(others))
     # An orthogonal transform keeps what each fit leaves: the triangle has as many rows as columns.

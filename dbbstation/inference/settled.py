@@ -79,7 +79,7 @@ class Settled:
 
     @property
     def left(self) -> Floats:
-        """Return what is left of the residual over all rows, shape (n,)."""
+        """Return the residual beside the members, over all rows, shape (n,)."""
         return self.channel.residual - self.predicted()
 
     def averaged(self, probability: float, names: Collection[str]) -> float:

@@ -109,7 +109,7 @@ def is_marked(toolpath: Toolpath) -> bool:
     place, angle = np.concatenate(sums).T
 
     def sums_with(decimals: Sequence[int]) -> NDArray[np.uint64]:
-        # What has few decimals has zeros as the further ones.
+        # A number with few decimals continues with zeros.
         further = place * np.uint64(10 ** (decimals[0] - least[0]))
         return further + angle * np.uint64(10 ** (decimals[3] - least[1]))
 

@@ -262,7 +262,7 @@ def with_budgets(result: CirclesResult) -> list[CircleFiguresResult | PairFigure
 
 
 def not_stated(result: CirclesResult) -> list[str]:
-    """Return the causes of uncertainty that nobody stated."""
+    """Return the contributions to uncertainty without a stated size."""
     budgets = (budget for one in with_budgets(result) for budget in one.uncertainty.values())
     return list(dict.fromkeys(cause for budget in budgets for cause in budget.missing))
 

@@ -304,7 +304,7 @@ def rope(rng: np.random.Generator, t: Values) -> Scene:
 
 
 def stray_light(rng: np.random.Generator, t: Values) -> Scene:
-    """Absorbance of a dye. The simulation is linear in concentration; stray light bends high values."""
+    """A photometer reads the absorbance of a dye. Stray light bends high values; the simulation has none."""
     dye = rng.uniform(0.0, 1.0, len(t))
     share = float(rng.uniform(0.01, 0.05))
     effect = -1000.0 * (np.log10((10.0 ** (-2.0 * dye) + share) / (1.0 + share)) + 2.0 * dye)

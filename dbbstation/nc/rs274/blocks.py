@@ -132,8 +132,8 @@ def _take_code(block: ProgramBlock, word: Word) -> None:
     name = codes.name(word.letter, word.value)
     if group is None:
         raise block.fault(f"{name} is not read", codes.remedy(word.letter, word.value), word)
-    if group in block.codes:
-        other = block.codes[group]
+    other = block.codes.get(group) or block.codes.get(codes.EXCLUDED.get(group, group))
+    if other is not None:
         what = f"{name} and {codes.name(other.letter, other.value)} exclude each other in one line ({group})"
         raise block.fault(what, "write them in separate lines, or remove one", word)
     block.codes[group] = word._replace(value=value)

@@ -31,6 +31,7 @@ class ModalGroup(StrEnum):
     SPINDLE = "spindle"
     COOLANT = "coolant"
     OVERRIDE = "override switches"
+    SWITCH = "one override switch"
     CALL = "subprogram"
     STATE = "stored modes"
     OUTPUT = "output, or function of one's own"
@@ -60,8 +61,16 @@ G_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((98, 99), ModalGroup.RETRACT),
 }
 
-SWITCHES = (50.0, 51.0, 52.0, 53.0)
-"""Switches of feed and spindle override, adaptive feed and feed stop."""
+EXCLUDED = {
+    ModalGroup.OVERRIDE: ModalGroup.SWITCH,
+    ModalGroup.SPINDLE: ModalGroup.STATE,
+    ModalGroup.STOP: ModalGroup.CALL,
+}
+EXCLUDED |= {other: group for group, other in EXCLUDED.items()}
+"""Groups that are one in LinuxCNC."""
+
+NEEDED = {**dict.fromkeys((62.0, 63.0, 64.0, 65.0), "P"), 67.0: "E", 68.0: "E"}
+"""Letter without which LinuxCNC refuses an output."""
 
 M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((0, 1, 2, 30), ModalGroup.STOP),
@@ -69,9 +78,10 @@ M_CODES: dict[float, ModalGroup] = {
     **dict.fromkeys((6, 61), ModalGroup.TOOL),
     **dict.fromkeys((7, 8, 9), ModalGroup.COOLANT),
     **dict.fromkeys((48, 49), ModalGroup.OVERRIDE),
+    **dict.fromkeys((50, 51, 52, 53), ModalGroup.SWITCH),
     **dict.fromkeys((98, 99), ModalGroup.CALL),
     **dict.fromkeys((70, 71, 72, 73), ModalGroup.STATE),
-    **dict.fromkeys((*SWITCHES, 62, 63, 64, 65, 67, 68, *range(100, 198), 199), ModalGroup.OUTPUT),
+    **dict.fromkeys((*NEEDED, *range(100, 198), 199), ModalGroup.OUTPUT),
 }
 
 STORED: dict[ModalGroup, str] = {

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.nc.rs274.arc_words import CENTRES
-from dbbstation.nc.rs274.codes import CURVES, CYCLES, STORED, SWITCHES, ModalGroup, name
+from dbbstation.nc.rs274.codes import CURVES, CYCLES, NEEDED, STORED, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.expressions import shown
@@ -71,6 +71,9 @@ _NOT_BESIDE = frozenset(
     }
 )
 """Codes that are refused while a contour is compensated."""
+
+_BEHIND_CUTTER = frozenset({ModalGroup.TOOL_LENGTH, ModalGroup.OFFSET, ModalGroup.ONCE})
+"""Those that LinuxCNC runs after G41 in its line, and refuses there."""
 
 
 class Feed(NamedTuple):
@@ -207,11 +210,14 @@ class Modes:
         said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]
         self._spindle_speed = self._spindle_speed if speed is None else f"S{speed.value:g}"
         said += [block.codes.get(group) for group in (ModalGroup.SPINDLE, ModalGroup.COOLANT, ModalGroup.OVERRIDE)]
-        output = block.codes.get(ModalGroup.OUTPUT)
-        if self._stored and output is not None and output.value in SWITCHES:
-            what = f"M{output.value:g} between modes that are stored (M70, M73) and come back"
-            raise block.fault(what, "write it before them, or behind", output)
-        said += [] if output is None else [output, *(block.words.pop(letter, None) for letter in "EPQ")]
+        output, switch = (block.codes.get(group) for group in (ModalGroup.OUTPUT, ModalGroup.SWITCH))
+        if self._stored and switch is not None:
+            what = f"M{switch.value:g} between modes that are stored (M70, M73) and come back"
+            raise block.fault(what, "write it before them, or behind", switch)
+        needed = "" if output is None else NEEDED.get(output.value, "")
+        if output is not None and needed and needed not in block.words:
+            raise block.fault(f"M{output.value:g} needs {needed}", "give the output's number", output)
+        said += [output, switch, *(block.words.pop(letter, None) for letter in "EPQ" if output or switch)]
         text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
             self.path.say(RowKind.FUNCTION, text, line=block.place.line)
@@ -239,7 +245,8 @@ class Modes:
             return
         users = [self._in_line(block, ModalGroup.ONCE, {DWELL, 10.0}), self._in_line(block, ModalGroup.PATH, {64.0})]
         users += [self._in_line(block, ModalGroup.MOTION, ARCS) or self._modal_arc(block)]
-        users += [name("M", block.codes[ModalGroup.OUTPUT].value)] if ModalGroup.OUTPUT in block.codes else []
+        outputs = (block.codes.get(group) for group in (ModalGroup.OUTPUT, ModalGroup.SWITCH))
+        users += [name("M", word.value) for word in outputs if word is not None]
         both = [code for code in users if code]
         if len(both) > 1 and ("P" in block.words or both[0] == name("G", DWELL)):
             what = f"{' and '.join(both)} both take P"
@@ -289,13 +296,15 @@ class Modes:
     def _cutter_radius(self, block: ProgramBlock) -> None:
         word, block_number = block.codes.get(ModalGroup.CUTTER), block.words.pop("D", None)
         number = self._radius_number = block_number or self._radius_number
+        changes = block.codes.keys() & (_NOT_BESIDE if word is None else _BEHIND_CUTTER)
+        changes -= {ModalGroup.ONCE} if block.code(ModalGroup.ONCE) == DWELL else set()
+        begins = word is not None and word.value != 40.0  # noqa: PLR2004
+        if changes and (begins or (word is None and self._cutter is not None)):
+            what = "beside a contour (G41, G42) the line changes what moves mean"
+            raise block.fault(what, "write it before the contour or behind G40", block.codes[min(changes)])
         if word is None:
-            dwells = block.code(ModalGroup.ONCE) == DWELL
-            if self._cutter is not None and block.codes.keys() & _NOT_BESIDE > ({ModalGroup.ONCE} if dwells else set()):
-                what = "beside a contour (G41, G42) the line changes what moves mean"
-                raise block.fault(what, "write it before the contour or behind G40")
             return
-        if word.value == 40.0:  # noqa: PLR2004
+        if not begins:
             self._left_contour = self._beside is not None
             self._cutter = self._beside = None
             return

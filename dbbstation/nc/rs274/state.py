@@ -111,6 +111,8 @@ class ControlState:
     def shift(self, code: float, block: ProgramBlock) -> None:
         """Run G52 or G92 to G92.3."""
         word, shift = block.codes[ModalGroup.ONCE], list(self.g92)
+        if code in {52.0, 92.0} and block.words.keys().isdisjoint(AXES):
+            raise block.fault(f"{name('G', code)} without axes", "give the axes that it sets", word)
         for axis, letter in enumerate(AXES):
             value = self._taken(block, axis, letter) if code in {52.0, 92.0} else None
             if value is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.text.written import natural, on_one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
 
 @dataclass(frozen=True, order=True)
@@ -21,6 +21,11 @@ class Problem:
     column: int
     what: str
     remedy: str = ""
+
+    @classmethod
+    def of(cls, file: object, what: str, remedy: str = "", line: int = 0, column: int = 0) -> Problem:
+        """Return a fault of a whole file, or of a line of it."""
+        return cls(str(file), line, column, what, remedy)
 
     def __str__(self) -> str:
         """Return `file:line:column: what; remedy`, the form that editors jump to."""
@@ -105,7 +110,17 @@ class InputError(StationError):
     @classmethod
     def of(cls, file: object, what: str, remedy: str = "", line: int = 0, column: int = 0) -> InputError:
         """Return the error of one fault."""
-        return cls([Problem(str(file), line, column, what, remedy)])
+        return cls([Problem.of(file, what, remedy, line, column)])
+
+
+def refuse(faults: Collection[Problem]) -> None:
+    """Raise all faults as one error.
+
+    Raises:
+        InputError: there is a fault.
+    """
+    if faults:
+        raise InputError(faults)
 
 
 class ArgumentError(StationError, ValueError):

@@ -83,7 +83,7 @@ def check(
       dbbstation check --schema dbb-plan/1 > dbb-plan-1.schema.json
     """
     from dbbstation.cli.output import print_result
-    from dbbstation.errors import InputError
+    from dbbstation.errors import refuse
 
     if schema is not None:
         if files:
@@ -122,8 +122,7 @@ def check(
         for one in seen:
             for note in one.notes:
                 echo(f"{one.plan}: {note}")
-    if problems:
-        raise InputError(set(problems))
+    refuse(set(problems))
 
 
 def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
@@ -243,9 +242,7 @@ def _dry_run(
     with count_bar("programs") as trying:
         count, faults = dry_run(plan, machine, tests=chosen, step_deg=step_deg, approach=approach, progress=trying)
     on = f"on {machine_file}: "
-    problems = tuple(
-        Problem(str(plan_file), 0, 0, f"{on}{fault.where}: {fault.what}", fault.remedy) for fault in faults
-    )
+    problems = tuple(Problem.of(plan_file, f"{on}{fault.where}: {fault.what}", fault.remedy) for fault in faults)
     return DryRunResult(str(plan_file), str(machine_file), count, not problems, problems)
 
 

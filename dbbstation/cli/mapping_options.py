@@ -128,7 +128,7 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
         InputError: every fault of every file.
         click.UsageError: an option repeats a fact of the mapping.
     """
-    from dbbstation.errors import InputError, Problem
+    from dbbstation.errors import InputError, Problem, refuse
     from dbbstation.files.formats.mapping import read_mapping
 
     decimal, separator = options.decimal, options.separator
@@ -149,8 +149,7 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
             found[path] = _read(path, language, shops, encoding)
         except InputError as error:
             faults += error.problems
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return found
 
 

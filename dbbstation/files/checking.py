@@ -131,7 +131,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
     kind, reader = OTHERS.get(checked.path.suffix.lower(), ("", ""))
     if kind:
         what = f"this is {kind}, which `check` does not read"
-        checked.problems.append(Problem(str(checked.path), 0, 0, what, f"use `{reader}`"))
+        checked.problems.append(Problem.of(checked.path, what, f"use `{reader}`"))
         return
     document = load_yaml(checked.path, checked.problems)
     if document is None:
@@ -220,7 +220,7 @@ def _implausible(path: Path, recording: Recording) -> list[Problem]:
     usable = np.arange(len(recording)) if recording.usable is None else np.flatnonzero(recording.usable)
     if len(usable) < FEWEST_SAMPLES:
         what = f"{_count(len(usable), 'usable sample')}: a circle takes {FEWEST_SAMPLES} at the least"
-        faults.append(Problem(str(path), 0, 0, what, "check that it is the whole recording, and what `status` says"))
+        faults.append(Problem.of(path, what, "check that it is the whole recording, and what `status` says"))
     lengths = recording.length_mm[usable]
     wrong = np.flatnonzero((lengths < BAR_LENGTH.least) | (lengths > BAR_LENGTH.most))
     if wrong.size:
@@ -228,7 +228,7 @@ def _implausible(path: Path, recording: Recording) -> list[Problem]:
         what = f"length_mm is {found:g} in sample {usable[wrong[0]] + 1}, expected {BAR_LENGTH.range}{BAR_LENGTH.guess(found)}"
         more = f"; {wrong.size - 1} more are so" if wrong.size > 1 else ""
         remedy = "give the whole distance between the balls in mm, nothing taken off"
-        faults.append(Problem(str(path), 0, 0, what + more, remedy))
+        faults.append(Problem.of(path, what + more, remedy))
     return faults
 
 
@@ -249,7 +249,7 @@ def _session(checked: Checked) -> None:
         return
     wanted: list[tuple[RunEntry, Recording]] = []
     checked.warnings += [
-        Problem(str(run.path), 0, 0, f"samples: {run.counts.text}")
+        Problem.of(run.path, f"samples: {run.counts.text}")
         for run in session.runs
         if run.counts is not None and (run.counts.lost or run.counts.rejected)
     ]
@@ -268,11 +268,11 @@ def _session(checked: Checked) -> None:
     for path in unlisted_sealed(session):
         what = "this sealed run is in no list: the session does not use it"
         remedy = "`dbbstation session take-in` lists it, to be accepted or rejected"
-        checked.warnings.append(Problem(str(path), 0, 0, what, remedy))
+        checked.warnings.append(Problem.of(path, what, remedy))
     try:
         session.plan.check(session.machine)
     except TravelError as error:
-        checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
+        checked.problems.append(Problem.of(session.plan_path, f"{error.where}: {error.what}", error.remedy))
     _judge(checked, session, wanted)
     _amended(checked, session)
     checked.summary = f"session: {_states(session)}; {_seal(session)}"
@@ -282,10 +282,10 @@ def _session(checked: Checked) -> None:
 
 
 def _amended(checked: Checked, session: SessionFolder) -> None:
-    checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
+    checked.warnings += [Problem.of(session.folder, amendment.text) for amendment in session.amendments]
     log = read_event_log(session.folder, [])
     if log is not None:
-        checked.warnings += few([Problem(str(log.path), 0, 0, what) for what in set_back(log)])
+        checked.warnings += few([Problem.of(log.path, what) for what in set_back(log)])
     if session.seal is not None:
         checked.problems += copy_faults(session.folder, session.seal, session.amendments)
 
@@ -306,7 +306,7 @@ def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunE
         lossy = any(finding.name is Name.LOST for finding in judgement.wrong)
         said = {Name.LOST, Name.CIRCLE} if lossy else {Name.LOST}
         checked.warnings += [
-            Problem(str(run.path), 0, 0, f"{finding.name}: {finding.text}")
+            Problem.of(run.path, f"{finding.name}: {finding.text}")
             for finding in judgement.wrong
             if finding.name not in said
         ]

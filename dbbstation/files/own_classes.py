@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.catalogue import FOREIGN, FoundClass, classes_of, in_words, line_in
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem, refuse
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
 from dbbstation.laws.contract import TableSource
@@ -46,7 +46,7 @@ def classes_in_files(
         kinds = classes_of(module, base)
         if not kinds:
             names = " or ".join(one.__name__ for one in (base if isinstance(base, tuple) else (base,)))
-            faults.append(Problem(str(path), 0, 0, f"no class in it derives from {names}", contract))
+            faults.append(Problem.of(path, f"no class in it derives from {names}", contract))
         for kind in kinds:
             others = any(issubclass(other, kind) for other in kinds if other is not kind)
             if not (isabstract(kind) and others):  # what others derive from may leave things to them
@@ -94,8 +94,7 @@ def own_instances(
         if fault is not None:
             faults.append(Problem(place.file, place.line, 0, *fault))
         found.setdefault(name, one)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return list(found.values())
 
 
@@ -115,9 +114,9 @@ def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
         what = f"is not Python: {error.msg}"
         faults.append(Problem(str(path), error.lineno or 0, error.offset or 0, what, "mend the line"))
     except ValueError as error:
-        faults.append(Problem(str(path), 0, 0, f"is not Python: {error}", "name a Python file"))
+        faults.append(Problem.of(path, f"is not Python: {error}", "name a Python file"))
     except (MemoryError, RecursionError):
-        faults.append(Problem(str(path), 0, 0, "is nested too deeply", "name a file that was written by hand"))
+        faults.append(Problem.of(path, "is nested too deeply", "name a file that was written by hand"))
     return None
 
 

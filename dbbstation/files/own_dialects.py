@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dbbstation.catalogue import FOREIGN, FoundClass, in_words, line_in
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.own_classes import classes_in_files
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.registry import dialect_named
@@ -30,9 +30,8 @@ def dialect_given(name_or_file: str) -> Dialect:
     found = classes_in_files([Path(name_or_file)], Dialect, CONTRACT, faults)  # never made
     if len(found) > 1:
         names = ", ".join(one.kind.__name__ for one in found)
-        faults.append(Problem(name_or_file, 0, 0, f"there are several dialects in it: {names}", "leave one"))
-    if faults:
-        raise InputError(faults)
+        faults.append(Problem.of(name_or_file, f"there are several dialects in it: {names}", "leave one"))
+    refuse(faults)
     return _tried(found[0])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from dbbstation.catalogue import FoundClass
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem, refuse
 from dbbstation.files.own_classes import classes_in_files, module_name
 from dbbstation.laws.contract import MOVING, TableSource
 from dbbstation.sources.contract import ErrorSource
@@ -32,8 +32,7 @@ def every_source(files: Sequence[Path] = ()) -> Mapping[str, ErrorSource]:
     faults: list[Problem] = []
     own = classes_in_files(files, (ErrorSource, TableSource), CONTRACT, faults)
     found = known_with([_of_struts(one) for one in own if _has_columns(one, faults)], faults)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return found
 
 

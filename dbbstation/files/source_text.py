@@ -38,15 +38,15 @@ def read_bytes(
 def unreadable(path: Path, error: OSError) -> Problem:
     """Return the problem of a file that cannot be read."""
     if isinstance(error, FileNotFoundError):
-        return Problem(str(path), 0, 0, "there is no such file", "check the path")
+        return Problem.of(path, "there is no such file", "check the path")
     if isinstance(error, IsADirectoryError):
-        return Problem(str(path), 0, 0, "this is a folder: name a file", "name a file in this folder")
+        return Problem.of(path, "this is a folder: name a file", "name a file in this folder")
     if isinstance(error, NotRegularError):
-        return Problem(str(path), 0, 0, str(error.strerror), "write it to a file first")
+        return Problem.of(path, str(error.strerror), "write it to a file first")
     if isinstance(error, TooLargeError):
-        return Problem(str(path), 0, 0, str(error.strerror), "check that it is the file you mean")
+        return Problem.of(path, str(error.strerror), "check that it is the file you mean")
     why = (error.strerror or "unknown reason").lower()
-    return Problem(str(path), 0, 0, f"cannot be read: {why}", "check its permissions and the disk")
+    return Problem.of(path, f"cannot be read: {why}", "check its permissions and the disk")
 
 
 def first_line(path: Path) -> bytes:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from dbbstation.catalogue import files_of_packages, looked_up, nearest
-from dbbstation.errors import InputError, InstrumentError, Problem
+from dbbstation.errors import InputError, InstrumentError, Problem, refuse
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.schema import Partly, Schema, validate
 from dbbstation.files.yaml.text import load_yaml
@@ -192,6 +192,5 @@ def _read(path: Path) -> dict[str, Protocol]:
         remedy = f"rename the file to {file.name}.yaml or change the name in it"
         faults.append(document.problem(("name",), f"the name {file.name!r} is not the file's", remedy))
     variants = {name: variant(document, name, faults) for name in (file.profile, *file.profiles)}
-    if faults:
-        raise InputError(set(faults))
+    refuse(set(faults))
     return {name: one for name, one in variants.items() if one is not None}

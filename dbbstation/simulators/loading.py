@@ -15,7 +15,7 @@ import numpy as np
 from dbbstation.catalogue import FOREIGN, in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
 from dbbstation.files.keys import digests_of, key_of
@@ -85,8 +85,7 @@ def load_simulator(
     file = read_simulator(path)
     faults: list[Problem] = []
     tables = _tables(file, recordings, numbers, faults)
-    if faults:
-        raise InputError(faults[:MOST_FAULTS])
+    refuse(faults[:MOST_FAULTS])
     source = _source(path, file)
     parameters = [_parameter(name, name, one) for name, one in file.parameters.items()]
     several = len(tables) > 1
@@ -133,8 +132,7 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
     found = classes_in_files([python], Simulator, CONTRACT, faults)
     if len(found) > 1 and not faults:
         faults.append(Problem(str(python), found[1].place.line, 0, "there are two simulators in one file", CONTRACT))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     kind, place = found[0].kind, found[0].place
     if isabstract(kind):
         raise InputError.of(place.file, f"{kind.__name__} lacks simulate", CONTRACT, line=place.line)

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.session import RunState, SessionDetails
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_checks import unlike_bar
@@ -52,18 +52,15 @@ def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
         TravelError: a circle leaves the machine's travel; names test, direction, pose and limit.
     """
     faults = [
-        Problem(
+        Problem.of(
             file,
-            0,
-            0,
             f"test {test.name} has no feed-in: a recording of it cannot be cut",
             "give `feed_in_mm` in its path, 1.5 mm is usual",
         )
         for test in plan.tests.values()
         if test.circle.feed_in_mm <= 0.0
     ]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     plan.check(machine)
 
 
@@ -83,9 +80,8 @@ def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None
             f"test {test.name}: the bar goes from {bar_mm:g} to {outside_mm:g} mm with its feed-in, and the instrument"
         )
         remedy = "take an instrument or a profile with more range, or a shorter `feed_in_mm` in its path"
-        faults.append(Problem(file, 0, 0, f"{what} reads {low_mm:g} to {high_mm:g} mm", remedy))
-    if faults:
-        raise InputError(faults)
+        faults.append(Problem.of(file, f"{what} reads {low_mm:g} to {high_mm:g} mm", remedy))
+    refuse(faults)
 
 
 def unjudged(
@@ -162,7 +158,7 @@ class Job:
         bar = self.details.bar
         fault = None if bar is None else unlike_bar(bar.calibrated_length_mm, bar.stroke_mm, plan)
         if fault is not None:
-            raise InputError([Problem(plan_file, 0, 0, *fault)])
+            raise InputError([Problem.of(plan_file, *fault)])
         self._check_room(plan)
         check_plan(plan, self.machine, file=plan_file)
         if self.range_mm is not None:

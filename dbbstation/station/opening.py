@@ -6,7 +6,7 @@ import time
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.machine import machine_data
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.formats.session import RunState
@@ -43,18 +43,17 @@ def check_session(
     faults = []
     if machine_data(machine) != machine_data(session.machine):
         what = "the machine of this session is another one"
-        faults.append(Problem(str(session.machine_path), 0, 0, what, "give its machine file, or another --out"))
+        faults.append(Problem.of(session.machine_path, what, "give its machine file, or another --out"))
     if plan_data(plan) != plan_data(read_inline_plan(session.plan_path)):
         what = "the plan of this session is another one"
-        faults.append(Problem(str(session.plan_path), 0, 0, what, "give its plan file, or another --out"))
+        faults.append(Problem.of(session.plan_path, what, "give its plan file, or another --out"))
     other = [run for run in session.in_state(RunState.ACCEPTED) if (run.program is not None) is not with_programs]
     if other:
         was, now = ("plain circles", "NC programs") if with_programs else ("NC programs", "plain circles")
         what = f"its runs were commanded by {was}, now {now} are asked for"
-        faults.append(Problem(str(folder), 0, 0, what, "measure them into a separate session"))
+        faults.append(Problem.of(folder, what, "measure them into a separate session"))
     faults += _mixed(folder, session, details.instrument)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> list[Problem]:
@@ -66,7 +65,7 @@ def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> l
         return []
     kinds = {True: "a virtual machine", False: "a real machine", None: "a machine that is not noted as virtual"}
     what = f"this session is of {kinds[session.virtual]}, and {instrument.text} is that of {kinds[instrument.virtual]}"
-    return [Problem(str(folder), 0, 0, what, "measure into a new session: give another --out")]
+    return [Problem.of(folder, what, "measure into a new session: give another --out")]
 
 
 def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> None:
@@ -76,8 +75,7 @@ def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | N
         InputError: they would be mixed.
     """
     faults = _mixed(folder, session, instrument)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
 
 
 def open_session(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.nc.commanded import poses_at_progress
 from dbbstation.nc.nominal import check_nominal
@@ -53,8 +53,7 @@ def load_programs(folder: Path, plan: Plan, machine: Machine) -> dict[tuple[str,
             program = None if path is None else _loaded(path, test.run(direction), machine, faults)
             if program is not None:
                 programs[name, direction] = program
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return programs
 
 
@@ -81,7 +80,7 @@ def _file_of(folder: Path, stem: str, faults: list[Problem]) -> Path | None:
     what = f"there is no program {stem}" if not found else f"several programs are called {stem}"
     names = ", ".join(path.name for path in found or candidates)
     remedy = f"write it with `dbbstation program` ({names})" if not found else f"leave one of {names}"
-    faults.append(Problem(str(folder), 0, 0, what, remedy))
+    faults.append(Problem.of(folder, what, remedy))
     return None
 
 
@@ -99,7 +98,7 @@ def _loaded(path: Path, circle: Circle, machine: Machine, faults: list[Problem])
         return None
     except StationError as error:
         what = f"{error.what}, and the control corrects already: {machine.control.said if machine.control else ''}"
-        faults.append(Problem(str(path), 0, 0, what, "measure with nominal programs"))
+        faults.append(Problem.of(path, what, "measure with nominal programs"))
         return None
     check_reach(machine, toolpath)
     named = [match[1] for text in toolpath.text.values() if (match := _MODEL.match(text))]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.errors import InputError, OutputError, Problem, TraceError
+from dbbstation.errors import InputError, OutputError, Problem, TraceError, refuse
 from dbbstation.files.atomic import streamed, write_text
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.formats.session import RunState
@@ -77,10 +77,9 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
         found |= dict.fromkeys(split_head(run.path, faults))
     if not runs:
         faults.append(
-            Problem("export", 0, 0, "no run is left to be exported", "exclude fewer tests, or give another --states")
+            Problem.of("export", "no run is left to be exported", "exclude fewer tests, or give another --states")
         )
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     known = [
         name for name in columns.COLUMNS if name in found and name not in {columns.TIME, columns.THETA, columns.LENGTH}
     ]

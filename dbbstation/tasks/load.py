@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.control.commands import nominal_commands
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.files.source_text import decode, read_bytes
@@ -152,16 +152,15 @@ def load_sessions(
             except InputError as error:
                 problems += error.problems
             except StationError as error:
-                problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
+                problems.append(Problem.of(run.path, error.what, error.remedy))
         progress(len(wanted), len(wanted))
         warnings += _under_spindle(session, wanted)
         logs[session.name] = [*logged, *_left_out(session, exclude)] if logged else []
     problems += [
-        Problem(str(copy), 0, 0, f"{count} runs repeat recordings of {first}", "give every recording once")
+        Problem.of(copy, f"{count} runs repeat recordings of {first}", "give every recording once")
         for (copy, first), count in copied.items()
     ]
-    if problems:
-        raise InputError(problems)
+    refuse(problems)
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError.of(places, "no accepted run is left", "accept a run, or exclude fewer tests")
@@ -277,7 +276,7 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
         serials = first.serial_number, other.serial_number
         if all(serials) and serials[0] != serials[1]:
             what = f"it is of machine {serials[1]}, {first.folder} of machine {serials[0]}"
-            faults.append(Problem(str(other.folder), 0, 0, what, "choose sessions of one machine"))
+            faults.append(Problem.of(other.folder, what, "choose sessions of one machine"))
         elif unlike := differences(first.machine, other.machine):
             what = (
                 f"its machine file is not that of {first.folder}: {in_words(unlike)}, in {first.name} and {other.name}"
@@ -286,12 +285,11 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
                 "fit sessions together only where the control had the same joints and reference lengths; where it had, "
                 "correct the wrong machine.yaml, so that both say the same"
             )
-            faults.append(Problem(str(other.machine_path), 0, 0, what, remedy))
+            faults.append(Problem.of(other.machine_path, what, remedy))
         elif first.machine.name != other.machine.name:
             names = f"{first.machine.name} in {first.name}, {other.machine.name} in {other.name}"
             told.append(f"the machine files have two names ({names}) and agree in all values: taken for one machine")
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return told
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import Problem, StationError, refuse
 from dbbstation.files.source_text import read_bytes
 from dbbstation.report.content import Modelled
 from dbbstation.results.model_warnings import lacks_physics
@@ -51,9 +51,8 @@ def logo_of(settings: Settings) -> str:
     data = read_bytes(path, faults, LARGEST_LOGO_BYTES) or b""
     kind = next((kind for begins, kind in _PICTURES.items() if data.startswith(begins)), "")
     if not kind and not faults:
-        faults.append(Problem(str(path), 0, 0, "no PNG or JPEG picture", f"name one in {stated.origin}"))
-    if faults:
-        raise InputError(faults)
+        faults.append(Problem.of(path, "no PNG or JPEG picture", f"name one in {stated.origin}"))
+    refuse(faults)
     return f"data:image/{kind};base64,{b64encode(data).decode()}"
 
 

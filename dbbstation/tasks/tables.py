@@ -13,7 +13,7 @@ import numpy as np
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
-from dbbstation.errors import ArgumentError, InputError, Problem
+from dbbstation.errors import ArgumentError, InputError, Problem, refuse
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, given_table, read_table
 from dbbstation.inference.triangle import left_by
 from dbbstation.inference.variables import Kind, Variable
@@ -152,16 +152,15 @@ def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabula
     units = {name: meaning_of(name).unit for name in (asked.measured, asked.simulated)}
     if len({unit for unit in units.values() if unit}) > 1:
         said = " and ".join(f"`{name}` in {unit}" for name, unit in units.items())
-        faults.append(Problem(first, 0, 0, f"{said} cannot be compared", "give both in the same unit"))
+        faults.append(Problem.of(first, f"{said} cannot be compared", "give both in the same unit"))
     if asked.measured == asked.simulated:
         what = f"`{asked.measured}` is named for measured and for simulated values"
-        faults.append(Problem(first, 0, 0, what, "name the column of the simulation"))
+        faults.append(Problem.of(first, what, "name the column of the simulation"))
     certain = [asked.measured, asked.simulated, *(asked.variables or ())]
     faults += [fault for file in files for name in dict.fromkeys(certain) for fault in file.faults_of(name)]
     faults += [fault for file in files for fault in _faults_of_size(file, certain if asked.variables else file.names)]
     faults += _faults_of_scale(files, asked)
-    if faults:
-        raise InputError(faults[:MOST_FAULTS])
+    refuse(faults[:MOST_FAULTS])
     return _Reader(files, asked, units[asked.measured] or units[asked.simulated]).read()
 
 
@@ -310,14 +309,13 @@ class _Reader:
         remedy = f"name parameters of columns {DERIVATIVE}NAME, here: {there}"
         stated = [("--known", name) for name in self._asked.known] + [("--free", name) for name in self._asked.free]
         faults = [
-            Problem(option, 0, 0, f"`{name}` is no parameter of this table", remedy)
+            Problem.of(option, f"`{name}` is no parameter of this table", remedy)
             for option, name in stated
             if name not in table.derivatives
         ]
         both = sorted(set(self._asked.known) & set(self._asked.free))
-        faults += [Problem("--free", 0, 0, f"`{name}` is also stated with --known", "give it once") for name in both]
-        if faults:
-            raise InputError(faults)
+        faults += [Problem.of("--free", f"`{name}` is also stated with --known", "give it once") for name in both]
+        refuse(faults)
 
     def _derivatives(self, values: Mapping[str, Floats]) -> list[str]:
         found = [name for name in self.names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
@@ -73,8 +73,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         rows.append([_number(row[name], name, path, line, language, faults) for name in POSE_COLUMNS])
         for name, kept in others.items():
             kept.append(row[name])
-    if faults:
-        raise InputError(faults[:MOST_FAULTS])
+    refuse(faults[:MOST_FAULTS])
     if not rows:
         raise InputError.of(path, "no pose follows the header", "give one pose per line", line=1, column=1)
     return PoseTable(np.array(rows), others)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -86,8 +86,7 @@ def read_settings(files: Iterable[Path]) -> Settings:
     from dbbstation.files.yaml.schema import read_valid  # noqa: PLC0415 - the same
 
     read = [read_valid(path, SettingsFile, faults) for path in paths]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     values: dict[str, Setting] = {}
     tolerances: tuple[Tolerance, ...] = ()
     told = ""

@@ -150,7 +150,7 @@ def rebuild(folder: Path) -> tuple[str, int]:
     log = read_event_log(folder, faults)
     if log is None or not log.events:
         what = f"there is no {EVENTS_FILE} from which the session file could be written"
-        raise InputError(faults or [Problem(str(folder), 0, 0, what, "restore the session file from a backup")])
+        raise InputError(faults or [Problem.of(folder, what, "restore the session file from a backup")])
     with SessionLock(folder, PATIENCE_S):
         store = SessionStore(folder, anew=True)
         read_session(folder)

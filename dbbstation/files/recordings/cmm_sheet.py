@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.jig import BallSchema, JigFile, checked_jig, jig_text
 from dbbstation.files.formats.mapping import LENGTH, UNITS
 from dbbstation.files.recordings.dmis import Measured, read_dmis
@@ -66,8 +66,7 @@ def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[Table
             line = next(iter(of.values())).line
             what = f"{ball} has no {', '.join(missing)}"
             faults.append(Problem(table.file, line, 0, what, "export all three coordinates"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     numbers = {axis: np.array([of[axis].value for of in balls.values()]) for axis in AXES}
     if "u" in columns:
         numbers |= {f"u{axis}": np.array([of[axis].u for of in balls.values()]) for axis in AXES}
@@ -209,14 +208,12 @@ def read_sheet(
         )
     if not faults:
         faults += [fault for key in (*AXES, *of_u) if key in found for fault in _bad_cells(table, found[key])]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     factors = UNITS[LENGTH][unit], UNITS[LENGTH][u_said or unit]
     rows = [_row(table, k, found, factors, coverage) for k in range(len(table))]
     if not u_said:
         faults += [_unlike_a_cmm(one, str(path), unit) for one in rows if not _is_like_a_cmm(one)]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return rows
 
 
@@ -270,8 +267,7 @@ def jig_of_sheet(
             balls[name] = BallSchema.model_construct(
                 bore=bore, holder=holder, centre_mm=(x, y, z), uncertainty_um=float(f"{u_um:.6g}")
             )
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     plate = before.jig.model_copy(update={"cmm_temp_c": cmm_temp_c})
     return checked_jig(jig_text(before.model_copy(update={"jig": plate, "balls": balls})), file)
 

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Problem, refuse
 from dbbstation.files.source_text import LARGEST_SHEET, shortened, text_of
 
 if TYPE_CHECKING:
@@ -70,17 +70,16 @@ def read_dmis(path: Path) -> list[Measured]:
             point = _point(actual[1], actual[2], factor, str(path), line, faults)
             found += [] if point is None else [point]
     faults += _of_the_whole(found, factor, str(path), faults)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return found
 
 
 def _of_the_whole(found: list[Measured], factor: float, file: str, faults: list[Problem]) -> Iterator[Problem]:
     if found and not factor:
-        yield Problem(file, 0, 0, "no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
+        yield Problem.of(file, "no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
     if not found and not faults:
         what = "there is no measured sphere or point: no `FA(NAME)=FEAT/SPHERE` or `FEAT/POINT`"
-        yield Problem(file, 0, 0, what, "output actual features; `F(NAME)` are nominal ones")
+        yield Problem.of(file, what, "output actual features; `F(NAME)` are nominal ones")
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:

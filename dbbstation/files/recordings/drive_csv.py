@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.number_language import is_number
 from dbbstation.files.recordings.table_csv import given_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
@@ -98,14 +98,13 @@ def given_drive(given: Columns, name: str) -> DriveFile:
     _check_names(list(table.names), name, 0, faults)
     numbers = {one: table.values[one] for one in table.names if one in LARGEST}
     faults += [
-        Problem(name, 0, 0, f"`{one}` has values that are not finite", "correct or remove the rows")
+        Problem.of(name, f"`{one}` has values that are not finite", "correct or remove the rows")
         for one, values in numbers.items()
         if not np.isfinite(values).all()
     ]
     if not faults:
         _check_values(numbers, table.lines.tolist(), name, faults)
-    if faults:
-        raise InputError(faults[:MOST_FAULTS])
+    refuse(faults[:MOST_FAULTS])
     return DriveFile(name, 0, numbers, {}, ())
 
 
@@ -126,8 +125,7 @@ def parse_drive(text: str, file: str) -> DriveFile:
     rows = lines[1:]
     if not rows and not faults:
         faults.append(Problem(file, header, 0, "there are no samples below this line"))
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     warnings: list[Problem] = []
     if not text.endswith("\n") and rows[-1][1].count(",") != len(names) - 1:
         warnings.append(Problem(file, rows[-1][0], 0, "the last line was cut off; it is left out"))
@@ -140,8 +138,7 @@ def parse_drive(text: str, file: str) -> DriveFile:
     numbers = _numbers(rows, names, known, file, faults)
     if not faults:
         _check_values(numbers, [number for number, _ in rows], file, faults)
-    if faults:
-        raise InputError(faults[:MOST_FAULTS])
+    refuse(faults[:MOST_FAULTS])
     kept = {name: tuple(line.split(",")[names.index(name)].strip() for _, line in rows) for name in others}
     return DriveFile(file, header, numbers, kept, tuple(warnings))
 
@@ -178,7 +175,7 @@ def _numbers(
         _name_faults(rows, names, known, file, faults)
         if not faults:
             what = "NumPy reads this file otherwise than line by line"
-            faults.append(Problem(file, 0, 0, what, "write plain decimal numbers"))
+            faults.append(Problem.of(file, what, "write plain decimal numbers"))
     return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(known)}
 
 

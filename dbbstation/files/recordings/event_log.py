@@ -332,6 +332,6 @@ def anchor_told(folder: Path, anchor: str) -> Problem:
         if event.link.startswith(anchor):
             when = "" if event.at is None else f", {event.at:%Y-%m-%d %H:%M %Z}"
             what = f"the anchor {anchor[:SHORTEST]} is event {number} of {len(events)}{when}: nothing before it was changed"
-            return Problem(str(folder), 0, 0, what)
+            return Problem.of(folder, what)
     what = f"the anchor {anchor[:SHORTEST]} is not in this session: it is another one, or was written anew since"
-    return Problem(str(folder), 0, 0, what, "compare it with a backup")
+    return Problem.of(folder, what, "compare it with a backup")

@@ -128,8 +128,8 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
     groups = [len(re.findall(r"\d+", line)) for line in lines[:_LOOKED_AT]]
     most = max(groups, default=0)
     if most < 2:  # noqa: PLR2004 - a row has two numbers
-        return Problem(
-            file, 0, 0, "there is no table of numbers in this file", f"check which file it is; {language.text}{stated}"
+        return Problem.of(
+            file, "there is no table of numbers in this file", f"check which file it is; {language.text}{stated}"
         )
     line = groups.index(most) + 1
     what = (
@@ -188,7 +188,7 @@ def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str |
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         what = f"byte {data[error.start]:#04x} at position {error.start} is no {encoding} text"
-        faults.append(Problem(file, 0, 0, what, "give another --encoding, or save the file as UTF-8"))
+        faults.append(Problem.of(file, what, "give another --encoding, or save the file as UTF-8"))
         return None
 
 

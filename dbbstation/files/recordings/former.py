@@ -177,4 +177,4 @@ def _may_be_model(path: Path) -> bool:
 
 def _no_sessions(folder: Path) -> Problem:
     what = f"no folder in it holds a {SESSION_FILE}, {DEEPEST} folders deep"
-    return Problem(str(folder), 0, 0, what, "name a folder that holds the session folders of `measure` or `simulate`")
+    return Problem.of(folder, what, "name a folder that holds the session folders of `measure` or `simulate`")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import MOST_FAULTS, InputError, Problem, few
+from dbbstation.errors import MOST_FAULTS, InputError, Problem, few, refuse
 from dbbstation.files.formats.session import PART, Counts
 from dbbstation.files.gateway import digest_of, opened
 from dbbstation.files.inputs import note_input, note_read
@@ -120,7 +120,7 @@ def _faults_of_lines(lines: Lines) -> Iterator[Problem]:
             yield Problem(lines.file, number, 0, *fault)
     if not found:
         what = "NumPy reads this file otherwise than line by line"
-        yield Problem(lines.file, 0, 0, what, "write plain decimal numbers")
+        yield Problem.of(lines.file, what, "write plain decimal numbers")
 
 
 def _faults_of_time(file: str, t_s: Floats, numbers: Sequence[int]) -> Iterator[Problem]:
@@ -215,7 +215,7 @@ def sha256_of(path: Path) -> str:
 def changed(file: str) -> Problem:
     """Return the problem of a file whose hash differs from the noted one."""
     what = "the file was changed after it was recorded: its SHA-256 is not the one in the session"
-    return Problem(file, 0, 0, what, "restore the file as recorded, or reject the run")
+    return Problem.of(file, what, "restore the file as recorded, or reject the run")
 
 
 def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False) -> RunFile:
@@ -247,8 +247,7 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
                 texts.setdefault(name, []).extend(lines.texts(name, known))
     found = numbers.columns()
     faults = [*few(faults), *numbers.faults.told()]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     status = texts.pop(columns.STATUS, [])
     usable = np.array([text in {"", columns.STATUS_GOOD} for text in status], dtype=np.bool_) if status else None
     return RunFile(

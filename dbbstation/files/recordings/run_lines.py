@@ -328,7 +328,7 @@ def _in_time_order(lines: Lines, kept: list[tuple[bytes, int]], problems: list[P
         problems.append(Problem(lines.file, kept[end][1], 0, what))
         order = list(range(end))
     elif moved:
-        problems.append(Problem(lines.file, 0, 0, "lines were found out of order; they are sorted by time"))
+        problems.append(Problem.of(lines.file, "lines were found out of order; they are sorted by time"))
     chosen: list[int] = []
     for index in order:
         if not chosen or times[index] > times[chosen[-1]]:

@@ -133,7 +133,7 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
     """Yield faults of kept copies: damaged, missing, or unknown."""
     if (folder / SEALED).is_symlink():  # it may lead to a whole disk
         what = f"{SEALED} is a link: the copies of what was sealed are part of the session"
-        yield Problem(str(folder / SEALED), 0, 0, what, "put the folder itself there, not a link")
+        yield Problem.of(folder / SEALED, what, "put the folder itself there, not a link")
         return
     known = {copy_name(name, digest): digest for name, digest in seal.files.items()}
     known |= {one.former: one.former_sha256 for one in amendments if is_copy(one.former) and one.what != RUNS}
@@ -154,7 +154,7 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
         remedy = (
             f"`dbbstation session seal {folder}` puts it right" if said in originals else "restore it from a backup"
         )
-        yield Problem(str(folder / name), 0, 0, what, remedy)
+        yield Problem.of(folder / name, what, remedy)
 
 
 def fits_name(name: str, digest: str) -> bool:
@@ -202,7 +202,7 @@ def sealed_over(files: Mapping[str, str], runs: Sequence[RunEntry]) -> Seal:
 def seal_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str], runs: Sequence[RunEntry]) -> list[Problem]:
     """Return changes since sealing: files with their keys, and runs."""
     faults = [*_file_faults(folder, file, seal, names)]
-    faults += [Problem(str(file), 0, 0, what, remedy) for what, remedy in chain_faults(folder, seal, runs)]
+    faults += [Problem.of(file, what, remedy) for what, remedy in chain_faults(folder, seal, runs)]
     return faults
 
 
@@ -211,16 +211,16 @@ def _file_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str]) -> 
     for name, stored in seal.files.items():
         if name not in now:
             what = f"{name}, which was sealed, is not there"
-            yield Problem(str(file), 0, 0, what, f"restore it{_from(folder, name, stored)}")
+            yield Problem.of(file, what, f"restore it{_from(folder, name, stored)}")
         elif now[name] != stored:
             what = f"the file is not the one that was sealed: its SHA-256 was {stored}, is {now[name]}"
             keys = _changed_keys(folder / copy_name(name, stored), folder / name)
             remedy = AMEND.format(folder=folder).replace("restore it", f"restore it{_from(folder, name, stored)}")
-            yield Problem(str(folder / name), 0, 0, f"{what}; {keys}" if keys else what, remedy)
+            yield Problem.of(folder / name, f"{what}; {keys}" if keys else what, remedy)
     for name in now:
         if name not in seal.files:
             what = f"{name} was not sealed: the session named another file then"
-            yield Problem(str(file), 0, 0, what, AMEND.format(folder=folder).replace("restore it", "name that one"))
+            yield Problem.of(file, what, AMEND.format(folder=folder).replace("restore it", "name that one"))
 
 
 def _from(folder: Path, name: str, stored: str) -> str:

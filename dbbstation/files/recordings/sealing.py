@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.session import LogMark, Seal, SessionFile
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.places import SESSION_FILE
@@ -109,14 +109,13 @@ def sealing(folder: Path) -> Sealing:
     hashed, files = _with_hashes(text, path)
     runs, seal, log = _chain(hashed, path)
     faults += [
-        Problem(str(path), 0, 0, f"run {run.label} is of {wrong}: it is not sealed", "set its date right")
+        Problem.of(path, f"run {run.label} is of {wrong}: it is not sealed", "set its date right")
         for run in runs
         if run.started is not None
         and not (run.instrument and run.instrument.virtual)
         and (wrong := impossible_day(run.started))
     ]
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     whole, linked = _with_links(hashed, path, runs)
     spoilt = [copy for copy, digest in _copies(seal).items() if hashes(path.parent, (copy,)).get(copy) != digest]
     return Sealing(path, whole, files, linked, seal, text, log is not None and bool(log.events), tuple(spoilt))
@@ -143,8 +142,7 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
             continue
         additions.append(_behind(run, "file", f"sha256: {digest_of(recorded)}", text))
         named.append(file.value)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return _added(text, additions), tuple(named)
 
 
@@ -163,7 +161,7 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog 
         sealed = sealed_names(folder, names)
         found = hashes(folder, sealed)
         faults += [
-            Problem(str(path), 0, 0, f"there is no file `{name}` to be sealed", "put it there")
+            Problem.of(path, f"there is no file `{name}` to be sealed", "put it there")
             for name in sealed
             if name not in found
         ]
@@ -173,9 +171,8 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog 
     linked = chained(runs)
     if [run.label for run in linked] != [run.label for run in runs]:
         what = "runs without a link in the chain stand before runs that have one"
-        faults.append(Problem(str(path), 0, 0, what, "put them behind the runs that are sealed"))
-    if faults:
-        raise InputError(faults)
+        faults.append(Problem.of(path, what, "put them behind the runs that are sealed"))
+    refuse(faults)
     over = sealed_over(found, linked)
     return linked, over if seal is None else replace(over, log=seal.log), log
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, TraceError
+from dbbstation.errors import InputError, Problem, TraceError, refuse
 from dbbstation.facts.quantities import Quantity
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
@@ -148,8 +148,7 @@ class SessionFolder(SessionDetails):
             return self._read[run.path]
         read = read_run(run.path, sha256=run.sha256)
         faults = [*_header_faults(run, read.header), *self._implausible(run, read.recording)]
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
         if self.keeps:
             self._read[run.path] = read
         return read
@@ -175,8 +174,7 @@ class SessionFolder(SessionDetails):
             except InputError as error:
                 faults += error.problems
         progress(len(runs), len(runs))
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
         return read
 
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
@@ -184,7 +182,7 @@ class SessionFolder(SessionDetails):
         lost, kept = lost_on_turn(recording, self.circle(run))
         unusable = unusable_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
-        return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
+        return [Problem.of(run.path, what, AFTER_LOSS)] if what else []
 
     def unusable(self, run: RunEntry) -> str:
         """Return why a run's file gives no figures; empty if it gives figures."""
@@ -211,17 +209,17 @@ class SessionFolder(SessionDetails):
             if not guess and abs(length) < _UNLIKE_RADIUS * bar:
                 guess = " (it looks like a deviation from the radius)"
             remedy = "give the whole distance between the balls in mm, nothing taken off"
-            faults.append(Problem(file, 0, 0, what + guess, remedy))
+            faults.append(Problem.of(file, what + guess, remedy))
         if run.state is RunState.RECORDING:
             return faults
         expected = 360.0 / circle.turning_deg_s
         duration = float(recording.t_s[-1] - recording.t_s[0])
         if not _FASTEST * expected < duration < _SLOWEST * expected:
             what = f"t_s spans {duration:g}, a turn takes {expected:.1f} s at the plan's feed"
-            faults.append(Problem(file, 0, 0, what, "give t_s in seconds, and the feed that was programmed"))
+            faults.append(Problem.of(file, what, "give t_s in seconds, and the feed that was programmed"))
         if recording.theta_deg is not None and np.ptp(recording.theta_deg) < np.pi * 2.0 + 0.1:
             what = f"theta_deg spans {np.ptp(recording.theta_deg):.3f} only (it looks like rad)"
-            faults.append(Problem(file, 0, 0, what, "give a full turn in degrees"))
+            faults.append(Problem.of(file, what, "give a full turn in degrees"))
         return faults
 
 
@@ -248,13 +246,13 @@ def no_session(folder: Path) -> Problem:
     """Return the fault of a folder without a session, and name sessions nearby."""
     if (folder / EVENTS_FILE).is_file():
         what = f"the session file {SESSION_FILE} is gone, its event log is there"
-        return Problem(str(folder), 0, 0, what, REBUILD.format(folder=folder))
+        return Problem.of(folder, what, REBUILD.format(folder=folder))
     inside = sorted(file.parent for file in folder.glob(f"*/{SESSION_FILE}"))
     around = [folder.parent] if (folder.parent / SESSION_FILE).is_file() else []
     beside = sorted(file.parent for file in folder.parent.glob(f"*/{SESSION_FILE}"))
     near = ", ".join(str(session) for session in (inside or around or beside)[:MOST_NAMED])
     what = f"this folder is no session: there is no {SESSION_FILE} in it"
-    return Problem(str(folder), 0, 0, what, f"did you mean {near}?" if near else "name a session folder")
+    return Problem.of(folder, what, f"did you mean {near}?" if near else "name a session folder")
 
 
 def _other_than_session(path: Path) -> Problem | None:
@@ -262,7 +260,7 @@ def _other_than_session(path: Path) -> Problem | None:
         return None if (path / SESSION_FILE).exists() else no_session(path)
     if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:  # such as the log beside them, by `shop/*`
         remedy = f"name session folders; `{path.parent}/*/` names all in that folder and no files"
-        return Problem(str(path), 0, 0, "this file is no session", remedy)
+        return Problem.of(path, "this file is no session", remedy)
     return None
 
 
@@ -371,5 +369,5 @@ def _header_faults(run: RunEntry, header: Mapping[str, str]) -> list[Problem]:
     for key, expected in (("test", run.test), ("direction", str(run.direction)), ("repeat", str(run.repeat))):
         if header.get(key, expected) != expected:
             what = f"the file is {key} `{header[key]}`, the session calls it {key} `{expected}`"
-            faults.append(Problem(str(run.path), 0, 0, what, "check which file belongs to which run"))
+            faults.append(Problem.of(run.path, what, "check which file belongs to which run"))
     return faults

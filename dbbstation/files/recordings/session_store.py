@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.errors import InputError, OutputError, Problem, refuse
 from dbbstation.files.atomic import write_folder, write_text
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.places import SESSION_FILE
@@ -100,9 +100,9 @@ def log_faults(file: Path, data: Mapping[str, Any], log: EventLog | None, *, but
     stands = standing(data, log, but_runs=but_runs)
     remedy = AMEND.format(folder=file.parent)
     if not stands.log_sound:
-        return [Problem(str(file.parent / EVENTS_FILE), 0, 0, what, remedy) for what in stands.differences]
+        return [Problem.of(file.parent / EVENTS_FILE, what, remedy) for what in stands.differences]
     remedy = remedy.replace("restore it", _rebuild(file))
-    return [Problem(str(file), 0, 0, f"{what}, by the event log", remedy) for what in stands.differences]
+    return [Problem.of(file, f"{what}, by the event log", remedy) for what in stands.differences]
 
 
 def _rebuild(file: Path) -> str:
@@ -133,8 +133,7 @@ class SessionStore:
         self.put_aside: str | None = None
         faults: list[Problem] = []
         self.log = read_event_log(folder, faults) or EventLog(folder / EVENTS_FILE)
-        if faults:
-            raise InputError(faults)
+        refuse(faults)
         found, data = self._on_disk(faults)
         self.data: dict[str, object] = data or {}
         if (data is None or anew) and self.log.events:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
@@ -120,8 +120,7 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
             continue
         rows.append(cells)
         places.append(number)
-    if faults:
-        raise InputError(faults[:MOST_FAULTS])
+    refuse(faults[:MOST_FAULTS])
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(names)}
     language = numbers or PLAIN
     values = {name: _numbers(column, language) for name, column in columns.items()}
@@ -160,12 +159,12 @@ def given_table(given: Columns, needed: Iterable[str] = (), file: str = "table")
     length = max((len(one) for one in arrays.values() if one.ndim), default=0)
     faults = _faults_of_names(list(arrays), needed, file, 0)
     faults += [
-        Problem(file, 0, 0, f"`{name}` has the shape {one.shape}, not ({length},)", "give columns of equal length")
+        Problem.of(file, f"`{name}` has the shape {one.shape}, not ({length},)", "give columns of equal length")
         for name, one in arrays.items()
         if one.shape != (length,)
     ]
     if faults or not length:
-        raise InputError(faults[:MOST_FAULTS] or [Problem(file, 0, 0, "there are no rows")])
+        raise InputError(faults[:MOST_FAULTS] or [Problem.of(file, "there are no rows")])
     instants = frozenset(name for name, one in arrays.items() if one.dtype.kind in "mM")
     arrays |= {name: (arrays[name] - arrays[name][0]) / np.timedelta64(1, "s") for name in instants}
     cells = {

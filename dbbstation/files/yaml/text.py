@@ -192,7 +192,7 @@ def _syntax_problem(error: YAMLError, text: str, file: str) -> Problem:
         return Problem(file, line, column, f"character {error.character:#04x} is not allowed", "remove it")
     mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
     if not isinstance(error, MarkedYAMLError) or mark is None:
-        return Problem(file, 0, 0, f"not YAML: {error}", "compare it with the example of its format")
+        return Problem.of(file, f"not YAML: {error}", "compare it with the example of its format")
     place = (mark.line + 1, mark.column + 1)
     said = error.problem or ""
     if "'\\t'" in said:

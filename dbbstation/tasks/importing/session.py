@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, OutputError, Problem, TraceError
+from dbbstation.errors import InputError, OutputError, Problem, TraceError, refuse
 from dbbstation.files.formats.mapping import mapping_text
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.new_session import write_session
@@ -108,6 +108,5 @@ def _try_out(folder: Path, runs: Sequence[ImportedRun]) -> None:
                 for fault in error.problems
             ]
         except TraceError as error:
-            faults.append(Problem(one.file, 0, 0, f"as run {one.name}: {error.what}", error.remedy))
-    if faults:
-        raise InputError(faults)
+            faults.append(Problem.of(one.file, f"as run {one.name}: {error.what}", error.remedy))
+    refuse(faults)

@@ -14,7 +14,6 @@ from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, TitledPolar, cured_polars, polar
-from dbbstation.report.shown import ReportContent, ShownBudget, ShownFindings, ShownModel, ShownSession
 from dbbstation.results.circles import RunWithoutCircle, circles_result, not_stated, why_not
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.report import (
@@ -161,48 +160,48 @@ def certified_of(reported: Reported) -> Certified:
     return certified(shown, reported.job, reported.place, tolerances=bool(reported.settings.tolerances))
 
 
-def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance) -> ReportContent:
+def content_of(reported: Reported, numbers: ReportResult, provenance: Provenance) -> dict[str, object]:
     """Return the template's content other than numbers."""
     found, modelled = reported.found, reported.modelled
     bad = {one.worst.test for one in numbers.tolerances if one.worst is not None and not one.within}
     bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}
-    return ReportContent(
-        machine=found.sessions[0].machine.name,
-        number=hashlib.sha256(provenance.text().encode()).hexdigest()[:NUMBER_DIGITS].upper(),
-        issued=datetime.now().astimezone().date(),
-        virtual=[session.name for session in found.sessions if session.virtual],
-        job=reported.job or found.sessions[0].job,
-        sessions=list(_sessions(reported, bad)),
-        reasons_shown=REASONS_SHOWN,
-        map_width=WIDTH,
-        polar_size=SIZE,
-        polar_radius=CIRCLE,
-        polars=_polars(reported),
-        ranking=reported.ranked,
-        cured=[] if reported.ranked is None else cured_polars(reported.ranked),
-        before_name="" if reported.before is None else reported.before.sessions[0].name,
-        several=len(found.sessions) > 1,
-        findings=_findings(found),
-        not_stated=not_stated(numbers.circles),
-        why_not=why_not(numbers.circles),
-        tolerances_from=reported.settings.tolerances_from,
-        modelled=None
+    return {
+        "machine": found.sessions[0].machine.name,
+        "number": hashlib.sha256(provenance.text().encode()).hexdigest()[:NUMBER_DIGITS].upper(),
+        "issued": datetime.now().astimezone().date(),
+        "virtual": [session.name for session in found.sessions if session.virtual],
+        "job": reported.job or found.sessions[0].job,
+        "sessions": list(_sessions(reported, bad)),
+        "reasons_shown": REASONS_SHOWN,
+        "map_width": WIDTH,
+        "polar_size": SIZE,
+        "polar_radius": CIRCLE,
+        "polars": _polars(reported),
+        "ranking": reported.ranked,
+        "cured": [] if reported.ranked is None else cured_polars(reported.ranked),
+        "before_name": "" if reported.before is None else reported.before.sessions[0].name,
+        "several": len(found.sessions) > 1,
+        "findings": _findings(found),
+        "not_stated": not_stated(numbers.circles),
+        "why_not": why_not(numbers.circles),
+        "tolerances_from": reported.settings.tolerances_from,
+        "modelled": None
         if modelled is None
-        else ShownModel(
-            problem=modelled.problem,
-            failed=lacks_physics(modelled.identified.report),
-            quality=quality_of_fit(modelled.identified),
-            parameters=parameters(modelled.identified, reported.coverage_factor),
-            not_visible=not_visible(modelled.identified),
-        ),
-        notes=[*found.warnings, *_notes_before(reported)],
-        files=list(_files(reported, provenance)),
-        provenance=provenance,
-        laboratory=_said(reported, "report.laboratory"),
-        customer=_said(reported, "report.customer"),
-        logo=reported.logo,
-        budget=_budget(numbers.circles),
-    )
+        else {
+            "problem": modelled.problem,
+            "failed": lacks_physics(modelled.identified.report),
+            "quality": quality_of_fit(modelled.identified),
+            "parameters": parameters(modelled.identified, reported.coverage_factor),
+            "not_visible": not_visible(modelled.identified),
+        },
+        "notes": [*found.warnings, *_notes_before(reported)],
+        "files": list(_files(reported, provenance)),
+        "provenance": provenance,
+        "laboratory": _said(reported, "report.laboratory"),
+        "customer": _said(reported, "report.customer"),
+        "logo": reported.logo,
+        "budget": _budget(numbers.circles),
+    }
 
 
 def _said(reported: Reported, key: str) -> str:
@@ -210,20 +209,20 @@ def _said(reported: Reported, key: str) -> str:
     return "" if setting is None else str(setting.value)
 
 
-def _sessions(reported: Reported, bad: set[str]) -> Iterable[ShownSession]:
+def _sessions(reported: Reported, bad: set[str]) -> Iterable[dict[str, object]]:
     for session in reported.found.sessions:
         circles = [one for one in reported.found.circles if one.session == session.name]
         tests = list(dict.fromkeys(one.entry.test for one in circles))
         if circles:
-            yield ShownSession(
-                name=session.name,
-                measured=when_measured(one.entry for one in circles),
-                identity=identity(session),
-                serial=session.serial_number,
-                conditions=conditions(session, circles, reported.job),
-                places=plate_map({name: session.plan.tests[name] for name in tests}, bad),
-                known=all(session.plan.tests[name].ball.place_known for name in tests),
-            )
+            yield {
+                "name": session.name,
+                "measured": when_measured(one.entry for one in circles),
+                "identity": identity(session),
+                "serial": session.serial_number,
+                "conditions": conditions(session, circles, reported.job),
+                "places": plate_map({name: session.plan.tests[name] for name in tests}, bad),
+                "known": all(session.plan.tests[name].ball.place_known for name in tests),
+            }
 
 
 def _notes_before(reported: Reported) -> list[str]:
@@ -256,7 +255,7 @@ def _polars(reported: Reported) -> list[TitledPolar]:
     ]
 
 
-def _findings(found: Circled) -> ShownFindings:
+def _findings(found: Circled) -> dict[str, object]:
     wrong, undecided, good = [], dict[tuple[str, str], list[str]](), 0
     for one in found.circles:
         for finding in () if one.judgement is None else one.judgement.findings:
@@ -266,10 +265,12 @@ def _findings(found: Circled) -> ShownFindings:
                 good += 1
             else:
                 undecided.setdefault((str(finding.name), finding.text), []).append(one.entry.label)
-    return ShownFindings(wrong, [(name, text, runs) for (name, text), runs in undecided.items()], good)
+    told = [(name, text, runs) for (name, text), runs in undecided.items()]
+    return {"wrong": wrong, "undecided": told, "good": good}
 
 
-def _budget(circles: CirclesResult) -> ShownBudget | None:
+def _budget(circles: CirclesResult) -> dict[str, object] | None:
+    """Return the standard uncertainties of one circle [µm], a row for each cause and a column for each figure."""
     runs = [one for one in circles.runs if not isinstance(one, RunWithoutCircle)]
     if not runs:
         return None
@@ -281,7 +282,7 @@ def _budget(circles: CirclesResult) -> ShownBudget | None:
         if any(cause in budget.terms_um for budget in budgets)
     ]
     rows.append(("u, all together", [budget.u_um for budget in budgets]))
-    return ShownBudget(f"{run.test} {run.direction} {run.repeat}", list(run.uncertainty), rows)
+    return {"run": f"{run.test} {run.direction} {run.repeat}", "figures": list(run.uncertainty), "rows": rows}
 
 
 def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:

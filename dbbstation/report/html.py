@@ -19,11 +19,12 @@ from dbbstation.system.children import BoundExceededError, ProgramBounds, is_roo
 from dbbstation.text.written import with_uncertainty
 
 if TYPE_CHECKING:
-    from dbbstation.report.shown import ReportContent
+    from collections.abc import Mapping
+
     from dbbstation.results.report import ReportResult
 
 
-def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
+def report_html(numbers: ReportResult, content: Mapping[str, object]) -> bytes:
     """Return a reproducible report without external references.
 
     Its one script enlarges polar traces; its policy forbids other scripts.
@@ -31,8 +32,7 @@ def report_html(numbers: ReportResult, content: ReportContent) -> bytes:
     script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()
     digest = b64encode(sha256(script.encode()).digest()).decode()
     page = environment().get_template("report.html")
-    shown = {**vars(numbers), **vars(content)}
-    return page.render(shown, script=script, script_sha256=digest).encode()
+    return page.render({**vars(numbers), **content}, script=script, script_sha256=digest).encode()
 
 
 def environment() -> jinja2.Environment:

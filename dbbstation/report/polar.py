@@ -42,25 +42,14 @@ the figure."""
 _STEPS = (1.0, 2.0, 5.0)
 
 
-@dataclass(frozen=True)
-class PolarTrace:
-    """One drawn run."""
-
-    points: str
-    direction: str
-    former: bool
-    thin: bool
-    name: str
-    title: str
-
-
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class PolarTrace:
     """A path to draw.
 
     Attributes:
         theta_deg: shape (n,).
         deviation_um: from the least-squares circle, shape (n,).
+        points: of the polygon; empty until there is a scale.
     """
 
     theta_deg: Floats
@@ -70,6 +59,7 @@ class Drawn:
     title: str
     former: bool = False
     thin: bool = False
+    points: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,7 +93,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
     paths = [
-        Drawn(
+        PolarTrace(
             analysis.path.theta_deg,
             analysis.residual_um,
             str(one.entry.direction),
@@ -120,21 +110,10 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
     return replace(made, what=f"{made.what}, {count}")
 
 
-def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int = 0) -> Polar:
+def polar_of(test: str, circle: Circle, paths: Sequence[PolarTrace], not_drawn: int = 0) -> Polar:
     """Return the paths of one circle with one scale."""
     most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
-    traces = tuple(
-        PolarTrace(
-            points=_points(one.theta_deg, one.deviation_um, scale),
-            direction=one.direction,
-            former=one.former,
-            thin=one.thin,
-            name=one.name,
-            title=one.title,
-        )
-        for one in paths
-    )
     tilt = ", ".join(f"{axis} {angle:g}°" for axis, angle in zip("ABC", circle.tilt_deg, strict=True) if angle)
     centre = ", ".join(f"{axis} {place:.10g}" for axis, place in zip("XYZ", circle.centre_mm, strict=True))
     step_um = step_of(most_um)
@@ -142,7 +121,7 @@ def polar_of(test: str, circle: Circle, paths: Sequence[Drawn], not_drawn: int =
         test=test,
         what=f"bar {circle.bar_mm:g} mm, {tilt or 'not tilted'}, {circle.feed_mm_min:g} mm/min, about {centre} mm, "
         f"from {circle.start_deg:g}°, {circle.overshoot_deg:g}° more at either end",
-        traces=traces,
+        traces=tuple(replace(one, points=_points(one.theta_deg, one.deviation_um, scale)) for one in paths),
         rings=tuple(Ring(CIRCLE + scale * um, um) for um in (-step_um, 0.0, step_um)),
         step_um=step_um,
         scale=scale,
@@ -225,8 +204,8 @@ def _drawn(one: CuredCircle) -> Polar:
         one.test,
         one.raw.circle,
         [
-            Drawn(*measured, one.direction, "measured", f"as measured: G {one.measured_g_um:.1f} µm", former=True),
-            Drawn(*cured, one.direction, "without it", f"as it would be: G {one.cured_g_um:.1f} µm"),
+            PolarTrace(*measured, one.direction, "measured", f"as measured: G {one.measured_g_um:.1f} µm", former=True),
+            PolarTrace(*cured, one.direction, "without it", f"as it would be: G {one.cured_g_um:.1f} µm"),
         ],
     )
 

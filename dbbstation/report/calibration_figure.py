@@ -14,6 +14,7 @@ from dbbstation.calibration.reporting.residual_map import ball_shifts, circle_te
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, ShownFigure, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.report.polar import step_of
 from dbbstation.results.frame import OnePanel
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def calibration_figure(calibration: Calibration, wanted: Wanted = FigureFormat.S
         if isinstance(wanted, OnePanel):
             tests = circle_tests(calibration)
             reach = max(float(np.abs(circle.before_um).max()) for test in tests for circle in test.circles)
-            panels = {test.name: partial(_circle, test=test, ring=_round(reach / 2.0)) for test in tests}
+            panels = {test.name: partial(_circle, test=test, ring=step_of(reach / 2.0)) for test in tests}
             centres = {"centres": partial(_centres, tests=tests, k=1, title="calibrated")}
             return wanted.draw(centres | {"balls": partial(_balls, balls=ball_shifts(calibration))} | panels)
         return in_format(draw_calibration(calibration), wanted)
@@ -65,7 +66,7 @@ def draw_calibration(calibration: Calibration) -> ShownFigure:
 
 def _circles(part: SubFigure, tests: Sequence[CircleTest], rows: int) -> None:
     reach = max(float(np.abs(circle.before_um).max()) for test in tests for circle in test.circles)
-    ring = _round(reach / 2.0)
+    ring = step_of(reach / 2.0)
     part.suptitle(
         f"measured less predicted length about the commanded circle, one ring {ring:g} µm",
         fontsize=9,
@@ -145,7 +146,7 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
     axes.set_xlabel("X, mm")
     axes.set_ylabel("Y, mm")
     axes.set_title(f"centres off the balls, {title}")
-    key = _round(longest)
+    key = step_of(longest)
     start = np.array([middle[0] - half + 8.0, middle[1] - half + 10.0])
     axes.quiver(*start, key, 0.0, color="black", width=0.006, **scale)
     axes.text(start[0], start[1] + 5.0, f"{key:g} µm", fontsize=8, va="bottom")
@@ -176,8 +177,3 @@ def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
     axes.set_xlabel("X, µm")
     axes.set_ylabel("Y, µm")
     axes.legend(loc="upper right", handlelength=1.0, borderpad=0.1)
-
-
-def _round(value: float) -> float:
-    decade = 10.0 ** np.floor(np.log10(value))
-    return float(max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)) * decade)

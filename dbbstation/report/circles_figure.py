@@ -14,7 +14,7 @@ from dbbstation import __version__
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, in_style
-from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
+from dbbstation.report.figure_format import Wanted, in_format
 from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_map, draw_polar, draw_spectrum, draw_together
 from dbbstation.report.polar import chosen
 from dbbstation.report.sheet import MARGIN_IN, Box, Cell, Key, Sheet
@@ -108,12 +108,13 @@ class Plotted:
         return [one for panel in self.panels() for one, _ in panel.drawn]
 
 
-def circles_figure(plotted: Plotted, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
+def circles_figure(kind: str, found: Circled, chosen: Filter, wanted: Wanted) -> Any:  # noqa: ANN401 - as `in_format`
     """Return a reproducible sheet; one panel is a run's deviation over the angle.
 
     Raises:
         StationError: as `Plotted.panels`.
     """
+    plotted = Plotted(PlotKind(kind), found, chosen)
     with in_style(), warnings.catch_warnings():
         # A name in letters that no font here has becomes boxes in PNG and PDF; in SVG the viewer's fonts have them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")

@@ -13,7 +13,7 @@ from dbbstation.machine.difference import differences, in_words
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
-from dbbstation.report.polar import CIRCLE, SIZE, TitledPolar, cured_polars, polar
+from dbbstation.report.polar import CIRCLE, SIZE, Polar, cured_polars, polar
 from dbbstation.results.circles import RunWithoutCircle, circles_result, not_stated, why_not
 from dbbstation.results.model_warnings import lacks_physics, model_warnings
 from dbbstation.results.report import (
@@ -234,22 +234,19 @@ def _notes_before(reported: Reported) -> list[str]:
     return [*([note] if unlike else []), *reported.before.warnings]
 
 
-def _polars(reported: Reported) -> list[TitledPolar]:
+def _polars(reported: Reported) -> list[Polar]:
     before = () if reported.before is None else reported.before.circles
     tests = dict.fromkeys((one.session, one.entry.test) for one in reported.found.circles if one.analysis is not None)
     several = len(reported.found.sessions) > 1
     return [
-        TitledPolar(
+        polar(
             f"{session}: test {test}" if several else f"test {test}",
-            polar(
-                test,
-                [
-                    c
-                    for c in reported.found.circles
-                    if (c.session, c.entry.test) == (session, test) and c.analysis is not None
-                ],
-                [c for c in before if c.entry.test == test and c.analysis is not None],
-            ),
+            [
+                c
+                for c in reported.found.circles
+                if (c.session, c.entry.test) == (session, test) and c.analysis is not None
+            ],
+            [c for c in before if c.entry.test == test and c.analysis is not None],
         )
         for session, test in tests
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.report.history_words import DASH
@@ -20,23 +19,6 @@ WIDTH, HEIGHT = 220, 22
 
 REACH = 6.0
 """Greatest score that a strip shows; larger scores are drawn at its end."""
-
-
-@dataclass(frozen=True)
-class MachineRow:
-    """A machine on the page.
-
-    Attributes:
-        session: the last finished session, or a failed one.
-    """
-
-    name: str
-    session: FleetSession
-    others: int
-    unlike: tuple[Scored, ...]
-    marks: str
-    marked: str
-    words: str
 
 
 def fleet_html(result: FleetResult, provenance: Provenance) -> bytes:
@@ -91,7 +73,8 @@ def _expected(result: FleetResult) -> str:
     )
 
 
-def _row(name: str, sessions: Sequence[FleetSession], result: FleetResult) -> MachineRow:
+def _row(name: str, sessions: Sequence[FleetSession], result: FleetResult) -> dict[str, object]:
+    # The last finished session, or a failed one.
     shown = next((one for one in sessions if one.compared), sessions[-1])
     scored = (
         []
@@ -102,15 +85,15 @@ def _row(name: str, sessions: Sequence[FleetSession], result: FleetResult) -> Ma
     words = f"{len(scored)} scores of {name}"
     if scored:
         words += f" from {min(one.score or 0.0 for one in scored):.1f} to {max(one.score or 0.0 for one in scored):.1f}"
-    return MachineRow(
-        name=name,
-        session=shown,
-        others=len(sessions) - 1,
-        unlike=unlike,
-        marks=_strokes([one.score or 0.0 for one in scored if not one.unlike]),
-        marked=_strokes([one.score or 0.0 for one in scored if one.unlike]),
-        words=words,
-    )
+    return {
+        "name": name,
+        "session": shown,
+        "others": len(sessions) - 1,
+        "unlike": unlike,
+        "marks": _strokes([one.score or 0.0 for one in scored if not one.unlike]),
+        "marked": _strokes([one.score or 0.0 for one in scored if one.unlike]),
+        "words": words,
+    }
 
 
 def _strokes(scores: Sequence[float]) -> str:

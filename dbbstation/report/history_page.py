@@ -49,22 +49,6 @@ class TrendMark:
     y: float = 0.0
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """One quantity over time for SVG."""
-
-    name: str
-    ident: str
-    points: str
-    bars: str
-    levels: str
-    limits: tuple[float, ...]
-    dates: tuple[TrendMark, ...]
-    heights: tuple[TrendMark, ...]
-    events: tuple[TrendMark, ...]
-    words: str
-
-
 def history_html(history: HistoryResult, provenance: Provenance, tolerances_from: str = "") -> bytes:
     """Return reproducible HTML without script and external references."""
     k = history.coverage_factor
@@ -93,8 +77,8 @@ def history_html(history: HistoryResult, provenance: Provenance, tolerances_from
     return environment().get_template("history.html").render(content).encode()
 
 
-def draw(one: QuantityHistory, ident: str, coverage_factor: float) -> Drawing:
-    """Return the drawing of one quantity."""
+def draw(one: QuantityHistory, ident: str, coverage_factor: float) -> dict[str, object]:
+    """Return one quantity over time for SVG."""
     values = one.values
     days = [datetime.fromisoformat(value.started or "").timestamp() / _DAY_S for value in values]
     x = _scale(min(days), max(days), LEFT + 6.0, WIDTH - RIGHT - 6.0)
@@ -104,21 +88,23 @@ def draw(one: QuantityHistory, ident: str, coverage_factor: float) -> Drawing:
     places = list(at.values())
     spread = [coverage_factor * (value.u or 0.0) for value in values]
     limit = one.limit
-    return Drawing(
-        name=one.quantity,
-        ident=ident,
-        points=" ".join(f"M{px:.1f} {py:.1f}h0" for px, py in places),
-        bars=" ".join(
+    return {
+        "name": one.quantity,
+        "ident": ident,
+        "points": " ".join(f"M{px:.1f} {py:.1f}h0" for px, py in places),
+        "bars": " ".join(
             f"M{px:.1f} {y(v.value - s):.1f}V{y(v.value + s):.1f}"
             for (px, _), v, s in zip(places, values, spread, strict=True)
         ),
-        levels=" ".join(_levels(values, at, y)),
-        limits=tuple(round(y(side), 1) for side in (() if limit is None else (limit, -limit)) if low <= side <= high),
-        dates=tuple(_dates(values, days, x)),
-        heights=tuple(_heights(low, high, y)),
-        events=tuple(_event(event, at[event.found], one.unit, coverage_factor) for event in one.events),
-        words=f"{one.quantity} over {len(values)} sessions: {one.verdict}",
-    )
+        "levels": " ".join(_levels(values, at, y)),
+        "limits": tuple(
+            round(y(side), 1) for side in (() if limit is None else (limit, -limit)) if low <= side <= high
+        ),
+        "dates": tuple(_dates(values, days, x)),
+        "heights": tuple(_heights(low, high, y)),
+        "events": tuple(_event(event, at[event.found], one.unit, coverage_factor) for event in one.events),
+        "words": f"{one.quantity} over {len(values)} sessions: {one.verdict}",
+    }
 
 
 def _scale(low: float, high: float, start: float, end: float) -> Callable[[float], float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,18 +18,7 @@ _SAME_MM = 1.0
 """Largest distance of balls at one position, such as holders of several heights in one bore."""
 
 
-@dataclass(frozen=True)
-class MapPlace:
-    """Balls at one place."""
-
-    x: float
-    y: float
-    label: str
-    tests: str
-    marked: bool
-
-
-def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[MapPlace, ...]:
+def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[Mapping[str, object], ...]:
     """Return places of tests; +X is right, +Y up."""
     at: dict[tuple[int, int], list[PlannedTest]] = {}
     for test in tests.values():
@@ -41,13 +29,13 @@ def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tupl
     scale = (WIDTH - 2.0 * _MARGIN) / width_mm
     middle = _SAME_MM * (max(xs) + min(xs)) / 2.0, _SAME_MM * (max(ys) + min(ys)) / 2.0
     return tuple(
-        MapPlace(
-            x=round(WIDTH / 2.0 + scale * (_SAME_MM * x - middle[0]), 1),
-            y=round(WIDTH / 2.0 - scale * (_SAME_MM * y - middle[1]), 1),
-            label=_label(there),
-            tests=" ".join(test.name for test in there),
-            marked=any(test.name in marked for test in there),
-        )
+        {
+            "x": round(WIDTH / 2.0 + scale * (_SAME_MM * x - middle[0]), 1),
+            "y": round(WIDTH / 2.0 - scale * (_SAME_MM * y - middle[1]), 1),
+            "label": _label(there),
+            "tests": " ".join(test.name for test in there),
+            "marked": any(test.name in marked for test in there),
+        }
         for (x, y), there in at.items()
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -69,17 +69,12 @@ class Ring:
     radius: float
     um: float
 
-    @property
-    def label(self) -> str:
-        """Return the signed deviation."""
-        return f"{self.um:+g}" if self.um else "0"
-
 
 @dataclass(frozen=True)
 class Polar:
     """The circles of one test."""
 
-    test: str
+    title: str
     what: str
     traces: tuple[PolarTrace, ...]
     rings: tuple[Ring, ...]
@@ -88,7 +83,7 @@ class Polar:
     not_drawn: int
 
 
-def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
+def polar(title: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
     """Return a test's circles about their centres, before and now with one scale."""
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
@@ -104,13 +99,13 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
         )
         for one, analysis, former, thin in analysed
     ]
-    made = polar_of(test, analysed[-1][1].raw.circle, paths, len(now) + len(before) - len(drawn))
+    made = polar_of(title, analysed[-1][1].raw.circle, paths, len(now) + len(before) - len(drawn))
     points = sorted(len(one.theta_deg) for one in paths)
     count = f"{points[0]} points" if points[0] == points[-1] else f"{points[0]} to {points[-1]} points"
     return replace(made, what=f"{made.what}, {count}")
 
 
-def polar_of(test: str, circle: Circle, paths: Sequence[PolarTrace], not_drawn: int = 0) -> Polar:
+def polar_of(title: str, circle: Circle, paths: Sequence[PolarTrace], not_drawn: int = 0) -> Polar:
     """Return the paths of one circle with one scale."""
     most_um = max(float(np.abs(one.deviation_um).max()) for one in paths)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
@@ -118,7 +113,7 @@ def polar_of(test: str, circle: Circle, paths: Sequence[PolarTrace], not_drawn: 
     centre = ", ".join(f"{axis} {place:.10g}" for axis, place in zip("XYZ", circle.centre_mm, strict=True))
     step_um = step_of(most_um)
     return Polar(
-        test=test,
+        title=title,
         what=f"bar {circle.bar_mm:g} mm, {tilt or 'not tilted'}, {circle.feed_mm_min:g} mm/min, about {centre} mm, "
         f"from {circle.start_deg:g}°, {circle.overshoot_deg:g}° more at either end",
         traces=tuple(replace(one, points=_points(one.theta_deg, one.deviation_um, scale)) for one in paths),
@@ -173,14 +168,7 @@ MOST_CURED = 6
 """Number of tests whose circles are drawn without the first cause: the tests on which it acts most."""
 
 
-class TitledPolar(NamedTuple):
-    """A polar trace with its title."""
-
-    title: str
-    drawing: Polar
-
-
-def cured_polars(ranked: Ranked) -> list[TitledPolar]:
+def cured_polars(ranked: Ranked) -> list[Polar]:
     """Return circles as measured and without the first cause."""
     if not ranked.effects:
         return []
@@ -189,19 +177,13 @@ def cured_polars(ranked: Ranked) -> list[TitledPolar]:
     for circle in sorted(first.runs, key=lambda one: -one.g_um):
         of.setdefault(circle.test, circle)
     chosen = sorted(list(of.values())[:MOST_CURED], key=lambda one: one.test)
-    return [
-        TitledPolar(
-            f"test {one.test} {one.direction.upper()}: G {one.measured_g_um:.1f}, without it {one.cured_g_um:.1f} µm",
-            _drawn(one),
-        )
-        for one in chosen
-    ]
+    return [_drawn(one) for one in chosen]
 
 
 def _drawn(one: CuredCircle) -> Polar:
     measured, cured = _path(one, one.raw.length_mm), _path(one, one.raw.length_mm - one.effect_mm)
     return polar_of(
-        one.test,
+        f"test {one.test} {one.direction.upper()}: G {one.measured_g_um:.1f}, without it {one.cured_g_um:.1f} µm",
         one.raw.circle,
         [
             PolarTrace(*measured, one.direction, "measured", f"as measured: G {one.measured_g_um:.1f} µm", former=True),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option, task
+from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -131,16 +131,9 @@ def calibrate(
         covariance=covariance_of(model),
         model=model,
         recorded=recorded,
-        drawing=partial(_drawn, calibration),
+        drawing=drawing("calibration_figure", calibration),
         notes=tuple(telling.notes),
     )
-
-
-def _drawn(calibration: Calibration, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.calibration_figure import calibration_figure
-    from dbbstation.report.figure_format import figure_format
-
-    return calibration_figure(calibration, figure_format(wanted))
 
 
 def _prescribed(names: Sequence[str] | None, method: Method) -> list[Name] | None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option, task
+from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from dbbstation.circles.path import Filter
-    from dbbstation.results.circles import Circled, CircleFiguresResult, CirclesResult
+    from dbbstation.results.circles import CircleFiguresResult, CirclesResult
     from dbbstation.tasks.telling import Progress
 
 
@@ -92,14 +91,9 @@ def circles(
         progress=telling.counted("circles"),
     )
     telling.note(*found.warnings)
-    return replace(circles_result(found, chosen, quick_look=quick_look), drawing=partial(_drawn, found, chosen, kind))
-
-
-def _drawn(found: Circled, chosen: Filter, kind: str, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.circles_figure import PlotKind, Plotted, circles_figure
-    from dbbstation.report.figure_format import figure_format
-
-    return circles_figure(Plotted(PlotKind(kind), found, chosen), figure_format(wanted))
+    return replace(
+        circles_result(found, chosen, quick_look=quick_look), drawing=drawing("circles_figure", kind, found, chosen)
+    )
 
 
 @task("circle")

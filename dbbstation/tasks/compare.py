@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.errors import InputError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.diagnosis.compare.comparison import Comparison
     from dbbstation.results.comparison import ComparisonResult
     from dbbstation.tasks.telling import Progress
 
@@ -80,13 +79,6 @@ def compare(
         notes_of(one.machine, other.machine, found.matching.pairs),
         a=os.fspath(a),
         b=os.fspath(b),
-        drawing=partial(_drawn, found),
+        drawing=drawing("compare_figure", found),
         notes=tuple(telling.notes),
     )
-
-
-def _drawn(found: Comparison, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.compare_figure import compare_figure
-    from dbbstation.report.figure_format import figure_format
-
-    return compare_figure(found, figure_format(wanted))

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Files, Names, Option, task
+from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from dbbstation.diagnosis.drive.findings import DriveFindings
     from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.drive import DriveResult
     from dbbstation.tasks.telling import Progress
@@ -99,13 +98,6 @@ def identify(
     telling.note(*(str(warning) for file in files for warning in file.warnings))
     raw = [file.recording(force_per_ampere) for file in files]
     found = identified_drive(raw, named, cutoff_hz, telling.stage, hold_out=held_out)
-    result = drive_result(found, partial(_drawn, found))
+    result = drive_result(found, drawing("drive_figure", found))
     telling.note(*result.noticed)
     return result
-
-
-def _drawn(found: DriveFindings, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.drive_figure import drive_figure
-    from dbbstation.report.figure_format import figure_format
-
-    return drive_figure(found, figure_format(wanted))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Files, Names, Option, task
+from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ def mismatch(
         correction = applied(found, others.table, sources)
         telling.note(*others.notes, *_limits_of(correction))
         table = _with_correction(others, correction.values, correction.uncertainty)
-    return mismatch_result(found, table=table, drawing=partial(_drawn, found), notes=tuple(telling.notes))
+    return mismatch_result(found, table=table, drawing=drawing("mismatch_figure", found), notes=tuple(telling.notes))
 
 
 def _limits_of(correction: AppliedCorrection) -> Iterator[str]:
@@ -276,10 +276,3 @@ def _with_correction(
 
 def _unused(name: str, taken: Mapping[str, object]) -> str:
     return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if one not in taken)
-
-
-def _drawn(found: Mismatch, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.figure_format import figure_format
-    from dbbstation.report.mismatch_figure import mismatch_figure
-
-    return mismatch_figure(found, figure_format(wanted))

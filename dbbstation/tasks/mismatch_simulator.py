@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.diagnosis.simulator.answer import find
@@ -13,6 +12,7 @@ from dbbstation.results.simulator import SimulationsRun, simulator_result
 from dbbstation.simulators.code import missing_code
 from dbbstation.simulators.loading import load_simulator
 from dbbstation.simulators.running import MOST_SECONDS, Runs
+from dbbstation.tasks.drawing import drawing
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison
@@ -54,15 +54,8 @@ def with_simulator(
         simulator_result(answer, SimulationsRun(runs.ran, runs.most, one_s, runs.found)),
         code=missing_code(answer),
         rows_csv=_corrected(answer),
-        drawing=partial(_drawn, answer),
+        drawing=drawing("simulator_figure", answer),
     )
-
-
-def _drawn(answer: SimulatorComparison, wanted: object) -> Any:  # noqa: ANN401 - as asked for
-    from dbbstation.report.figure_format import figure_format
-    from dbbstation.report.simulator_figure import simulator_figure
-
-    return simulator_figure(answer, figure_format(wanted))
 
 
 def _corrected(answer: SimulatorComparison) -> str:

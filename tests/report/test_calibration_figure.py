@@ -12,7 +12,7 @@ from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.report.calibration_figure import _round, calibration_figure
+from dbbstation.report.calibration_figure import calibration_figure
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 
@@ -39,8 +39,3 @@ def test_every_part_is_drawn_and_drawn_alike(fit):
     paths = re.findall(rb' d="([^"]*)"', drawn)
     assert len(paths) > 1000
     assert all(re.fullmatch(rb"\s*(?:[MLQClz]\s*|-?\d*(?:\.\d{1,2})?(?:e-\d+)?\s*)*", path) for path in paths)
-
-
-@pytest.mark.parametrize(("value", "expected"), [(0.37, 0.2), (1.0, 1.0), (4.99, 2.0), (5.0, 5.0), (730.0, 500.0)])
-def test_keys_are_round(value, expected):
-    assert _round(value) == pytest.approx(expected)

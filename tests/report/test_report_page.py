@@ -60,7 +60,9 @@ def test_no_direction_is_told_by_colour_alone():
     assert re.search(r"\.cw \{[^}]*stroke-dasharray", STYLE)
 
 
-@pytest.mark.parametrize(("most", "step"), [(0.5, 0.5), (1.0, 1.0), (1.9, 1.0), (4.9, 2.0), (5.0, 5.0), (73.0, 50.0)])
+@pytest.mark.parametrize(
+    ("most", "step"), [(0.37, 0.2), (0.5, 0.5), (1.0, 1.0), (1.9, 1.0), (4.99, 2.0), (5.0, 5.0), (73.0, 50.0)]
+)
 def test_divisions_are_round(most, step):
     assert step_of(most) == pytest.approx(step)
 

@@ -10,9 +10,7 @@ import numpy as np
 from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import residual_map
-from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.shapes import EVERY, PULL, SIGNED, TOWARDS
-from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, ShownFigure, draw_maps, in_style
@@ -96,9 +94,10 @@ MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def diagnosis_figure(diagnosis: Diagnosis, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`
+def diagnosis_figure(
+    diagnosis: Diagnosis, gains: Sequence[GainOfTest], curves: Sequence[SourceCurves], wanted: Wanted = FigureFormat.SVG
+) -> Any:  # noqa: ANN401 - as `in_format`
     """Draw maps, errors over their variables, traces and gains, as SVG."""
-    gains = gains_by_test(diagnosis)
     with in_style():
         if isinstance(wanted, OnePanel):
             found = diagnosis.after is not diagnosis.before
@@ -110,7 +109,7 @@ def diagnosis_figure(diagnosis: Diagnosis, wanted: Wanted = FigureFormat.SVG) ->
                     "levels": partial(_levels, classes=_tested(diagnosis)),
                 }
             )
-        return in_format(draw_diagnosis(diagnosis, gains, source_curves(diagnosis)), wanted)
+        return in_format(draw_diagnosis(diagnosis, gains, curves), wanted)
 
 
 def draw_diagnosis(diagnosis: Diagnosis, gains: Sequence[GainOfTest], curves: Sequence[SourceCurves]) -> ShownFigure:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import CalibrationError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, task
-from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -114,7 +113,7 @@ def diagnose(
         figures,
         effects=tuple(replace(one, verdict=verdicts.get(one.cause, "")) for one in effects),
         model=model,
-        drawing=drawing("diagnosis_figure", found),
+        drawing=partial(_drawn, found),
         notes=tuple(telling.notes),
     )
     return replace(result, recorded=diagnosed.recorded)
@@ -131,3 +130,12 @@ def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
         return keep_unexplained(curve, found.after)
     except CalibrationError:
         return None
+
+
+def _drawn(diagnosis: Diagnosis, wanted: object) -> Any:  # noqa: ANN401 - as asked for
+    from dbbstation.diagnosis.per_test import gains_by_test
+    from dbbstation.diagnosis.source_curves import source_curves
+    from dbbstation.report.diagnosis_figure import diagnosis_figure
+    from dbbstation.report.figure_format import figure_format
+
+    return diagnosis_figure(diagnosis, gains_by_test(diagnosis), source_curves(diagnosis), figure_format(wanted))

@@ -14,6 +14,8 @@ import tempfile
 from pathlib import Path
 
 from dbbstation.calibration.fit.calibrate import calibrate
+from dbbstation.diagnosis.per_test import gains_by_test
+from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.report.calibration_figure import calibration_figure
 from dbbstation.report.diagnosis_figure import diagnosis_figure
 from dbbstation.tasks.load import load_sessions
@@ -40,7 +42,7 @@ def main() -> None:
         fit = calibrate(recorded.machine, recorded.observations)
         (IMAGES / "calibration.svg").write_bytes(calibration_figure(fit))
         found = diagnose_sessions([elastic], CANDIDATES, (), print).diagnosis
-        (IMAGES / "diagnosis.svg").write_bytes(diagnosis_figure(found))
+        (IMAGES / "diagnosis.svg").write_bytes(diagnosis_figure(found, gains_by_test(found), source_curves(found)))
 
 
 if __name__ == "__main__":

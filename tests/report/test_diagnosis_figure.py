@@ -11,7 +11,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint, Unexplained
+from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.shapes import READING, Follows
+from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.inference.levels import Followed, FollowsAnswer
 from dbbstation.report.diagnosis_figure import diagnosis_figure, draw_unexplained
 from dbbstation.results.frame import OnePanel
@@ -24,6 +26,10 @@ def texts(drawn):
     return ["".join(t.itertext()).strip() for t in ET.fromstring(drawn).iter(f"{SVG}text")]  # noqa: S314 - our own
 
 
+def drawing(found, *wanted):
+    return diagnosis_figure(found, gains_by_test(found), source_curves(found), *wanted)
+
+
 @pytest.fixture(scope="module")
 def found(reference):
     return joint_fit(reference, ("backlash", "bar-drift"))
@@ -31,7 +37,7 @@ def found(reference):
 
 @pytest.fixture(scope="module")
 def drawn(found):
-    return diagnosis_figure(found)
+    return drawing(found)
 
 
 def test_all_parts_of_what_was_found(drawn):
@@ -57,22 +63,22 @@ def test_what_it_follows_where_and_what_tests_left_out_gain(found):
     )
     happened = Followed((("time",),), (), FollowsAnswer.HAPPENED, 1.0, {}, 1.0, ("bar-drift",))
     one = replace(found, levels=replace(found.levels, follows=(tested, happened)))
-    said = texts(diagnosis_figure(one))
+    said = texts(drawing(one))
     assert {"what the difference follows, and where", "strut-speed-sign, strut 3"} <= set(said)
     axes = Figure().subplots()
-    diagnosis_figure(one, OnePanel(axes, "levels"))
+    drawing(one, OnePanel(axes, "levels"))
     assert [bar.get_width() for bar in axes.patches] == [4.0, 1.5]
 
 
 def test_same_diagnosis_same_bytes(found, drawn):
-    assert diagnosis_figure(found) == drawn
+    assert drawing(found) == drawn
 
 
 def test_an_error_without_a_name(reference):
     rest = Unexplained(
         1.0, 3, Follows("strut-length", "wave"), 30.0, "An error without a known name, organised by a wave, strut 3."
     )
-    said = texts(diagnosis_figure(joint_fit(reference, ("backlash",), unexplained=rest)))
+    said = texts(drawing(joint_fit(reference, ("backlash",), unexplained=rest)))
     assert rest.text in said
     assert "without a name: strut-length error over strut length" in said
     assert not any("causes found" in text for text in said)
@@ -95,7 +101,7 @@ def test_its_curve_has_a_panel_of_its_own(reference):
         Follows("strut-length", "wave"), "mm", [600.0, 610.0, 620.0], [1.0, 0.0, -1.0], [0.1, 0.1, 0.1], 3, 40.0
     )
     rest = Unexplained(1.0, 3, Follows("strut-length", "wave"), 30.0, "organised by a wave", wave)
-    said = texts(diagnosis_figure(joint_fit(reference, ("backlash",), unexplained=rest)))
+    said = texts(drawing(joint_fit(reference, ("backlash",), unexplained=rest)))
     assert said.count("without a name: a wave of 40.00 mm: error of strut 3, cause unknown") == 1
     assert "µm, ±2u" in said
 
@@ -150,6 +156,6 @@ def test_what_is_of_the_reading_is_no_struts():
 
 
 def test_nothing_to_find(reference):
-    said = texts(diagnosis_figure(joint_fit(reference, ())))
+    said = texts(drawing(joint_fit(reference, ())))
     assert "The recordings agree with the kinematic model" in said
     assert not any("error over" in text for text in said)

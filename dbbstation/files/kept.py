@@ -70,35 +70,93 @@ class _Row:
     text: str
 
 
-class Kept:
-    """Stored results of one folder's files, each written at once; a context manager.
-
-    Args:
-        begin_anew: discard all but noted anchors.
+class CacheFile:
+    """An SQLite file in the user's cache folder; a damaged one is begun anew. A context manager.
 
     Attributes:
         problem: why nothing can be kept; empty if possible.
     """
 
-    def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
+    nothing = "nothing is kept for the next time"
+
+    def __init__(self, file: Path, problem: str) -> None:
         self.problem = ""
-        self._rows: dict[str, _Row] = {}
-        self._noted: dict[str, NotedAnchor] = {}
-        self._by_hash: dict[str, str] = {}
-        self._file = index_file(folder)
+        self._file = file
         self._base: sqlite3.Connection | None = None
-        why = _unfit(self._file, folder)
-        if why:
-            self._give_up(why)
-            return
-        self._open(begin_anew=begin_anew)
+        if problem:
+            self._give_up(problem)
+        else:
+            self._open()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the index."""
-        self._close()
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; everything is already written."""
+        if self._base is not None:
+            self._base.close()
+            self._base = None
+
+    def _begin(self, base: sqlite3.Connection) -> None:
+        """Prepare and read an opened file."""
+        raise NotImplementedError
+
+    def _open(self) -> None:
+        for attempt in range(2):
+            try:
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                self._base = sqlite3.connect(self._file, timeout=_PATIENCE_S, isolation_level=None)
+                self._begin(self._base)
+            except (sqlite3.OperationalError, OSError) as error:  # locked, no room, no permission: not for us to remove
+                self._give_up(str(error))
+            except (sqlite3.DatabaseError, TypeError, ValueError) as error:
+                _LOG.info("the file %s is damaged and is begun anew: %s", self._file, error)
+                self.close()
+                self._forget()
+                if attempt:
+                    self._give_up(str(error))
+            if self._base is not None or self.problem:
+                return
+
+    def _forget(self) -> None:
+        for path in (self._file, self._file.with_name(self._file.name + "-journal")):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+    def _write(self, command: str, rows: Sequence[tuple[object, ...]]) -> None:
+        if self._base is None or not rows:
+            return
+        try:
+            self._base.execute("BEGIN IMMEDIATE")
+            self._base.executemany(command, rows)
+            self._base.execute("COMMIT")
+        except sqlite3.Error as error:
+            self._give_up(str(error))
+
+    def _give_up(self, why: str) -> None:
+        self.close()
+        self.problem = f"{self.nothing} ({self._file}): {why}"
+        _LOG.info("%s", self.problem)
+
+
+class Kept(CacheFile):
+    """Stored results of one folder's files, each written at once.
+
+    Args:
+        begin_anew: discard all but noted anchors.
+    """
+
+    def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
+        self._rows: dict[str, _Row] = {}
+        self._noted: dict[str, NotedAnchor] = {}
+        self._by_hash: dict[str, str] = {}
+        self._begin_anew = begin_anew
+        file = index_file(folder)
+        super().__init__(file, _unfit(file, folder))
 
     def of(self, name: str, stamp: Stamp) -> str | None:
         """Return the stored result of an unchanged file, or None."""
@@ -132,80 +190,28 @@ class Kept:
         self._noted[name] = noted
         self._write("INSERT OR REPLACE INTO noted VALUES (?, ?, ?)", [(name, noted.anchor, noted.at)])
 
-    def _write(self, command: str, rows: Sequence[tuple[object, ...]]) -> None:
-        if self._base is None or not rows:
-            return
-        try:
-            self._base.executemany(command, rows)
-        except sqlite3.Error as error:
-            self._give_up(str(error))
-
-    def _open(self, *, begin_anew: bool) -> None:
-        for attempt in range(2):
-            try:
-                self._file.parent.mkdir(parents=True, exist_ok=True)
-                self._base = self._ready(begin_anew=begin_anew)
-                self._read()
-            except sqlite3.OperationalError as error:  # locked, no room, no permission: not for us to remove
-                self._give_up(str(error))
-            except (sqlite3.DatabaseError, TypeError, ValueError) as error:
-                _LOG.info("the index %s is damaged and is begun anew: %s", self._file, error)
-                self._close()
-                self._forget()
-                if attempt:
-                    self._give_up(str(error))
-            except OSError as error:
-                self._give_up(str(error))
-            if self._base is not None or self.problem:
-                return
-
-    def _ready(self, *, begin_anew: bool) -> sqlite3.Connection:
-        base = sqlite3.connect(self._file, timeout=_PATIENCE_S, isolation_level=None)
-        try:
-            base.execute("PRAGMA journal_mode = DELETE")
-            base.execute("BEGIN IMMEDIATE")
-            base.execute("CREATE TABLE IF NOT EXISTS version (text TEXT)")
-            program = key_of({"task": "index"})
-            known = [text for (text,) in base.execute("SELECT text FROM version")]
-            if known != [program] or begin_anew:
-                base.execute("DROP TABLE IF EXISTS kept")
-                base.execute("DELETE FROM version")
-                base.execute("INSERT INTO version VALUES (?)", (program,))
-            base.execute(
-                "CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, modified_ns INTEGER, size INTEGER, sha256 TEXT, text TEXT)"
-            )
-            base.execute("CREATE TABLE IF NOT EXISTS noted (name TEXT PRIMARY KEY, anchor TEXT, at TEXT)")
-            base.execute("COMMIT")
-        except sqlite3.Error:
-            base.close()
-            raise
-        return base
-
-    def _read(self) -> None:
-        if self._base is None:
-            return
-        rows = self._base.execute("SELECT name, modified_ns, size, sha256, text FROM kept").fetchall()
+    def _begin(self, base: sqlite3.Connection) -> None:
+        base.execute("PRAGMA journal_mode = DELETE")
+        base.execute("BEGIN IMMEDIATE")
+        base.execute("CREATE TABLE IF NOT EXISTS version (text TEXT)")
+        program = key_of({"task": "index"})
+        known = [text for (text,) in base.execute("SELECT text FROM version")]
+        if known != [program] or self._begin_anew:
+            base.execute("DROP TABLE IF EXISTS kept")
+            base.execute("DELETE FROM version")
+            base.execute("INSERT INTO version VALUES (?)", (program,))
+        base.execute(
+            "CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, modified_ns INTEGER, size INTEGER, sha256 TEXT, text TEXT)"
+        )
+        base.execute("CREATE TABLE IF NOT EXISTS noted (name TEXT PRIMARY KEY, anchor TEXT, at TEXT)")
+        base.execute("COMMIT")
+        rows = base.execute("SELECT name, modified_ns, size, sha256, text FROM kept").fetchall()
         self._rows = {
             str(n): _Row(Stamp(int(at), int(size)), str(digest), str(text)) for n, at, size, digest, text in rows
         }
         self._by_hash = {row.sha256: row.text for row in self._rows.values()}
-        noted = self._base.execute("SELECT name, anchor, at FROM noted").fetchall()
+        noted = base.execute("SELECT name, anchor, at FROM noted").fetchall()
         self._noted = {str(name): NotedAnchor(str(anchor), str(at)) for name, anchor, at in noted}
-
-    def _forget(self) -> None:
-        for path in (self._file, self._file.with_name(self._file.name + "-journal")):
-            with contextlib.suppress(OSError):
-                path.unlink()
-
-    def _close(self) -> None:
-        if self._base is not None:
-            self._base.close()
-            self._base = None
-
-    def _give_up(self, why: str) -> None:
-        self._close()
-        self.problem = f"nothing is kept for the next time ({self._file}): {why}"
-        _LOG.info("%s", self.problem)
 
 
 def index_file(folder: Path) -> Path:

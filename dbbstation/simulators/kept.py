@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import logging
 import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,41 +11,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.model import SimulationOutcome
-from dbbstation.files.kept import folder_problem
+from dbbstation.files.kept import CacheFile, folder_problem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from dbbstation.diagnosis.simulator.model import Model, SimulationRequest
 
-_LOG = logging.getLogger(__name__)
-
 MOST_BYTES = 1_000_000_000
 """Greatest size of the cache [bytes]; simulations whose last use is longest ago are deleted first."""
 
-_PATIENCE_S = 5.0
-"""Longest wait for another process that writes [s]."""
 
+class KeptSimulations(CacheFile):
+    """The stored simulations of one simulator and its recordings."""
 
-class KeptSimulations:
-    """The stored simulations of one simulator and its recordings; a context manager.
-
-    Attributes:
-        problem: why nothing can be kept; may be empty.
-    """
+    nothing = "no simulations are kept"
 
     def __init__(self, content: str, model: Model) -> None:
-        self._file = simulations_folder() / f"{_of_all(content, model)[:32]}.sqlite"
-        self._base: sqlite3.Connection | None = None
-        self.problem = folder_problem(self._file)
-        if not self.problem:
-            self._open()
-
-    def close(self) -> None:
-        """Close the file; all simulations are already written."""
-        if self._base is not None:
-            self._base.close()
-            self._base = None
+        file = simulations_folder() / f"{_of_all(content, model)[:32]}.sqlite"
+        _make_room(file)
+        super().__init__(file, folder_problem(file))
 
     def known(
         self, asks: Iterable[SimulationRequest], shape: Mapping[int, tuple[int, int]]
@@ -69,40 +53,11 @@ class KeptSimulations:
     def keep(self, pairs: Sequence[tuple[SimulationRequest, SimulationOutcome]]) -> None:
         """Keep simulations without signals, which are too large."""
         rows = [(_key(ask), found.outputs.astype("<f8").tobytes()) for ask, found in pairs if _kept_at_all(ask)]
-        if self._base is None or not rows:
-            return
-        try:
-            with self._base:
-                self._base.executemany("INSERT OR REPLACE INTO simulation VALUES (?, ?)", rows)
-        except sqlite3.Error as error:
-            self._give_up(str(error))
+        self._write("INSERT OR REPLACE INTO simulation VALUES (?, ?)", rows)
 
-    def _open(self) -> None:
-        try:
-            self._file.parent.mkdir(parents=True, exist_ok=True)
-            _make_room(self._file)
-            for attempt in range(2):
-                try:
-                    base = sqlite3.connect(self._file, timeout=_PATIENCE_S)
-                    base.execute("CREATE TABLE IF NOT EXISTS simulation (key BLOB PRIMARY KEY, outputs BLOB)")
-                except sqlite3.OperationalError:  # locked, no room, no permission: not for us to remove
-                    raise
-                except sqlite3.DatabaseError as error:
-                    _LOG.info("the file %s is damaged and is begun anew: %s", self._file, error)
-                    self._file.unlink()
-                    if attempt:
-                        raise
-                else:
-                    self._base = base
-                    self._file.touch()
-                    return
-        except (OSError, sqlite3.Error) as error:
-            self._give_up(str(error))
-
-    def _give_up(self, why: str) -> None:
-        self.close()
-        self.problem = f"no simulations are kept ({self._file}): {why}"
-        _LOG.info("%s", self.problem)
+    def _begin(self, base: sqlite3.Connection) -> None:
+        base.execute("CREATE TABLE IF NOT EXISTS simulation (key BLOB PRIMARY KEY, outputs BLOB)")
+        self._file.touch()
 
 
 def simulations_folder() -> Path:

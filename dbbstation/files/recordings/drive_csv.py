@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import difflib
 import io
-import math
-from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, refuse
-from dbbstation.files.formats.number_language import is_number
-from dbbstation.files.recordings.table_csv import given_table
+from dbbstation.files.formats.number_language import PLAIN
+from dbbstation.files.recordings.table_csv import MOST_FAULTS, given_table, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
 from dbbstation.trace.recording import DriveRecording
 
@@ -22,15 +20,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.files.recordings.table_csv import Columns
+    from dbbstation.files.recordings.table_csv import Columns, TableFile
 
 TIME, POSITION, FORCE, CURRENT = "t_s", "position_mm", "force_n", "motor_current_a"
 REQUIRED = (TIME, POSITION)
 
 LARGEST = {TIME: 1e6, POSITION: 1e5, FORCE: 1e7, CURRENT: 1e4}
 """Greatest plausible size of each column, in its unit."""
-
-MOST_FAULTS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,19 +89,7 @@ def given_drive(given: Columns, name: str) -> DriveFile:
     Raises:
         InputError: missing columns, columns of several lengths, or unusable values.
     """
-    table = given_table(given, REQUIRED, name)
-    faults: list[Problem] = []
-    _check_names(list(table.names), name, 0, faults)
-    numbers = {one: table.values[one] for one in table.names if one in LARGEST}
-    faults += [
-        Problem.of(name, f"`{one}` has values that are not finite", "correct or remove the rows")
-        for one, values in numbers.items()
-        if not np.isfinite(values).all()
-    ]
-    if not faults:
-        _check_values(numbers, table.lines.tolist(), name, faults)
-    refuse(faults[:MOST_FAULTS])
-    return DriveFile(name, 0, numbers, {}, ())
+    return _checked(given_table(given, (), name), [])
 
 
 def parse_drive(text: str, file: str) -> DriveFile:
@@ -118,29 +102,33 @@ def parse_drive(text: str, file: str) -> DriveFile:
     if not lines:
         what, remedy = "there is no line that names the columns", f"begin with `{TIME},{POSITION},{FORCE}`"
         raise InputError.of(file, what, remedy)
-    header, head = lines[0]
-    names = [name.strip() for name in head.split(",")]
+    warnings: list[Problem] = []
+    number, last = lines[-1]
+    if not text.endswith("\n") and last.count(",") != lines[0][1].count(","):
+        warnings.append(Problem(file, number, 0, "the last line was cut off; it is left out"))
+        text = text[: text.rindex(last)]
+    return _checked(parse_table(text, file, numbers=PLAIN), warnings)
+
+
+def _checked(table: TableFile, warnings: list[Problem]) -> DriveFile:
+    file, header, names = table.file, table.header, list(table.names)
     faults: list[Problem] = []
     _check_names(names, file, header, faults)
-    rows = lines[1:]
-    if not rows and not faults:
-        faults.append(Problem(file, header, 0, "there are no samples below this line"))
-    refuse(faults)
-    warnings: list[Problem] = []
-    if not text.endswith("\n") and rows[-1][1].count(",") != len(names) - 1:
-        warnings.append(Problem(file, rows[-1][0], 0, "the last line was cut off; it is left out"))
-        rows = rows[:-1]
-    known = [name for name in names if name in LARGEST]
-    others = [name for name in names if name not in LARGEST]
-    warnings += [
-        Problem(file, header, 0, f"the column `{name}` is not known; it is kept and not used") for name in others
+    numbers = {name: table.values[name] for name in names if name in LARGEST}
+    faults += [
+        Problem(file, line, 0, f"{name} is `{shortened(cell)}`, not a finite number", "correct or remove the line")
+        for name, values in numbers.items()
+        if not np.isfinite(values).all()
+        for line, cell, value in zip(table.lines.tolist(), table.cells[name], values, strict=True)
+        if not np.isfinite(value)
     ]
-    numbers = _numbers(rows, names, known, file, faults)
     if not faults:
-        _check_values(numbers, [number for number, _ in rows], file, faults)
+        _check_values(numbers, table.lines.tolist(), file, faults)
     refuse(faults[:MOST_FAULTS])
-    kept = {name: tuple(line.split(",")[names.index(name)].strip() for _, line in rows) for name in others}
-    return DriveFile(file, header, numbers, kept, tuple(warnings))
+    others = {name: table.cells[name] for name in names if name not in LARGEST}
+    unknown = (f"the column `{name}` is not known; it is kept and not used" for name in others)
+    warnings += [Problem(file, header, 0, what) for what in unknown]
+    return DriveFile(file, header, numbers, others, tuple(warnings))
 
 
 def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) -> None:
@@ -154,46 +142,6 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
         faults.append(Problem(file, line, 0, f"the column `{missing}` is missing", remedy))
     if FORCE not in names and CURRENT not in names:
         faults.append(Problem(file, line, 0, f"neither `{FORCE}` nor `{CURRENT}` is there", shown))
-    faults.extend(
-        Problem(file, line, 0, f"the column `{name}` appears here more than once", "remove one")
-        for name, times in sorted(Counter(names).items())
-        if times > 1
-    )
-
-
-def _numbers(
-    rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
-) -> dict[str, Floats]:
-    text = io.StringIO("\n".join(line for _, line in rows))
-    places = [names.index(name) for name in known]
-    try:
-        table = np.loadtxt(text, delimiter=",", comments=None, usecols=places, ndmin=2)
-    except ValueError:
-        table = np.full((0, len(known)), np.nan)
-    whole = len(table) == len(rows) and bool(np.isfinite(table).all())
-    if not whole or any(line.count(",") != len(names) - 1 for _, line in rows):
-        _name_faults(rows, names, known, file, faults)
-        if not faults:
-            what = "NumPy reads this file otherwise than line by line"
-            faults.append(Problem.of(file, what, "write plain decimal numbers"))
-    return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(known)}
-
-
-def _name_faults(
-    rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
-) -> None:
-    for number, line in rows:
-        cells = line.split(",")
-        if len(cells) != len(names):
-            what = f"{len(cells)} values in {len(names)} columns"
-            remedy = "compare the line with the header; the decimal sign is a dot, a comma ends a value"
-            faults.append(Problem(file, number, 0, what, remedy))
-            continue
-        for name in known:
-            cell = cells[names.index(name)].strip()
-            if not is_number(cell) or not math.isfinite(float(cell)):
-                what = f"{name} is `{shortened(cell)}`, not a finite number"
-                faults.append(Problem(file, number, 0, what, "correct or remove the line"))
 
 
 def _check_values(numbers: dict[str, Floats], lines: list[int], file: str, faults: list[Problem]) -> None:

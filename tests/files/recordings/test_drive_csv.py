@@ -49,7 +49,7 @@ def test_a_last_line_that_was_cut_off_costs_that_line_alone():
     [
         ("", "x.csv: there is no line that names the columns; begin with `t_s,position_mm,force_n`"),
         ("# only\n", "x.csv: there is no line that names the columns"),
-        (f"{HEADER}\n", "x.csv:1: there are no samples below this line"),
+        (f"{HEADER}\n", "x.csv:1: there are no rows below this line"),
         ("t_s,pos_mm,force_n\n0,1,2\n", "x.csv:1: the column `position_mm` is missing; is it `pos_mm`?"),
         ("t_s,position_mm,torque\n0,1,2\n", "x.csv:1: neither `force_n` nor `motor_current_a` is there"),
         ("t_s;position_mm;force_n\n0;1;2\n", "commas stand between columns"),

@@ -88,7 +88,7 @@ class Front:
 
     def sessions(self) -> tuple[SessionLine, ...]:
         """Return sessions of the working folder and remembered ones, the last first."""
-        return list_sessions(self.under, [folder for folder, _ in self.memory.read().sessions])
+        return list_sessions(self.under, self.memory.read().sessions)
 
     def first_choice(self) -> Choice:
         """Return the last choice for a new session, without missing files."""
@@ -303,13 +303,13 @@ class Front:
         last = self.memory.read()
         if choice.folder is None:
             return
-        kept = replace(
-            last,
-            machine=last.machine if choice.machine is None else choice.machine.absolute(),
-            plan=last.plan if choice.plan is None else choice.plan.absolute(),
-            operator=choice.operator or last.operator,
-            serial_number=choice.serial_number or last.serial_number,
-        )
+        now = {
+            "machine": choice.machine and choice.machine.absolute(),
+            "plan": choice.plan and choice.plan.absolute(),
+            "operator": choice.operator,
+            "serial_number": choice.serial_number,
+        }
+        kept = last.model_copy(update={name: value for name, value in now.items() if value})
         self.memory.write(kept.with_session(choice.folder, choice.line))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,41 +73,28 @@ class Line(BaseModel):
 VIRTUAL = (virtual_port(), virtual_port(10.0))
 """Choice in the list of ports that needs no hardware."""
 
-_NO_LINE = Line()
 
-
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-    machine: str = ""
-    plan: str = ""
-    line: Line = Line()
-    operator: str = ""
-    serial_number: str = ""
-    sessions: dict[str, Line] = {}
-
-
-@dataclass(frozen=True)
-class Remembered:
+class Remembered(BaseModel):
     """Last choices."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     machine: Path | None = None
     plan: Path | None = None
-    line: Line = _NO_LINE
+    line: Line = Line()
     operator: str = ""
     serial_number: str = ""
-    sessions: tuple[tuple[Path, Line], ...] = ()
+    sessions: dict[Path, Line] = {}
 
     def line_of(self, folder: Path) -> Line:
         """Return a session's remembered instrument, else the last chosen one."""
-        return dict(self.sessions).get(folder.absolute(), self.line)
+        return self.sessions.get(folder.absolute(), self.line)
 
     def with_session(self, folder: Path, line: Line) -> Remembered:
         """Return the memory with a newly opened session. A virtual line is remembered for its session only."""
         folder = folder.absolute()
-        others = [(other, by) for other, by in self.sessions if other != folder]
-        last = self.line if line.virtual else line
-        return replace(self, line=last, sessions=((folder, line), *others)[:MOST])
+        sessions = [(folder, line), *(one for one in self.sessions.items() if one[0] != folder)][:MOST]
+        return self.model_copy(update={"line": self.line if line.virtual else line, "sessions": dict(sessions)})
 
 
 class Memory:
@@ -129,24 +115,14 @@ class Memory:
     def read(self) -> Remembered:
         """Return the last choices; empty if the file is missing or unreadable."""
         try:
-            file = _File.model_validate_json(content_of(self.path, LARGEST_BYTES))
+            found = Remembered.model_validate_json(content_of(self.path, LARGEST_BYTES))
         except (OSError, ValidationError):
             return Remembered()
-        sessions = tuple((Path(folder), line) for folder, line in file.sessions.items())
-        machine, plan = (Path(name) if name else None for name in (file.machine, file.plan))
-        last = _NO_LINE if file.line.virtual else file.line  # older programs remembered a virtual one like any other
-        return Remembered(machine, plan, last, file.operator, file.serial_number, sessions)
+        # Older programs remembered a virtual line like any other.
+        return found.model_copy(update={"line": Line()}) if found.line.virtual else found
 
     def write(self, remembered: Remembered) -> None:
         """Keep the last choices if possible."""
-        file = _File(
-            machine=str(remembered.machine or ""),
-            plan=str(remembered.plan or ""),
-            line=remembered.line,
-            operator=remembered.operator,
-            serial_number=remembered.serial_number,
-            sessions={str(folder): line for folder, line in remembered.sessions},
-        )
         with suppress(OSError, OutputError):
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            write_text(self.path, file.model_dump_json(indent=1) + "\n", force=True, rewrites=True)
+            write_text(self.path, remembered.model_dump_json(indent=1) + "\n", force=True, rewrites=True)

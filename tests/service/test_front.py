@@ -101,7 +101,9 @@ def test_remembered_sessions_are_listed_wherever_they_are_and_gone_ones_are_not(
 
 
 def test_choices_are_remembered(front: Front, session: Path, tmp_path: Path) -> None:
-    remembered = Remembered(MACHINE, PLAN, REAL, "me", "H-7").with_session(session, REAL)
+    remembered = Remembered(machine=MACHINE, plan=PLAN, line=REAL, operator="me", serial_number="H-7").with_session(
+        session, REAL
+    )
     front.memory.write(remembered)
     assert front.memory.read() == remembered
     choice = front.first_choice()
@@ -116,7 +118,7 @@ def test_choices_are_remembered(front: Front, session: Path, tmp_path: Path) -> 
     for number in range(2 * MOST):
         remembered = remembered.with_session(tmp_path / str(number), REAL)
     assert len(remembered.sessions) == MOST
-    assert remembered.sessions[0][0] == tmp_path / str(2 * MOST - 1)
+    assert next(iter(remembered.sessions)) == tmp_path / str(2 * MOST - 1)
 
 
 def test_a_virtual_machine_is_never_offered_unless_it_is_asked_for(front: Front, session: Path) -> None:

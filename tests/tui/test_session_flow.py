@@ -206,8 +206,8 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
     # The command that the model names is one that anybody can type.
     assert "dbbstation calibrate session" in (results / "model.yaml").read_text("utf-8")
     remembered = front.memory.read()
-    assert remembered.sessions[0][0] == front.under / "session"
-    assert remembered.sessions[0][1].time_scale == 10.0
+    assert next(iter(remembered.sessions)) == front.under / "session"
+    assert remembered.line_of(front.under / "session").time_scale == 10.0
     # The next session is not offered at a virtual machine.
     assert not remembered.line.virtual
 

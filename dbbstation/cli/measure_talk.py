@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
 from dbbstation.cli.progress import COUNTED, ProgressBar
+from dbbstation.results.frame import of_facts
 from dbbstation.results.sessions import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.station import events
@@ -125,28 +126,23 @@ class Summary:
         )
 
     def _run(self, run: RunEntry) -> RecordedRun:
-        recorded = RecordedRun(
-            test=run.test,
+        recorded = of_facts(
+            RecordedRun,
+            run,
             direction=run.direction.value,
-            repeat=run.repeat,
-            mounting=run.mounting,
             state=run.state.value,
             file=f"runs/{run.path.name}",
         )
         completed = self._completed.get(run.name)
         if completed is None:
             return recorded
-        figures = completed.figures
-        return CompletedRun(
-            **vars(recorded),
-            samples=completed.samples,
-            lost=completed.lost,
-            doubtful=completed.doubtful,
+        return of_facts(
+            CompletedRun,
+            recorded,
+            completed,
+            completed.figures,
             problem=completed.problem or None,
             findings=tuple(completed.findings),
-            centre_deviation_um=None if figures is None else figures.centre_deviation_um,
-            mean_radial_error_um=None if figures is None else figures.mean_radial_error_um,
-            circularity_um=None if figures is None else figures.circularity_um,
         )
 
 

@@ -49,22 +49,21 @@ def list_runs(folder: _Folder) -> Answer:
     """
     from dbbstation.cli.output import print_table
     from dbbstation.files.recordings.session import read_session
+    from dbbstation.results.frame import of_facts
     from dbbstation.results.sessions import ListedRun, ListedSession
     from dbbstation.text.written import repeats_in_order
 
     read = read_session(folder)
     missing, runs = _missing(read), repeats_in_order(read.runs)
     listed = tuple(
-        ListedRun(
+        of_facts(
+            ListedRun,
+            run,
             run=run.name,
-            test=run.test,
             direction=run.direction.value,
-            repeat=run.repeat,
-            mounting=run.mounting,
             started=None if run.started is None else run.started.isoformat(),
             state=run.state.value,
             reason=run.reason or None,
-            counts=run.counts,
             file=run.path.relative_to(read.folder).as_posix(),
         )
         for run in runs

@@ -17,7 +17,7 @@ from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.quality.finding import Finding
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
-from dbbstation.results.frame import Framed
+from dbbstation.results.frame import Framed, of_facts
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
@@ -308,29 +308,25 @@ def circle_figures(
     entry = circle.entry
     figures, (x_mm, y_mm), raw = budgets(one, circle.known), one.centre_mm, one.raw
     value_um = {quantity: budget.value_um for quantity, budget in figures.items()}
-    return CircleFiguresResult(
-        session=circle.session,
-        test=entry.test,
+    return of_facts(
+        CircleFiguresResult,
+        circle,
+        entry,
+        raw.circle,
+        one,
+        one.path,
         direction=str(raw.circle.direction),
-        repeat=entry.repeat,
         problem=circle.problem or None,
         tilt_deg=tuple(raw.circle.tilt_deg),
-        elevation_deg=raw.circle.elevation_deg,
-        radius_mm=one.path.radius_mm,
-        bar_mm=raw.circle.bar_mm,
-        feed_mm_min=raw.circle.feed_mm_min,
         samples=len(raw),
         samples_lost=one.lost,
         g_um=value_um[BudgetQuantity.G],
         g_least_squares_um=value_um[BudgetQuantity.G_LS],
         f_um=LargestAndLeast(value_um[BudgetQuantity.F_MAX], value_um[BudgetQuantity.F_MIN]),
         f_about_commanded_centre_um=LargestAndLeast(one.f_commanded.largest_um, one.f_commanded.least_um),
-        radius_error_um=one.radius_error_um,
-        mean_radial_error_um=one.mean_radial_error_um,
         centre_um=PlaneVector(1e3 * x_mm, 1e3 * y_mm),
         harmonics=tuple(one.harmonics),
         reversal_steps=tuple(one.steps),
-        closure=one.closure,
         drift_um_per_turn=None if one.passes is None else one.passes.mean_um,
         feed_shown_mm_min=None if one.feed_mm_min is None else ShownFeed(*one.feed_mm_min),
         noise_um=NoiseFigures(finite(one.noise.slow_um), finite(one.noise.reading_um), one.noise.resolution_um),
@@ -341,15 +337,14 @@ def circle_figures(
 
 def _pair(pair: MeasuredPair) -> PairFigures:
     figures = pair_budgets(pair.analysis, pair.one.known)
-    return PairFigures(
-        session=pair.one.session,
-        test=pair.one.entry.test,
-        repeat=pair.one.entry.repeat,
+    return of_facts(
+        PairFigures,
+        pair.one,
+        pair.one.entry,
+        pair.analysis,
         g_um=figures[BudgetQuantity.G_BOTH].value_um,
         g_least_squares_um=figures[BudgetQuantity.G_BOTH_LS].value_um,
-        d_um=pair.analysis.d_um,
         h_um=figures[BudgetQuantity.H].value_um,
-        h_deg=pair.analysis.h_deg,
         uncertainty={str(quantity): budget for quantity, budget in figures.items()},
     )
 

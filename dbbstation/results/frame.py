@@ -179,8 +179,9 @@ def picked(one: object, *names: str) -> dict[str, object]:
 
 def of_facts(kind: type[_Kind], *facts: object, **further: object) -> _Kind:
     """Return a dataclass whose fields are the facts' attributes of the same name, of the first fact with each, or given."""
-    held = {one.name: fact for one in fields(kind) for fact in reversed(facts) if hasattr(fact, one.name)}  # type: ignore[arg-type]
-    return kind(**{name: getattr(fact, name) for name, fact in held.items()} | further)
+    names = [one.name for one in fields(kind) if one.name not in further]  # type: ignore[arg-type]
+    held = {name: fact for name in names for fact in reversed(facts) if hasattr(fact, name)}
+    return kind(**{name: getattr(fact, name) for name, fact in held.items()}, **further)
 
 
 def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:

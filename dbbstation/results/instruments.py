@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.facts.serialise import Absent
+from dbbstation.results.frame import of_facts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -41,15 +42,13 @@ class InstrumentsResult:
 
 def instrument_result(protocol: Protocol, profiles: Iterable[str], *, whole: bool = False) -> InstrumentResult:
     """Return the description of an instrument."""
-    return InstrumentResult(
-        name=protocol.name,
-        profile=protocol.profile,
-        title=protocol.title,
+    return of_facts(
+        InstrumentResult,
+        protocol,
         line=protocol.line.model_dump(),
         mode=protocol.ask.mode,
         readings_per_second=protocol.fastest_hz(),
         not_verified=tuple(one.says for one in protocol.references if not one.verified),
-        has_checksum=protocol.has_checksum,
         counts_samples=protocol.counter_modulus is not None,
         range_mm=tuple(protocol.length.range_mm),
         profiles=tuple(profiles),

@@ -12,7 +12,7 @@ from dbbstation.facts.serialise import Kept
 from dbbstation.files.atomic import write_text
 from dbbstation.files.provenance import Provenance
 from dbbstation.nc.remarks import said_acceleration
-from dbbstation.results.frame import Framed, picked
+from dbbstation.results.frame import Framed, of_facts, picked
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
@@ -107,19 +107,14 @@ def programs_result(
 
 
 def _written(file: str, each: Program) -> WrittenProgram:
-    return WrittenProgram(
+    return of_facts(
+        WrittenProgram,
+        each,
         file=file,
         sha256=hashlib.sha256(each.text.encode()).hexdigest(),
-        points=each.points,
         greatest_correction_um=each.greatest_um,
         chord_error_um=each.chord_um,
-        chord_asked_um=each.chord_asked_um,
         model_uncertainty_um=each.uncertainty_um,
         model_uncertainty_by_axis_um=dict(zip("xyz", each.uncertainty_by_axis_um, strict=False)) or None,
         model_uncertainty_not_known_because=each.why_unknown or None,
-        tilt_left_um=each.tilt_left_um,
-        feed_s=each.feed_s,
-        nominal_feed_s=each.nominal_feed_s,
-        remarks=each.remarks,
-        text=each.text,
     )

@@ -8,6 +8,7 @@ from typing import Annotated
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.facts.serialise import Absent
 from dbbstation.machine.geometry import Machine
+from dbbstation.results.frame import of_facts
 from dbbstation.sources.contract import ErrorSource
 
 
@@ -59,23 +60,17 @@ def source_description(source: ErrorSource, machine: Machine | None = None) -> S
     Raises:
         ModelError: the machine lacks what the source needs.
     """
-    texts = source.texts
     parameters = None
     if machine is not None:
         parameters = tuple(SourceParameter(p.name, p.unit, p.plausible, p.meaning) for p in source.parameters(machine))
-    return SourceDescription(
-        name=source.name,
+    return of_facts(
+        SourceDescription,
+        source.texts,
+        source,
         belongs_to=source.belongs_to.value,
         role=role_of(source),
-        what=texts.what,
-        shows=texts.shows,
-        confirm=texts.confirm,
-        cure=texts.cure,
-        equation=texts.equation,
-        origin=texts.origin,
         needs=tuple(sorted(need.value for need in source.needs)),
         varies_with=source.varies_with or None,
-        form_uncertainty=source.form_uncertainty,
         parameters=parameters,
     )
 

@@ -23,6 +23,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.travel import check_travel
 from dbbstation.results.control import KinematicsResult, ParametersResult
+from dbbstation.results.frame import of_facts
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.tasks.programs import program_text, sha256_of
 
@@ -93,13 +94,11 @@ def kinematics(
     control = correction_of("kinematics", digest, date, taken_out, identified.model.machine)
     write_text(corrected, machine_text(replace(identified.model.machine, control=control)), force=force)
     write_text(out, made.text, force=force)
-    return KinematicsResult(
+    return of_facts(
+        KinematicsResult,
+        made,
         file=str(out),
-        name=made.name,
         model_sha256=digest,
-        parts=made.parts,
-        left_out=made.left_out,
-        thermometers=made.thermometers,
         install=(f"sudo halcompile --install {out.name}",),
         ini=ini,
         hal=hal,

@@ -71,6 +71,7 @@ def evaluate(
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.results.evaluation import EvaluationResult
+    from dbbstation.results.frame import of_facts
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.load import loaded
@@ -88,14 +89,13 @@ def evaluate(
     plane = plane_figures(identified.model, height_mm)
     flatness_u_um, parallelism_u_um = plane_uncertainty_um(identified, height_mm)
     own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
-    return EvaluationResult(
+    return of_facts(
+        EvaluationResult,
+        found,
+        plane,
         runs=runs,
-        nominal_rms_um=found.nominal_rms_um,
-        residual_rms_um=found.residual_rms_um,
         held_out=set(chain(*recorded.sessions.items())).isdisjoint(chain(*identified.sessions.items())),
-        flatness_um=plane.flatness_um,
         flatness_u_um=flatness_u_um,
-        parallelism_um=plane.parallelism_um,
         parallelism_u_um=parallelism_u_um,
         plane_uncertainty_not_known_because=None
         if None not in {flatness_u_um, parallelism_u_um}

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 FEWEST_POINTS = 4
 """Three points are always on one circle, so a zone needs four."""
 
-SECTORS = 6
-"""The search starts with the highest and lowest point of each sector, because the four touching points are far apart."""
+SECTORS = 4
+"""The search starts with the highest and lowest point of each sector, because the four touching points are far apart.
+Six sectors take twice the time of four, with equal zones."""
 
 AGREED_MM = 1e-10
 """A point may protrude this far from the zone: much less than a bar's resolution [mm]."""
@@ -78,11 +79,13 @@ def _extremes(points_mm: Floats) -> Integers:
     x, y = (points_mm - middle).T
     radius = np.hypot(x, y)
     sector = ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64)
-    found = [np.arange(min(FEWEST_POINTS, len(points_mm)))]
+    found = []
     for one in range(SECTORS):
         inside = np.flatnonzero(sector == one)
         if len(inside):
             found.append(inside[[np.argmax(radius[inside]), np.argmin(radius[inside])]])
+    if len(found) < FEWEST_POINTS:
+        found.append(np.arange(FEWEST_POINTS))
     return np.unique(np.concatenate(found))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES
-from dbbstation.calibration.reporting.prediction import smooth_circularities_um, smooth_circularity_um
+from dbbstation.calibration.reporting.prediction import smooth_circularities_um
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.errors import KinematicsError
@@ -226,14 +226,15 @@ def _circle(observation: Observation, effect_mm: Floats) -> CuredCircle:
     measured, cured = raw.length_mm, raw.length_mm - effect_mm
     was, would = figures(raw, measured), figures(raw, cured)
     before, after = (1e3 * np.asarray(one.centre_mm) for one in (was, would))
+    g_um, measured_g_um, cured_g_um = smooth_circularities_um(raw, [raw.circle.bar_mm + effect_mm, measured, cured])
     return CuredCircle(
         test=observation.test,
         direction=str(raw.circle.direction),
         repeat=observation.repeat,
-        g_um=smooth_circularity_um(raw, raw.circle.bar_mm + effect_mm),
+        g_um=g_um,
         centre_um=before - after,
-        measured_g_um=smooth_circularity_um(raw, measured),
-        cured_g_um=smooth_circularity_um(raw, cured),
+        measured_g_um=measured_g_um,
+        cured_g_um=cured_g_um,
         measured_centre_um=before,
         cured_centre_um=after,
         raw=raw,

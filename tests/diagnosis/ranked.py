@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dbbstation.calibration.reporting.prediction import smooth_circularity_um
+from dbbstation.calibration.reporting.prediction import smooth_circularities_um
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.tasks.diagnose import diagnose
 from dbbstation.tasks.load import load
@@ -123,7 +123,7 @@ def truth_of(folder, seed, plan, mechanisms):
     for k, mechanism in enumerate(mechanisms):
         rest = lengths_of(folder / f"without-{k}", seed, plan, [*mechanisms[:k], *mechanisms[k + 1 :]])
         g = [
-            smooth_circularity_um(one.raw, one.raw.circle.bar_mm + one.raw.length_mm - rest[key].raw.length_mm)
+            smooth_circularities_um(one.raw, [one.raw.circle.bar_mm + one.raw.length_mm - rest[key].raw.length_mm])[0]
             for key, one in whole.items()
         ]
         found[GEOMETRY if mechanism.name == "kinematics" else mechanism.name] = float(np.mean(g))

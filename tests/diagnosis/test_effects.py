@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.calibration.reporting.prediction import smooth_circularity_um
+from dbbstation.calibration.reporting.prediction import smooth_circularities_um
 from dbbstation.diagnosis.effects import GEOMETRY, effects_of
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.model.machine_model import MachineModel
@@ -68,7 +68,7 @@ def test_a_circle_without_a_cause_is_the_circle_of_a_machine_without_it(known):
     model, runs, _ = known
     gravity = next(one for one in effects_of(model, runs) if one.cause == "gravity")
     for circle, run in zip(gravity.runs, runs, strict=True):
-        assert circle.measured_g_um == pytest.approx(smooth_circularity_um(run.raw, run.raw.length_mm))
+        assert circle.measured_g_um == pytest.approx(smooth_circularities_um(run.raw, [run.raw.length_mm])[0])
         np.testing.assert_allclose(circle.measured_centre_um - circle.cured_centre_um, circle.centre_um, atol=1e-9)
         np.testing.assert_allclose(circle.raw.length_mm, run.raw.length_mm)
     alone = next(iter(effects_of(MachineModel(model.machine, (model.sources[2],)), runs)))

@@ -43,24 +43,16 @@ def predicted_circles(
     circles: list[LowPassedCircularity] = []
     for o, before, after in zip(observations, nominal, left, strict=True):
         progress(len(circles), len(observations))
-        circle = LowPassedCircularity(
-            measured=smooth_circularity_um(o.raw, o.raw.length_mm),
-            predicted=smooth_circularity_um(o.raw, o.raw.length_mm - after),
-            before=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + before),
-            after=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + after),
-        )
+        raw, bar_mm = o.raw, o.raw.circle.bar_mm
+        lengths_mm = [raw.length_mm, raw.length_mm - after, bar_mm + before, bar_mm + after]
+        circle = LowPassedCircularity(*smooth_circularities_um(raw, lengths_mm))
         circles.append(circle)
     progress(len(circles), len(observations))
     return tuple(circles)
 
 
-def smooth_circularity_um(raw: RawCircle, length_mm: Floats) -> float:
-    """Return the circularity [µm] of lengths, shape (n,) [mm], at a circle's angles, up to 30 undulations per revolution."""
-    return smooth_circularities_um(raw, [length_mm])[0]
-
-
 def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[Floats]) -> list[float]:
-    """Return G [µm] of several series of lengths, shape (n,) each [mm]."""
+    """Return circularities [µm] of lengths, shape (n,) each [mm], at a circle's angles, up to 30 undulations per revolution."""
     return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
 
 

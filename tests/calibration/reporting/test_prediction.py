@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from dbbstation.calibration.reporting.prediction import predicted_circles, smooth_circularity_um
+from dbbstation.calibration.reporting.prediction import predicted_circles, smooth_circularities_um
 from dbbstation.cli import cli
 from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
@@ -22,16 +22,16 @@ def test_form_counts_up_to_thirty_undulations():
     theta = np.radians(PHI)
     slow, fast = 1e-3 * np.cos(30 * theta), 1e-3 * np.cos(31 * theta)
     # 30 µm of centre makes a circle of 150 mm out of round by 3 nm.
-    assert smooth_circularity_um(raw, raw.length_mm) == pytest.approx(0.0, abs=0.01)
-    assert smooth_circularity_um(raw, raw.length_mm + slow) == pytest.approx(2.0, abs=0.02)
-    assert smooth_circularity_um(raw, raw.length_mm + fast) == pytest.approx(0.0, abs=0.02)
+    assert smooth_circularities_um(raw, [raw.length_mm])[0] == pytest.approx(0.0, abs=0.01)
+    assert smooth_circularities_um(raw, [raw.length_mm + slow])[0] == pytest.approx(2.0, abs=0.02)
+    assert smooth_circularities_um(raw, [raw.length_mm + fast])[0] == pytest.approx(0.0, abs=0.02)
 
 
 def test_few_samples_are_no_reason_to_fail():
     raw = observation("a", 0.0).raw
     few = type(raw)(raw.name, raw.circle, raw.t_s[::30], raw.phi_deg[::30], raw.length_mm[::30])
     wave = 1e-3 * np.cos(2 * np.radians(few.phi_deg))
-    assert smooth_circularity_um(few, few.length_mm + wave) == pytest.approx(2.0, abs=0.02)
+    assert smooth_circularities_um(few, [few.length_mm + wave])[0] == pytest.approx(2.0, abs=0.02)
 
 
 def test_a_machine_whose_frame_is_stretched_along_x_cuts_an_oval(reference):

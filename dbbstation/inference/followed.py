@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
-from dbbstation.inference.bank import LOOKED_FOR
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.levels import RUN, TIME
@@ -35,9 +34,11 @@ WAYS = {
     **dict.fromkeys((Family.HYSTERESIS, Family.FRICTION, Family.SCALED), "direction"),
     **dict.fromkeys((Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION), "direction"),
     **dict.fromkeys((Family.SPEED, Family.LAG, Family.MEMORY, Family.DEAD_TIME, Family.INTEGRAL), "late"),
-    **dict.fromkeys((Family.DRIFT, *IN_TIME), "in_time"),
+    **dict.fromkeys((Family.DRIFT, Family.WANDER, *IN_TIME), "in_time"),
 }
 VALUE = "value"
+AT_ONCE = (VALUE, "direction")
+"""Ways without memory of earlier rows, which imitates drifts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,19 +181,27 @@ def interchangeable(
     settled: Settled, members: Collection[str], follow: Callable[[str], frozenset[str]]
 ) -> tuple[str, ...]:
     """Return variables of single causes without memory that can replace members."""
-    best, bank = settled.best, settled.bank
     own = frozenset[str]().union(*(follow(name) for name in members))
-    rivals = []
-    for cause in settled.causes:
-        over = followed_by(bank, cause.name)
-        pattern = bank.patterns.get(cause.name)
-        picked = pattern is not None and pattern.family in LOOKED_FOR
-        if cause.name in best.names or len(over) != 1 or over & own or picked or way_of(bank, cause.name) != VALUE:
-            continue
-        rivals.append(cause)
-    shares = shares_of(settled, members, rivals)
-    found = (followed_by(bank, name) for name, share in shares.items() if share >= settled.channel.interchangeable)
+    found = in_place_of(settled, members, VALUE, lambda over: len(over) == 1 and not over & own)
     return tuple(sorted(frozenset[str]().union(*found)))
+
+
+def in_place_of(
+    settled: Settled, members: Collection[str], way: str, asked: Callable[[frozenset[str]], bool]
+) -> list[frozenset[str]]:
+    """Return the variables of single causes, not picked by a search, that can replace members.
+
+    Args:
+        way: how the causes follow their variables.
+        asked: function that selects causes by their variables.
+    """
+    bank, rivals = settled.bank, []
+    for cause in settled.causes:
+        picked = cause.name in bank.looked_for or cause.name in settled.best.names
+        if not picked and way_of(bank, cause.name) == way and asked(followed_by(bank, cause.name)):
+            rivals.append(cause)
+    shares = shares_of(settled, members, rivals)
+    return [followed_by(bank, name) for name, share in shares.items() if share >= settled.channel.interchangeable]
 
 
 def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause]) -> dict[str, float]:
@@ -280,15 +289,22 @@ class ChosenWithoutParts:
         """Return each part's rms error with only effects of these variables, or with all effects if none are given."""
         # Effects in time may be the drift that belongs to a law over a variable.
         also = {TIME, RUN} if wanted and self.of({TIME, RUN}).predicts else set[str]()
-        left = [left_with(part.settled, {*wanted, *also})[part.rows] for part in self.parts]
+        left = [left_with(part.settled, {*wanted, *also}, anew=True)[part.rows] for part in self.parts]
         return [rms(rows) for rows in left]
 
 
-def left_with(one: Settled, wanted: Collection[str]) -> Floats:
-    """Return the residual after refitting only effects of these variables, or all effects if none are given."""
-    follow = follow_of(one)
-    rest = [name for name in one.best.names if wanted and not follow(name) & set(wanted)]
-    return left_without(one, rest)
+def left_with(one: Settled, wanted: Collection[str], *, anew: bool = False) -> Floats:
+    """Return the residual after refitting only effects of these variables, or all effects if none are given.
+
+    Args:
+        anew: whether an effect counts that a cause over these variables can replace. A selection without a part may give
+            play of an axis the name of its screw.
+    """
+    follow, own = follow_of(one), frozenset(wanted)
+    rest = {name for name in one.best.names if own and not follow(name) & own}
+    ways = {name: way_of(one.bank, name) for name in rest} if anew else {}
+    same = {n for n, way in ways.items() if way in AT_ONCE and in_place_of(one, [n], way, own.issuperset)}
+    return left_without(one, rest - same)
 
 
 def gain_of(parts: Sequence[WithoutPart], wanted: Collection[str] | None, ignored: Collection[str] = ()) -> ClassGain:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from dbbstation.inference.curves import Power, Spline
-from dbbstation.inference.forms import Form, SignForm, Wave
+from dbbstation.inference.forms import Form, SignForm, Walk, Wave
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ class Family(StrEnum):
     FRICTION = "friction"
     SCALED = "scaled hysteresis"
     DRIFT = "drift"
+    WANDER = "wander"
     PRODUCT = "product"
     CURVE = "curve"
     BY_DIRECTION = "curve by direction"
@@ -340,3 +341,18 @@ def of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:
     for k, own in enumerate(blocks):
         samples[own, k] = 1.0
     return Pattern(Family.BLOCKS, (), samples)
+
+
+WALK_STEPS = 10
+"""Linear pieces of a random walk. Noise with `FEWEST_INDEPENDENT` samples has a corner at six half periods over the rows,
+above which it contains the walk. On eight walks 5 to 14 pieces gave log evidence within 4, 20 pieces up to 8 less."""
+
+
+def wander(time: Variable, blocks: Sequence[slice]) -> list[Pattern]:
+    """Return a random walk over the time within blocks, with an rms of one about its mean; none if time stands."""
+    steps = np.diff(time.values, prepend=time.values[0])
+    steps[[block.start for block in blocks]] = 0.0
+    since = np.cumsum(steps)
+    # The mean square deviation of a walk from its own mean is a sixth of its last variance.
+    walk = Walk(np.linspace(0.0, since[-1], WALK_STEPS + 1), since[-1] / 6.0)
+    return [Pattern.plain(Family.WANDER, (time,), walk.columns(since), walk)] if since[-1] > 0.0 else []

@@ -14,10 +14,11 @@ from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
 from dbbstation.inference.impossible import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.named_values import moved, values_of_law
-from dbbstation.inference.patterns import patterns
+from dbbstation.inference.patterns import patterns, wander
 from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import Beginning, Settled
 from dbbstation.inference.triangle import rms, squares
+from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -132,7 +133,12 @@ def _meets(one: Settled, other: Settled) -> bool:
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
     """Return patterns that need no search, independent of held-back rows."""
-    return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
+    found = patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit)
+    if channel.time is not None:
+        row = Variable("row", channel.time_unit, Kind.TIME, channel.time)
+        clock = next((v for v in channel.variables if v.values is channel.time), row)
+        found += wander(clock, channel.blocks)
+    return tuple(found)
 
 
 def _begun(channel: Channel, how: _How) -> Bank:

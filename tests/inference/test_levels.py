@@ -444,6 +444,20 @@ def test_a_correction_is_made_of_what_follows(both):
     assert np.mean(chosen.errors_with(())) < np.mean(chosen.errors_with({"q"}))
 
 
+def test_an_effect_with_another_name_in_a_part_is_corrected():
+    """A screw that turns with its axis comes first without a part: play of the one is play of the other."""
+    data = table(5, EFFECTS["hysteresis of q"], rows=600)
+    whole = channel(data, blocks=1)
+    screw = Variable("screw", "deg", Kind.LENGTH, 18.0 * data.q)
+    whole = replace(whole, variables=(screw, *whole.variables))
+    rows = parts_of(whole)[3][1]
+    part = WithoutPart(rows, settle(whole.without(rows), look=False, beginnings=ONE))
+    assert part.settled.best.names == {"hysteresis of screw"}
+    for wanted, columns in (("q", [direction(data.q)]), ("load", [])):
+        expected = np.sqrt(squares(data.residual, columns, rows) / rows.sum())
+        assert ChosenWithoutParts([part]).errors_with({wanted}) == pytest.approx([expected], rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("concealed", "said"),
     [

@@ -30,6 +30,7 @@ MEANINGS: dict[Family, str] = {
     Family.FRICTION: "Its sign changes with the direction of travel, within a small speed: friction in a lubricant.",
     Family.SCALED: "Its sign changes with the direction of travel, and its force grows with the other variable: friction under a load.",
     Family.DRIFT: "It grows with time: warming, wear, or a clock that runs at another rate.",
+    Family.WANDER: "It wanders in time like a random walk: a zero that creeps, or a cause without a column.",
     Family.PRODUCT: "It depends on both variables together, not on one alone.",
     Family.CURVE: "It follows this variable smoothly.",
     Family.BY_DIRECTION: "It follows this variable with opposite signs in the two directions of travel.",

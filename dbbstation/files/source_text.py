@@ -35,6 +35,24 @@ def read_bytes(
     return data
 
 
+def blocks_of(path: Path) -> Iterator[bytes]:
+    """Yield a file's bytes in blocks, and note it as an input.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    try:
+        with opened(path) as source:
+            for block in source.blocks():
+                digest.update(block)
+                yield block
+    except OSError as error:
+        raise InputError([unreadable(path, error)]) from error
+    note_read(path)
+    note_input(path, digest.hexdigest())
+
+
 def unreadable(path: Path, error: OSError) -> Problem:
     """Return the problem of a file that cannot be read."""
     if isinstance(error, FileNotFoundError):

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 from unicodedata import normalize
 
 from dbbstation.errors import InputError, StationError
+from dbbstation.nc.spilled import Text
 from dbbstation.nc.toolpath import DECIMALS, joined
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ class Dialect(ABC):
     look_ahead: ClassVar[LookAhead | None] = None
     """How far the control looks ahead in moves that turn A, B or C; None: unknown, so that feeds are not checked."""
     takes_setup: ClassVar[bool] = False
+    takes_text: ClassVar[bool] = False
+    """Whether `read` takes a `Text`, too, which may be longer than memory."""
     decimals: ClassVar[Sequence[int]] = DECIMALS
     """Decimals of X, Y, Z [mm], A, B, C [deg] for the mark and the check of compensated programs."""
     rotation: ClassVar[Rotation | None] = None
@@ -73,11 +76,11 @@ class Dialect(ABC):
         `toolpath.name` and `toolpath.run` identify the program, if a control needs a name or number.
         """
 
-    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
+    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> Text:
         """Return the program of a toolpath in parts; `head` returns header and `numbers` once all parts are made."""
         toolpath = joined(list(parts))
         header, numbers = head()
-        return self.write(replace(toolpath, numbers=numbers), header)
+        return Text.of(self.write(replace(toolpath, numbers=numbers), header))
 
     name_letters: ClassVar[str] = r"\s\S"
     """Letters that a program's name may have, as in brackets of a regular expression; others become underscores."""
@@ -108,7 +111,7 @@ class Dialect(ABC):
         """
 
     def toolpath(
-        self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
+        self, text: str | Text, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         """Return the result of `read` for a program with moves.
 
@@ -121,8 +124,9 @@ class Dialect(ABC):
         if declared and not self.takes_setup:
             what = f"the dialect {self.name} takes no offsets, tool lengths or files of the control"
             raise StationError(what, where=name, remedy="leave them out, or post the program in machine coordinates")
-        path = replace(self.read(text, name, start=start, **declared), rotation=self.rotation)
-        if not path.is_move.any():
+        given: Any = text if self.takes_text else str(text)
+        path = replace(self.read(given, name, start=start, **declared), rotation=self.rotation)
+        if path.first_move is None:
             if says_compensated(path):
                 raise already_compensated(name, "says its header")
             remedy = "check that it is the file you mean: subprograms move only if a program calls them"

@@ -26,13 +26,14 @@ from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.nc.remarks import check_kept, remarks_on
 from dbbstation.nc.setup import offset_text
+from dbbstation.nc.spilled import Spilled, Text
+from dbbstation.nc.toolpath import in_pieces
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from dbbstation.computing.arrays import Integers
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.machine_model import MachineModel
@@ -80,7 +81,7 @@ class Program:
     """
 
     name: str
-    text: str
+    content: Text
     points: int
     greatest_um: float | None = None
     chord_um: float | None = None
@@ -92,6 +93,11 @@ class Program:
     feed_s: float | None = None
     nominal_feed_s: float | None = None
     remarks: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """Return the whole program."""
+        return str(self.content)
 
 
 def circle_programs(
@@ -214,7 +220,7 @@ def _program(
     order = dialect.rotation or own
     written = path.in_order(order)
     if inverse is None:
-        return Program(name, dialect.write(written, header), _points(written))
+        return Program(name, Text.of(dialect.write(written, header)), _points(written))
     check_joints(inverse.model.machine)
     asked_um, prefer = 1e3 * chord_mm, inverse.prefer
     # The same machine, with angles in the order of the program that is written.
@@ -240,14 +246,14 @@ def _program(
         said += [] if done.is_marked else ["its poses are too few to carry a mark: keep this header"]
         return [*said, *_said_of_uncertainty(*uncertainty)], (done.checksum.number,) * 2
 
-    text = dialect.write_parts(done.finished(parts), head)
+    content = dialect.write_parts(done.finished(parts), head)
     total = done.total
     if inverse.strict:
         check_kept(total, asked_um, machine)
     together_um, by_axis_um, why = uncertainty
     return Program(
         name,
-        text,
+        content,
         done.points,
         total.greatest_um,
         total.chord_um,
@@ -274,7 +280,7 @@ class _Finished:
         self.checksum, self.points = ProgramChecksum(dialect.decimals), 0
         self._so_far: Compensation | None = None
         self._coarse_mm = 0.0
-        self._sums: list[NDArray[np.uint64]] = []
+        self._sums = Spilled(np.uint64)
 
     def finished(self, parts: Iterable[Compensation]) -> Iterator[Toolpath]:
         """Yield the parts as they are written."""
@@ -288,7 +294,7 @@ class _Finished:
             self._so_far, self._coarse_mm = part_so_far, max(self._coarse_mm, float(off_mm.max(initial=0.0)))
             check_reach(self._machine, finished)
             self.checksum.add(finished)
-            self._sums.append(sums_of(finished, self._decimals))
+            self._sums.add(sums_of(finished, self._decimals))
             self.points += _points(finished)
             yield finished
 
@@ -302,7 +308,7 @@ class _Finished:
     @property
     def is_marked(self) -> bool:
         """Return whether the written poses contain the mark."""
-        return has_marks(np.concatenate(self._sums))
+        return has_marks(self._sums)
 
 
 def planner_of(machine: Machine, dialect: Dialect) -> Planner:
@@ -325,21 +331,30 @@ UNCERTAIN_AT = 2000
 def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tuple[float | None, ...], str]:
     if inverse.identified is None:
         return None, (), ""
-    row, share = path.subdivided(REACH_MM, REACH_DEG)
-    known = path.is_move[row]
-    row, share = row[known], share[known]
-    some = np.unique(np.linspace(0, len(row) - 1, UNCERTAIN_AT).astype(np.int64))
-    row, share = row[some], share[some]
-    time_s = None
-    if inverse.started_s is not None:
-        time_s = inverse.started_s + path.end_s[row] - (1.0 - share) * path.duration_s[row]
-    motion = Motion(poses=path.between(row, share), is_path=True, time_s=time_s)
+    number = sum(int(_checked_pieces(part).sum()) for part in path.parts())
+    some = np.unique(np.linspace(0, number - 1, UNCERTAIN_AT).astype(np.int64))
+    poses, times_s, before, begin_s = [], [], 0, 0.0
+    for part in path.parts():
+        row, share = in_pieces(_checked_pieces(part))
+        here = some[np.searchsorted(some, before) : np.searchsorted(some, before + len(row))] - before
+        row, share, before = row[here], share[here], before + len(row)
+        ends_s = np.cumsum(np.append(begin_s, part.duration_s))
+        poses.append(part.between(row, share))
+        times_s.append(ends_s[1 + row] - (1.0 - share) * part.duration_s[row])
+        begin_s = float(ends_s[-1])
+    time_s = None if inverse.started_s is None else inverse.started_s + np.concatenate(times_s)
+    motion = Motion(poses=np.concatenate(poses), is_path=True, time_s=time_s)
     per_axis_um = 1e3 * position_uncertainty_mm(inverse.identified, motion)
     together_um = float(np.linalg.norm(per_axis_um, axis=1).max())
     by_axis_um = tuple(None if np.isnan(um) else um for um in per_axis_um.max(axis=0).tolist())
     if None in by_axis_um:
         return None, by_axis_um, inverse.identified.why_unknown
     return together_um, by_axis_um, ""
+
+
+def _checked_pieces(path: Toolpath) -> Integers:
+    """Return the number of pieces of each row, shape (n,); none in rows that are no moves."""
+    return np.where(path.is_move, path.pieces(REACH_MM, REACH_DEG), 0)
 
 
 def _said_of_uncertainty(together_um: float | None, by_axis_um: tuple[float | None, ...], why: str) -> list[str]:

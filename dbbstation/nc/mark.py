@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import bdtrc
 
 from dbbstation.machine.compiled import compiled, inlined
+from dbbstation.nc.spilled import Spilled
 from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def marked(
     free[-1] &= not goes_on
     can = np.flatnonzero(free.any(axis=1))
     # A pose that comes again counts once.
-    bits = BITS[4 if follows or goes_on else min(max(_distinct(_sums(numbers[can])), 2), 4)]
+    bits = BITS[4 if follows or goes_on else min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]
     steps = _steps(FARTHEST_ANGLE, 1) if bits == BITS[4] else _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
     shifts = np.append(_SHIFTS, np.uint64(64 - bits))
     fixed, moved = _as_bits(~free[can]), _as_bits(steps != 0)
@@ -102,28 +103,35 @@ def is_marked(toolpath: Toolpath) -> bool:
     """Return whether more poses are marked than chance explains."""
     tried = list(decimals_of(toolpath))
     least = [min(decimals[first] for decimals in tried) for first in (0, 3)]
-    sums = [np.zeros((0, 2), np.uint64)]
+    sums = Spilled((np.uint64, 2))
     for numbers in _known(toolpath):
         groups = zip(_GROUPS, least, strict=True)
-        sums.append(np.column_stack([_sums(_numbers(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups]))
-    place, angle = np.concatenate(sums).T
+        sums.add(np.column_stack([_sums(_numbers(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups]))
 
-    def sums_with(decimals: Sequence[int]) -> NDArray[np.uint64]:
-        # A number with few decimals continues with zeros.
-        further = place * np.uint64(10 ** (decimals[0] - least[0]))
-        return further + angle * np.uint64(10 ** (decimals[3] - least[1]))
+    def sums_with(decimals: Sequence[int]) -> Spilled:
+        found = Spilled(np.uint64)
+        for block in sums.blocks():
+            # A number with few decimals continues with zeros.
+            place = block[:, 0] * np.uint64(10 ** (decimals[0] - least[0]))
+            found.add(place + block[:, 1] * np.uint64(10 ** (decimals[3] - least[1])))
+        return found
 
     count = _distinct(sums_with(DECIMALS))
     return any(has_marks(sums_with(decimals), count) for decimals in tried)
 
 
-def has_marks(sums: NDArray[np.uint64], count: int | None = None) -> bool:
+def has_marks(sums: Spilled, count: int | None = None) -> bool:
     """Return whether more poses are marked than chance explains, from their `sums_of`; `count` is the number of different poses."""
     count = _distinct(sums) if count is None else count
     fewest = sorted(BITS.values())
-    marks = _marks(sums, _MIXING, np.append(_SHIFTS, 64 - np.array(fewest, dtype=np.uint64)))
-    hits = {bits: _distinct(sums[marks > fewer]) for fewer, bits in enumerate(fewest)}
-    return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in hits.items())
+    shifts = np.append(_SHIFTS, 64 - np.array(fewest, dtype=np.uint64))
+    found = [Spilled(np.uint64) for _ in fewest]
+    for block in sums.blocks():
+        marks = _marks(block, _MIXING, shifts)
+        for fewer, those in enumerate(found):
+            those.add(block[marks > fewer])
+    hits = zip(fewest, map(_distinct, found), strict=True)
+    return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in hits)
 
 
 def sums_of(toolpath: Toolpath, decimals: Sequence[int]) -> NDArray[np.uint64]:
@@ -136,9 +144,20 @@ def _known(toolpath: Toolpath) -> Iterator[Floats]:
         yield part.numbers_written[part.is_move & (part.unknown == 0)]
 
 
-def _distinct(sums: NDArray[np.uint64]) -> int:
-    # A sort takes a fifth of the time of NumPy's `unique`, which hashes.
-    return int(np.count_nonzero(np.diff(np.sort(sums)))) + bool(len(sums))
+SORTED_TOGETHER = 1 << 19
+"""Greatest number of sums that are sorted together."""
+
+
+def _distinct(sums: Spilled) -> int:
+    # A sort takes a fifth of the time of NumPy's `unique`, which hashes. Equal sums have equal digits in the middle.
+    shares = 1 << max(len(sums) // SORTED_TOGETHER, 0).bit_length()
+    share, middle, count = np.uint64(shares - 1), np.uint64(20), 0
+    for number in range(shares):
+        some = [block[(block >> middle) & share == number] for block in sums.blocks()]
+        if some:
+            ordered = np.sort(np.concatenate(some))
+            count += int(np.count_nonzero(np.diff(ordered))) + bool(len(ordered))
+    return count
 
 
 def decimals_of(toolpath: Toolpath) -> Iterator[tuple[int, ...]]:

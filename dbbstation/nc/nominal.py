@@ -98,6 +98,6 @@ def check_machine(toolpath: Toolpath, machine: Machine) -> None:
 
 
 def _header(toolpath: Toolpath) -> Iterator[str]:
-    moves = np.flatnonzero(toolpath.is_move)
-    first = int(moves[0]) if len(moves) else len(toolpath)
+    move = toolpath.first_move
+    first = len(toolpath) if move is None else move
     return (text for row, text in toolpath.text.items() if row < first and toolpath.kind[row] == RowKind.COMMENT)

@@ -15,6 +15,8 @@ from dbbstation.nc.dialect import Dialect
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from dbbstation.nc.spilled import Text
+
 GROUP = "dbbstation.dialects"
 """Entry points of this group name classes that derive from `Dialect`."""
 
@@ -48,7 +50,7 @@ def dialect_named(name: str) -> Dialect:
     return looked_up(name, known_dialects(), called="NC dialect", error=StationError, how_to_add=HOW_TO_ADD)
 
 
-def dialect_of_file(file: str, text: str) -> Dialect:
+def dialect_of_file(file: str, text: str | Text) -> Dialect:
     """Return a program's dialect by its extension, or by its text if several dialects share the extension.
 
     Raises:
@@ -63,7 +65,7 @@ def dialect_of_file(file: str, text: str) -> Dialect:
             where=file,
             remedy=f"known: {extensions}; name its language with --written-in",
         )
-    fitting = having if len(having) == 1 else [dialect for dialect in having if dialect.is_in(text)]
+    fitting = having if len(having) == 1 else [dialect for dialect in having if dialect.is_in(str(text))]
     if len(fitting) != 1:
         names = ", ".join(dialect.name for dialect in fitting or having)
         raise StationError(

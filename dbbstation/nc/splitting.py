@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import felt_mm, in_mm, row_and_share
 from dbbstation.nc.pieces import longest
+from dbbstation.nc.spilled import forget
 from dbbstation.nc.toolpath import ROWS_AT_ONCE, RowKind, in_pieces
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ def parts_of(toolpath: Toolpath, runs_in: Callable[[Toolpath], Integers]) -> Ite
             end = _end_of_part(part, runs) if begin + rows < len(toolpath) else len(part)
             rows *= 2
         yield part.part(slice(end)), runs[:end]
+        forget(toolpath.rows)
         begin = max(begin + end, 1)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from dbbstation.machine.rotation import Frames
+from dbbstation.nc.spilled import Spilled, forget
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -193,8 +194,14 @@ class Toolpath:
     @property
     def corner_mm(self) -> float | None:
         """Return the rounding allowed at the first move [mm], or None."""
-        corners = self.corners_mm[self.is_move]
-        return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
+        corner_mm = np.nan if self.first_move is None else float(self.corners_mm[self.first_move])
+        return None if np.isnan(corner_mm) else corner_mm
+
+    @property
+    def first_move(self) -> int | None:
+        """Return the row of the first move, or None."""
+        moves = (np.flatnonzero(part.is_move) + ROWS_AT_ONCE * number for number, part in enumerate(self.parts()))
+        return next((int(rows[0]) for rows in moves if len(rows)), None)
 
     @property
     def arc(self) -> Floats:
@@ -236,6 +243,7 @@ class Toolpath:
         """Yield successive rows as toolpaths, at least one: a long program is checked and written in little memory."""
         for begin in range(0, max(len(self), 1), ROWS_AT_ONCE):
             yield self.part(slice(begin, begin + ROWS_AT_ONCE))
+            forget(self.rows)
 
     def only(self, rows: slice | Integers) -> Toolpath:
         """Return some rows as a toolpath without texts; each move begins at the end of the move before."""
@@ -330,9 +338,6 @@ class Toolpath:
 
 _NO_FEED = (np.nan, np.nan)
 
-GROWTH = 1.25
-"""Factor by which a builder makes room for more rows."""
-
 
 class ToolpathBuilder:
     """Collects the rows of a toolpath.
@@ -360,10 +365,10 @@ class ToolpathBuilder:
         self.unknown = ALL_AXES if start is None else bits_of(np.isnan(start))
         self._offsets: dict[tuple[float, ...], int] = {(0.0,) * 6: 0}
         self._offset = 0
-        self._arcs: list[tuple[float, ...]] = [STRAIGHT]
-        self._rows = np.zeros(64, ROW)
+        self._rows, self._arcs = Spilled(ROW), Spilled((np.float64, len(STRAIGHT)))
+        self._arcs.add(np.array([STRAIGHT]))
         self._text: dict[int, str] = {}
-        self._count = self.fed = self.left = 0
+        self.fed = self.left = 0
         self._is_built = False
 
     def count_from(self, offset: Sequence[float]) -> None:
@@ -375,15 +380,15 @@ class ToolpathBuilder:
         kind = RowKind.RAPID if feed is None else RowKind.FEED
         self._add(kind, poses, feed or _NO_FEED, line=line, step=1)
         if feed is None:
-            self.left = self._count
+            self.left = len(self)
         else:
-            self.fed = self._count
+            self.fed = len(self)
 
     def rapid(self, pose: Floats, *, line: int = 0, in_machine: bool = False, unknown: int = 0) -> None:
         """Add a move as fast as the machine can."""
         self.unknown = unknown
         self._add(RowKind.RAPID, pose[None], line=line, in_machine=in_machine)
-        self.left = self._count
+        self.left = len(self)
 
     def feed(
         self,
@@ -404,14 +409,14 @@ class ToolpathBuilder:
         self.unknown = unknown
         feed = (mm_min, mm_min if deg_min is None else deg_min)
         self._add(RowKind.FEED, poses, feed, line=line, in_machine=in_machine, arc=arc)
-        self.fed = self._count
+        self.fed = len(self)
 
     @property
     def pose(self) -> Floats:
         """Return the pose at the end of the last row, shape (6,) [mm, deg]."""
-        if self._count == 0:
+        if len(self) == 0:
             return np.full(6, np.nan) if self._start is None else np.array(self._start, dtype=np.float64)
-        return self._rows["poses"][self._count - 1].copy()
+        return np.array(self._rows.values["poses"][-1])
 
     def bend(
         self,
@@ -421,12 +426,12 @@ class ToolpathBuilder:
         plane: Integers,
     ) -> None:
         """Replace the poses of rows that were added together. All later rows get the last pose's coordinates in a plane."""
-        behind = first + len(poses)
-        self._rows["poses"][first:behind] = poses
-        number = self._rows["arc_number"][first]
+        behind, rows = first + len(poses), self._rows.values
+        rows["poses"][first:behind] = poses
+        number = rows["arc_number"][first]
         if number:
-            self._arcs[number] = arc
-        self._rows["poses"][behind : self._count, plane] = poses[-1, plane]
+            self._arcs.values[number] = arc
+        rows["poses"][behind:, plane] = poses[-1, plane]
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
@@ -435,40 +440,44 @@ class ToolpathBuilder:
     def say(self, kind: RowKind, text: str, *, line: int = 0) -> None:
         """Add a row of words."""
         if text:
-            self._text[self._count] = text
+            self._text[len(self)] = text
         self._add(kind, self.pose[None], line=line)
 
     def taken_back(self) -> str:
         """Remove the last row added by `say` and return its text."""
-        self._count -= 1
-        return self._text.pop(self._count, "")
+        self._rows.take_back()
+        return self._text.pop(len(self), "")
 
     @property
     def last_kind(self) -> RowKind | None:
         """Return the kind of the last row, or None."""
-        return RowKind(self._rows["kind"][self._count - 1]) if self._count else None
+        return RowKind(self._rows.values["kind"][-1]) if len(self) else None
 
     @property
     def last_text(self) -> str:
         """Return the text of the last row, or an empty one."""
-        return self._text.get(self._count - 1, "")
+        return self._text.get(len(self) - 1, "")
 
     def built(self) -> Toolpath:
         """Return the toolpath of all rows so far. An axis begins at its first named position; an unknown axis keeps its position."""
-        rows = self._rows
-        if len(rows) != self._count:
-            rows.resize(self._count, refcheck=False)
         self._is_built = True
-        poses = rows["poses"]
-        for axis in np.flatnonzero(np.isnan(poses).any(axis=0)):
-            known = np.flatnonzero(~np.isnan(poses[:, axis]))
-            last = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
-            poses[:, axis] = poses[known[np.maximum(last, 0)], axis] if len(known) else 0.0
+        blocks = [slice(begin, begin + ROWS_AT_ONCE) for begin in range(0, len(self), ROWS_AT_ONCE)]
+        before, poses = np.full(6, np.nan), self._rows.values["poses"]
+        for block in blocks:
+            if not np.isnan(before).any():
+                break
+            before = np.where(np.isnan(before), going_on(poses[block][::-1], before)[-1], before)
+        before = np.nan_to_num(before, nan=0.0)
+        for block in blocks:
+            if np.isnan(poses[block]).any():
+                poses[block] = going_on(poses[block], before)
+            before = poses[block][-1]
+            forget(poses)
         return Toolpath(
             name=self.name,
-            rows=rows,
+            rows=self._rows.values,
             offsets=np.array(list(self._offsets)),
-            arcs=np.array(self._arcs),
+            arcs=self._arcs.values,
             text=MappingProxyType(dict(self._text)),
             start=self._start,
             holds=self.holds,
@@ -480,7 +489,7 @@ class ToolpathBuilder:
         )
 
     def __len__(self) -> int:
-        return self._count
+        return len(self._rows)
 
     def _add(
         self,
@@ -494,23 +503,20 @@ class ToolpathBuilder:
         arc: tuple[float, ...] = STRAIGHT,
         step: int = 0,
     ) -> None:
-        behind = self._count + len(poses)
         if self._is_built:  # a toolpath has these rows
-            self._rows, self._is_built = self._rows.copy(), False
-        if behind > len(self._rows):
-            self._rows.resize(int(GROWTH * behind), refcheck=False)
+            built, self._rows, self._is_built = self._rows.values, Spilled(ROW), False
+            self._rows.add(built)
         if arc[2] != 0.0:
-            self._arcs.append(arc)
+            self._arcs.add(np.array([arc]))
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
         number, offset = len(self._arcs) - 1 if arc[2] != 0.0 else 0, 0 if in_machine else self._offset
-        rows = self._rows[self._count : behind]
+        rows = self._rows.room(len(poses))
         rows[:] = (0.0, *feed, dwell_s, corner_mm, line, offset, number, kind, self.unknown, in_machine)
         rows["poses"] = poses
         if step:
             rows["line"] += step * np.arange(len(rows), dtype=np.int32)
         elif corner_mm <= 0.0:
             rows["corners_mm"][:-1] = PIECE_CORNER_MM  # an arc as chords stops only at its own ends
-        self._count = behind
 
 
 def joined(parts: Sequence[Toolpath]) -> Toolpath:
@@ -518,6 +524,14 @@ def joined(parts: Sequence[Toolpath]) -> Toolpath:
     begins = np.cumsum([0, *map(len, parts)]).tolist()
     text = {begin + row: said for begin, part in zip(begins, parts, strict=False) for row, said in part.text.items()}
     return replace(parts[0], rows=np.concatenate([part.rows for part in parts]), text=text)
+
+
+def going_on(values: Floats, before: Floats) -> Floats:
+    """Return modal values, shape (n, k): each NaN gets the value of the row above. `before`, shape (k,), is the row above the first."""
+    known = np.vstack([before, values])
+    at = np.where(np.isnan(known), 0, np.arange(len(known))[:, None])
+    filled: Floats = np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]
+    return filled
 
 
 def bits_of(axes: Flags) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.machine.compiled import compiled
 from dbbstation.nc.dialect import Dialect, plain
+from dbbstation.nc.spilled import Text
 from dbbstation.nc.toolpath import RowKind, rounded
 
 if TYPE_CHECKING:
@@ -90,35 +91,36 @@ class WordDialect(Dialect):
         Raises:
             CannotSayError: the dialect has no words for something in it.
         """
-        return self._written(toolpath.parts(), lambda: (header, toolpath.numbers))
+        return str(self._written(toolpath.parts(), lambda: (header, toolpath.numbers)))
 
-    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
+    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> Text:
         """Return the program of a toolpath in parts, each written as soon as it is made."""
         return (self._written if type(self).write is WordDialect.write else super().write_parts)(parts, head)
 
-    def _written(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> str:
+    def _written(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> Text:
         # The header, which is known last, comes first.
-        texts, first, state = [""], None, _Modal()
+        text, first, state = Text(), None, _Modal()
         for part in parts:
             first = part if first is None else first
-            texts.append(self._checked(self._body(part, state)))
+            text.add(self._checked(self._body(part, state)))
         if first is None:
             raise ValueError("a program needs a part")
+        text.add(self._checked([*self._tcp("tcp off"), *self.end(first)]))
         header, numbers = head()
-        texts[0] = self._checked(self._head(replace(first, numbers=numbers), header))
-        return "".join([*texts, self._checked([*self._tcp("tcp off"), *self.end(first)])])
+        text.first = self._checked(self._head(replace(first, numbers=numbers), header))
+        return text
 
     def _tcp(self, what: str) -> list[str]:
         return [self.words[what]] if what in self.words else []
 
-    def _checked(self, lines: Iterable[str]) -> str:
-        """Return lines as one text, each with a line feed."""
+    def _checked(self, lines: Iterable[str]) -> bytes:
+        """Return lines as UTF-8, each with a line feed."""
         text = StringIO()
         for line in lines:
             if len(line) > self.longest_block and max(map(len, line.split("\n"))) > self.longest_block:
                 raise self.cannot_say(f"a line of more than {self.longest_block} characters")
             text.write(f"{line}\n")
-        return text.getvalue()
+        return text.getvalue().encode("utf-8", "surrogatepass")
 
     def _head(self, toolpath: Toolpath, header: Sequence[str]) -> Iterator[str]:
         yield from self.before_header(toolpath)

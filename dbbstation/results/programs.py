@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from dbbstation.facts.serialise import Kept
-from dbbstation.files.atomic import write_text
+from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.files.atomic import streamed
 from dbbstation.files.provenance import Provenance
 from dbbstation.nc.remarks import said_acceleration
+from dbbstation.nc.spilled import Text
 from dbbstation.results.frame import Framed, of_facts, picked
 
 if TYPE_CHECKING:
@@ -45,7 +46,12 @@ class WrittenProgram:
     feed_s: float | None
     nominal_feed_s: float | None
     remarks: tuple[str, ...]
-    text: Annotated[str, Kept] = field(repr=False)
+    content: Annotated[Text, AsItIs, Kept] = field(repr=False)
+
+    @property
+    def text(self) -> str:
+        """Return the whole program."""
+        return str(self.content)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,12 +82,18 @@ class ProgramsResult(Framed):
         return max((one.greatest_correction_um for one in self.programs if one.greatest_correction_um), default=None)
 
     def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:  # noqa: ARG002 - the text states it
-        write_text(path, self.text, force=force)
+        write_programs(path, [one.content for one in self.programs], force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return one row per program."""
         sizes = ("greatest_correction_um", "model_uncertainty_um", "chord_error_um", "feed_s", "nominal_feed_s")
         return [picked(one, "file", "points", *sizes) for one in self.programs]
+
+
+def write_programs(path: Path, contents: Iterable[Text], *, force: bool) -> None:
+    """Write programs into one file; see `streamed`."""
+    with streamed(path, force=force) as file:
+        file.writelines(block for content in contents for block in content.blocks())
 
 
 def programs_result(
@@ -107,11 +119,14 @@ def programs_result(
 
 
 def _written(file: str, each: Program) -> WrittenProgram:
+    digest = hashlib.sha256()
+    for block in each.content.blocks():
+        digest.update(block)
     return of_facts(
         WrittenProgram,
         each,
         file=file,
-        sha256=hashlib.sha256(each.text.encode()).hexdigest(),
+        sha256=digest.hexdigest(),
         greatest_correction_um=each.greatest_um,
         chord_error_um=each.chord_um,
         model_uncertainty_um=each.uncertainty_um,

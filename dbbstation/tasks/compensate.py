@@ -148,7 +148,7 @@ def compensate(
     import numpy as np
 
     from dbbstation.control.commands import refuse_second_correction
-    from dbbstation.files.atomic import refuse_existing, write_text
+    from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.own_sources import every_source
@@ -157,14 +157,14 @@ def compensate(
     from dbbstation.nc.export import compensated_program
     from dbbstation.nc.registry import dialect_of_file
     from dbbstation.results.model_warnings import model_warnings
-    from dbbstation.results.programs import programs_result
+    from dbbstation.results.programs import programs_result, write_programs
     from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.programs import (
         NOT_CORRECTED,
         ProgramText,
         inverse_of,
         origin_of,
-        program_text,
+        program_of,
         setup_of,
         sha256_of,
         source_of,
@@ -183,7 +183,7 @@ def compensate(
     if out is not None:
         refuse_existing(Path(out), force=force)
     writer = dialect_given(dialect)
-    text = program_text(source)
+    text = program_of(source)
     reader = dialect_of_file(name, text) if written_in is None else dialect_given(written_in)
     path = reader.toolpath(text, name, start=None if np.isnan(pose).all() else pose, setup=setup)
     inverse = inverse_of(
@@ -213,7 +213,7 @@ def compensate(
     origin = origin_of({**named, **files, **called}, inverse, (provenance or from_python)())
     done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
     if out is not None:
-        write_text(Path(out), done.text, force=force)
+        write_programs(Path(out), [done.content], force=force)
     digest = sha256_of(Path(model)) if isinstance(model, str | PathLike) else None
     return programs_result(
         [(str(out or done.name), done)], writer, inverse.model.machine, digest, tuple(telling.notes), warnings

@@ -9,17 +9,18 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import ArgumentError, InputError, Problem
+from dbbstation.errors import ArgumentError
 from dbbstation.files.formats.linuxcnc_control import parameters_of, tools_of
-from dbbstation.files.source_text import read_bytes
+from dbbstation.files.source_text import blocks_of
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
 from dbbstation.nc.setup import FIRST_PARAMETERS, ControlSetup
+from dbbstation.nc.spilled import Text
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.tasks.models import model_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.sources.contract import ErrorSource
@@ -98,7 +99,10 @@ def hashed(path: Path) -> str:
 
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file; raises InputError if unreadable."""
-    return hashlib.sha256(_content(path)).hexdigest()
+    digest = hashlib.sha256()
+    for block in blocks_of(path):
+        digest.update(block)
+    return digest.hexdigest()
 
 
 def source_of(program: str | PathLike[str] | ProgramText) -> Path | ProgramText:
@@ -112,21 +116,34 @@ def source_of(program: str | PathLike[str] | ProgramText) -> Path | ProgramText:
     return program if isinstance(program, ProgramText) else Path(program)
 
 
-def program_text(path: Path | ProgramText) -> str:
-    """Return the text of a program, from UTF-8, UTF-16 with a byte order mark, or else Windows' code page, which matters in comments only.
+def program_of(path: Path | ProgramText) -> Text:
+    """Return a program, from UTF-8, UTF-16 with a byte order mark, or else Windows' code page, which matters in comments only.
 
     Raises:
         InputError: it cannot be read.
     """
     if isinstance(path, ProgramText):
-        return path.text
-    data = _content(path)
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", "replace")
+        return Text.of(path.text)
+    content = Text(blocks_of(path))
+    if content.letters[:2].tobytes() in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
+        return Text(_as_utf8(content, "utf-16", "replace"))
     try:
-        return data.decode("utf-8-sig")
+        for _ in _as_utf8(content, "utf-8", "strict"):
+            pass
     except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
+        return Text(_as_utf8(content, "cp1252", "replace"))
+    return content
+
+
+def _as_utf8(content: Text, encoding: str, errors: str) -> Iterator[bytes]:
+    decoder = codecs.getincrementaldecoder(encoding)(errors)
+    yield from (decoder.decode(block).encode("utf-8", "surrogatepass") for block in content.blocks())
+    yield decoder.decode(b"", final=True).encode()
+
+
+def program_text(path: Path | ProgramText) -> str:
+    """Return the text of `program_of`, without byte order mark."""
+    return str(program_of(path)).removeprefix("\ufeff")
 
 
 def setup_of(
@@ -173,11 +190,3 @@ def setup_of(
     return ControlSetup(
         places, lengths_there | own, diameters, parameters=known, subprogram=subprogram, block_delete=skips
     )
-
-
-def _content(path: Path) -> bytes:
-    faults: list[Problem] = []
-    data = read_bytes(path, faults)
-    if data is None:
-        raise InputError(faults)
-    return data

@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 
 from dbbstation.nc.rs274 import reader
-from dbbstation.nc.rs274.plain import letters_of, plain_lines
+from dbbstation.nc.rs274.plain import plain_lines
 from dbbstation.nc.rs274.reader import read_program
 
 AXES = "XYZABC"
+
+
+def letters_of(text: str) -> np.ndarray:
+    return np.frombuffer(text.encode() + b"\0", dtype=np.uint8)
 
 
 def lines(seed: int) -> str:
@@ -63,7 +67,7 @@ def test_lines_together_are_as_lines_one_by_one(monkeypatch, seed):
     ],
 )
 def test_a_plain_line_says_what_python_reads(line, says):
-    read = plain_lines(letters_of(f"(Fräser)\n{line}\r\nM2\n"), 9)
+    read = plain_lines(letters_of(f"(Fräser)\n{line}\r\nM2\n"), 10)
     got = [read.numbers[0], read.motion[0], read.axes[0, 0], read.axes[0, 1], read.feed[0]]
     np.testing.assert_array_equal(got, says)
     assert len(read.axes) == 1

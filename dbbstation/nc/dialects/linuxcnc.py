@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.setup import ControlSetup
+    from dbbstation.nc.spilled import Text
     from dbbstation.nc.toolpath import Toolpath
 
 MODES = "G21 G90 G94 G17 G40 G49"
@@ -38,7 +39,7 @@ class LinuxCNC(WordDialect):
     also_read = ("", ".nc", ".tap", ".cnc", ".gcode", ".gc", ".g", ".eia", ".iso", ".din", ".ncf", ".prg", ".txt")
     what = "LinuxCNC (RS274/NGC)"
     look_ahead = LookAhead(share=0.5)
-    takes_setup = True
+    takes_setup = takes_text = True
     functions = r"[STEPQ]-?[0-9.]+|G97|M(?:[3-9]|48|49|5[0-3]|6[1-57-8]|1[0-9]{2})"
     systems = r"[\s\S]*"
     instead = MappingProxyType({"(": "[", ")": "]"})
@@ -62,7 +63,9 @@ class LinuxCNC(WordDialect):
         }
     )
 
-    def read(self, text: str, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
+    def read(
+        self, text: str | Text, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
+    ) -> Toolpath:
         return read_program(text, name, start=start, setup=setup)
 
     def before_header(self, toolpath: Toolpath) -> Iterable[str]:

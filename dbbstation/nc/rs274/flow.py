@@ -5,23 +5,24 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
 from dbbstation.nc.rs274.expressions import ValueReader
-from dbbstation.nc.rs274.plain import MOST_LINES, letters_of, plain_lines
+from dbbstation.nc.rs274.lines import Lines
+from dbbstation.nc.rs274.plain import plain_lines
 from dbbstation.nc.rs274.tokens import BadLine, Place
 from dbbstation.nc.setup import ControlSetup
+from dbbstation.nc.spilled import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
-    from dbbstation.computing.arrays import Integers
     from dbbstation.nc.rs274.plain import PlainLines
 
 MOST_AGAIN = 500_000
@@ -90,6 +91,7 @@ class Flow:
     """Runs a program line by line.
 
     Args:
+        text: as UTF-8, shape (n,).
         outer: value of a parameter of the control; None if undefined.
 
     Attributes:
@@ -97,14 +99,17 @@ class Flow:
     """
 
     def __init__(
-        self, text: str, file: str, outer: Callable[[int | str], float | None], setup: ControlSetup | None = None
+        self,
+        text: NDArray[np.uint8],
+        file: str,
+        outer: Callable[[int | str], float | None],
+        setup: ControlSetup | None = None,
     ) -> None:
         self._outer, self._setup = outer, setup or ControlSetup()
         self._o_lines: dict[int, OLine] = {}
         self._macros: dict[int, OLine] = {}
         self._labels: dict[str, list[OLine]] = {}
-        self._text, self._begins = "", cast("Integers", np.zeros(1, dtype=np.int64))
-        self._window: tuple[int, NDArray[np.uint8]] = -1, letters_of("")
+        self._lines = Lines()
         self.files: tuple[tuple[int, str], ...] = ()
         self._append(text, file)
         self._own_lines = self._count
@@ -116,26 +121,16 @@ class Flow:
         self._entered = 0
         self._ran = 0
 
-    def _append(self, text: str, file: str) -> None:
-        before, behind = self._count, len(self._text)
-        self.files += ((before, file),)
-        self._text += f"{text}\n"
-        letters = letters_of(self._text[behind:])
-        self._begins = np.concatenate([self._begins, behind + 1 + np.flatnonzero(letters == ord("\n"))])
+    def _append(self, text: NDArray[np.uint8], file: str) -> None:
+        self.files += ((self._count, file),)
         # Every word of the flow has one of these letters, and few other lines have one.
-        may = np.flatnonzero(_LETTERS_OF_FLOW[letters]) + behind
-        for at in np.unique(np.searchsorted(self._begins, may, side="right") - 1).tolist():
-            self._take_word(self._line(at), at + 1)
-        self._window = -1, letters_of("")
+        for at, line in self._lines.append(text, _LETTERS_OF_FLOW):
+            self._take_word(line, at + 1)
 
     @property
     def _count(self) -> int:
         """Return the number of lines of all files so far."""
-        return len(self._begins) - 1
-
-    def _line(self, at: int) -> str:
-        """Return a line by its index, from 0."""
-        return self._text[self._begins[at] : self._begins[at + 1] - 1]
+        return len(self._lines)
 
     def _found(self, label: str, keyword: str) -> list[OLine]:
         """Return the begin of a subprogram; if it is in no line, look for its file."""
@@ -145,7 +140,9 @@ class Flow:
                 break
             file, text = self._setup.subprogram(name) or ("", "")
             if file and file not in begun:
-                self._append("\n".join("" if is_percent(line) else line for line in text.split("\n")), file)
+                self._append(
+                    Text.of("\n".join("" if is_percent(line) else line for line in text.split("\n"))).letters, file
+                )
         return [one for one in self._labels.get(label, []) if one.keyword == keyword]
 
     def _place(self, line: int) -> Place:
@@ -158,7 +155,7 @@ class Flow:
         Raises:
             BadLine: an O-word that makes no sense, or the program does not end.
         """
-        last = next((at for at in range(self._own_lines, 0, -1) if self._line(at - 1).strip(BLANKS)), 1) - 1
+        last = next((at for at in range(self._own_lines, 0, -1) if self._lines[at - 1].strip(BLANKS)), 1) - 1
         # Past its last line a file does not go on in the next one.
         while self._next < self._count and not (self._next and any(self._next == at for at, _ in self.files)):
             self._ran += 1
@@ -166,7 +163,7 @@ class Flow:
             if self._ran > self._count + MOST_AGAIN:
                 what = f"its loops and subprograms run more than {MOST_AGAIN} lines: they may never end"
                 raise place.fault(1, what, "check the conditions of its loops")
-            line = self._line(self._next)
+            line = self._lines[self._next]
             self._next += 1
             skipped = _SKIPPED.match(line)
             if skipped is not None and self._setup.block_delete is not None:
@@ -190,12 +187,7 @@ class Flow:
 
     def plain_lines(self) -> PlainLines:
         """Return the content of the plain lines from the last yielded line on."""
-        number, within = divmod(self._next - 1, MOST_LINES)
-        first = number * MOST_LINES
-        if self._window[0] != number:
-            end = self._begins[min(first + MOST_LINES, self._count)]
-            self._window = number, letters_of(self._text[self._begins[first] : end])
-        return plain_lines(self._window[1], int(self._begins[first + within] - self._begins[first]))
+        return plain_lines(*self._lines.letters_from(self._next - 1))
 
     def skip(self, lines: int) -> None:
         """Mark the next lines as run."""
@@ -213,14 +205,14 @@ class Flow:
         Raises:
             BadLine: the closing percent sign is missing.
         """
-        if self.percent and not any(is_percent(self._line(at)) for at in range(self._opening()[1], self._own_lines)):
+        if self.percent and not any(is_percent(self._lines[at]) for at in range(self._opening()[1], self._own_lines)):
             raise BadLine(self.cut_short())
 
     def all_lines(self) -> Iterator[tuple[str, Place]]:
         """Yield all lines without O-words in file order, up to the closing percent sign."""
         begin = self._opening()[1]
         for number in range(begin + 1, self._own_lines + 1):
-            line = self._line(number - 1)
+            line = self._lines[number - 1]
             if self.percent and is_percent(line):
                 return
             if number not in self._o_lines and number not in self._macros:
@@ -275,8 +267,8 @@ class Flow:
 
         A program between percent signs needs no other end. Elsewhere LinuxCNC treats a percent sign as a fault.
         """
-        start = next((at for at in range(self._count) if self._line(at).strip(BLANKS)), 0)
-        return (True, start + 1) if is_percent(self._line(start)) else (False, 0)
+        start = next((at for at in range(self._count) if self._lines[at].strip(BLANKS)), 0)
+        return (True, start + 1) if is_percent(self._lines[start]) else (False, 0)
 
     def cut_short(self) -> Problem:
         """Return the fault of a program without an end."""
@@ -350,7 +342,7 @@ class Flow:
 
     def _numbered(self, number: int, place: Place) -> int:
         """Return the index of the next line with this number; after the last line the search continues at the first [Fanuc, GOTO]."""
-        found = ((line, _NUMBERED.match(self._line(line - 1))) for line in self._program())
+        found = ((line, _NUMBERED.match(self._lines[line - 1])) for line in self._program())
         lines = [line - 1 for line, match in found if match and int(match[1]) == number]
         if not lines:
             raise place.fault(1, f"GOTO {number}: no line has the number N{number}", "add it")

@@ -26,6 +26,8 @@ from dbbstation.nc.toolpath import (
 from dbbstation.nc.words import number
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.rs274.blocks import ProgramBlock
     from dbbstation.nc.rs274.tokens import BadLine, Place, Word
@@ -101,7 +103,7 @@ class Stored(NamedTuple):
 class Modes:
     """Modal state; initially as in LinuxCNC, in millimetres."""
 
-    def __init__(self, text: str, file: str, start: Floats | None, setup: ControlSetup) -> None:
+    def __init__(self, text: NDArray[np.uint8], file: str, start: Floats | None, setup: ControlSetup) -> None:
         self.path = ToolpathBuilder(file, start)
         self.path.ending = Ending.TEXT  # unless a block says otherwise
         self.path.units_said = False

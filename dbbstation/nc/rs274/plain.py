@@ -46,13 +46,8 @@ class PlainLines(NamedTuple):
     axes: Floats
 
 
-def letters_of(text: str) -> NDArray[np.uint8]:
-    """Return a text for `plain_lines`: one byte for each letter, and one byte at the end."""
-    return np.frombuffer(text.encode("latin-1", "replace") + b"\0", dtype=np.uint8)
-
-
 def plain_lines(letters: NDArray[np.uint8], at: int) -> PlainLines:
-    """Return the content of plain lines from a position up to the first line that is not plain."""
+    """Return the content of plain lines from a position up to the first line that is not plain; a zero byte ends the letters."""
     for most in (LEAST_LINES, MOST_LINES):
         head, digits = np.full((most, 2), -1, dtype=np.int64), np.zeros((most, 7), dtype=np.int64)
         decimals = np.full((most, 7), -1, dtype=np.int64)
@@ -138,11 +133,3 @@ def _number(letters: NDArray[np.uint8], at: int) -> tuple[int, int, int]:
                 return -1, 0, 0
         at += 1
     return (at, sign * value, places) if count else (-1, 0, 0)
-
-
-def going_on(values: Floats, before: Floats) -> Floats:
-    """Return modal values, shape (n, k): each NaN gets the value of the row above. `before`, shape (k,), is the row above the first."""
-    known = np.vstack([before, values])
-    at = np.where(np.isnan(known), 0, np.arange(len(known))[:, None])
-    filled: Floats = np.take_along_axis(known, np.maximum.accumulate(at, axis=0), axis=0)[1:]
-    return filled

@@ -12,15 +12,17 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
-from dbbstation.nc.rs274.plain import LEAST_LINES, going_on
+from dbbstation.nc.rs274.plain import LEAST_LINES
 from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup
+from dbbstation.nc.spilled import Text
 from dbbstation.nc.toolpath import (
     MESSAGE,
     Ending,
     RowKind,
     Toolpath,
+    going_on,
 )
 
 if TYPE_CHECKING:
@@ -41,7 +43,9 @@ PAUSE, OPTIONAL_STOP = 0.0, 1.0
 ENDS = frozenset({2.0, 30.0})
 
 
-def read_program(text: str, file: str, *, start: Floats | None = None, setup: ControlSetup | None = None) -> Toolpath:
+def read_program(
+    text: str | Text, file: str, *, start: Floats | None = None, setup: ControlSetup | None = None
+) -> Toolpath:
     """Return the toolpath that a program commands.
 
     Args:
@@ -51,10 +55,7 @@ def read_program(text: str, file: str, *, start: Floats | None = None, setup: Co
     Raises:
         InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
     """
-    text = text.removeprefix("\ufeff")
-    if "\r" in text and "\n" not in text:
-        text = text.replace("\r", "\n")
-    interpreter = _Interpreter(text, file, start, setup or ControlSetup())
+    interpreter = _Interpreter(Text.of(text).lines(), file, start, setup or ControlSetup())
     try:
         interpreter.run_all()
     except BadLine as fault:

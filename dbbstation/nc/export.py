@@ -308,7 +308,7 @@ class _Finished:
     @property
     def is_marked(self) -> bool:
         """Return whether the written poses contain the mark."""
-        return has_marks(self._sums)
+        return has_marks(self._sums.blocks, len(self._sums))
 
 
 def planner_of(machine: Machine, dialect: Dialect) -> Planner:

@@ -18,12 +18,14 @@ from dbbstation.nc.spilled import Spilled
 from dbbstation.nc.toolpath import DECIMALS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.nc.toolpath import Toolpath
+
+    _Blocks = Callable[[], Iterator[NDArray[np.uint64]]]
 
 BITS = {2: 16, 3: 11, 4: 7}
 """Number of zero bits of the hash, by the number of poses that can carry the mark; 4 means four and more. One pose in 2 to this power has the mark by chance. More bits move poses farther."""
@@ -108,30 +110,36 @@ def is_marked(toolpath: Toolpath) -> bool:
         groups = zip(_GROUPS, least, strict=True)
         sums.add(np.column_stack([_sums(_numbers(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups]))
 
-    def sums_with(decimals: Sequence[int]) -> Spilled:
-        found = Spilled(np.uint64)
-        for block in sums.blocks():
-            # A number with few decimals continues with zeros.
-            place = block[:, 0] * np.uint64(10 ** (decimals[0] - least[0]))
-            found.add(place + block[:, 1] * np.uint64(10 ** (decimals[3] - least[1])))
-        return found
+    def sums_with(decimals: Sequence[int]) -> _Blocks:
+        # A number with few decimals continues with zeros.
+        further = np.array([10 ** (decimals[0] - least[0]), 10 ** (decimals[3] - least[1])], np.uint64)
+        return lambda: (block @ further for block in sums.blocks())
 
-    count = _distinct(sums_with(DECIMALS))
-    return any(has_marks(sums_with(decimals), count) for decimals in tried)
+    count = _distinct(sums_with(DECIMALS), len(sums))
+    return any(has_marks(sums_with(decimals), len(sums), count) for decimals in tried)
 
 
-def has_marks(sums: Spilled, count: int | None = None) -> bool:
-    """Return whether more poses are marked than chance explains, from their `sums_of`; `count` is the number of different poses."""
-    count = _distinct(sums) if count is None else count
-    fewest = sorted(BITS.values())
-    shifts = np.append(_SHIFTS, 64 - np.array(fewest, dtype=np.uint64))
-    found = [Spilled(np.uint64) for _ in fewest]
-    for block in sums.blocks():
-        marks = _marks(block, _MIXING, shifts)
-        for fewer, those in enumerate(found):
-            those.add(block[marks > fewer])
-    hits = zip(fewest, map(_distinct, found), strict=True)
-    return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in hits)
+def has_marks(sums: _Blocks, most: int, count: int | None = None) -> bool:
+    """Return whether more poses are marked than chance explains.
+
+    Args:
+        sums: yields `sums_of` successive poses.
+        most: number of poses.
+        count: number of different poses; None: to be counted.
+    """
+    count = _distinct(sums, most) if count is None else count
+    hits = Spilled(np.uint64)
+    for block in sums():
+        hits.add(_with_mark(block, min(BITS.values())))
+    numbers = {
+        bits: _distinct(lambda bits=bits: (_with_mark(block, bits) for block in hits.blocks()), len(hits))  # type: ignore[misc]
+        for bits in BITS.values()
+    }
+    return any(number and float(bdtrc(number - 1, count, 0.5**bits)) < BY_CHANCE for bits, number in numbers.items())
+
+
+def _with_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.uint64]:
+    return sums[_marks(sums, _MIXING, np.append(_SHIFTS, np.uint64(64 - bits)))]
 
 
 def sums_of(toolpath: Toolpath, decimals: Sequence[int]) -> NDArray[np.uint64]:
@@ -148,15 +156,14 @@ SORTED_TOGETHER = 1 << 19
 """Greatest number of sums that are sorted together."""
 
 
-def _distinct(sums: Spilled) -> int:
+def _distinct(sums: _Blocks, most: int) -> int:
     # A sort takes a fifth of the time of NumPy's `unique`, which hashes. Equal sums have equal digits in the middle.
-    shares = 1 << max(len(sums) // SORTED_TOGETHER, 0).bit_length()
+    shares = 1 << (most // SORTED_TOGETHER).bit_length()
     share, middle, count = np.uint64(shares - 1), np.uint64(20), 0
     for number in range(shares):
-        some = [block[(block >> middle) & share == number] for block in sums.blocks()]
-        if some:
-            ordered = np.sort(np.concatenate(some))
-            count += int(np.count_nonzero(np.diff(ordered))) + bool(len(ordered))
+        some = [block[(block >> middle) & share == number] if shares > 1 else block for block in sums()]
+        ordered = np.sort(np.concatenate(some)) if some else np.zeros(0)
+        count += int(np.count_nonzero(np.diff(ordered))) + bool(len(ordered))
     return count
 
 
@@ -213,13 +220,11 @@ def _sums(numbers: Integers, axes: slice = slice(None)) -> NDArray[np.uint64]:
 
 
 @compiled
-def _marks(sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> Integers:
-    """Return how many of the shifts from the fourth on leave zero of each hash, shape (n,)."""
-    found = np.zeros(len(sums), dtype=np.int64)
+def _marks(sums: NDArray[np.uint64], mixing: NDArray[np.uint64], shifts: NDArray[np.uint64]) -> Flags:
+    """Return whether the fourth shift leaves zero of each hash, shape (n,)."""
+    found = np.zeros(len(sums), dtype=np.bool_)
     for row in range(len(sums)):
-        mixed = _mixed(sums[row], mixing, shifts)
-        for shift in shifts[3:]:
-            found[row] += mixed >> shift == 0
+        found[row] = _mixed(sums[row], mixing, shifts) >> shifts[3] == 0
     return found
 
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 IN_MEMORY_BYTES = 4 << 20
 """Size from which an array lies in a file. Programs of 40,000 moves take no more time with half or twice of it."""
 
-BLOCK_BYTES = 1 << 17
-"""Bytes of a text, or of added values, that are handled together: some thousand lines of a program."""
+BLOCK_BYTES = 1 << 18
+"""Bytes that are handled together: of a program, some thousand lines."""
 
 _GROWTH = 1.25
 _LEAST = 64

@@ -177,7 +177,7 @@ def _motion(run: Observation, current_a: Floats) -> Motion:
     raw = replace(run.raw, logged={**run.raw.logged, **currents(current_a)})
     if run.commanded is None and len(raw) > LONG * SECTORS:
         raw = averaged(raw, SECTORS)
-    return replace(run, raw=raw).motion()
+    return replace(run, raw=raw, finer=None).motion()
 
 
 def current_blocks(layout: Layout, channel: CurrentChannel | None, x: Floats) -> list[Block]:

@@ -7,6 +7,7 @@ departures [Kennedy and O'Hagan 2001, sec. 4].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,7 +82,12 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
 
 def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula's inaccuracy."""
-    changes = [run.reading.by_parameters(source.left_open(run.motion, machine, run.values)) for run in runs]
+    changes = [
+        run.reading.by_parameters(
+            run.motion.seen(source, partial(source.left_open, machine=machine, values=run.values), 1)
+        )
+        for run in runs
+    ]
     return np.vstack(changes) / source.form_uncertainty
 
 

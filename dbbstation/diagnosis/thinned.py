@@ -21,6 +21,10 @@ LEAST_SECTORS = BOUNDS.samples_per_turn // 2
 """Least samples per turn for any number of runs; with fewer, noise cannot be estimated far above the low harmonics."""
 
 
+FINER = 4
+"""Most samples per sector at which sharp effects are evaluated: a step's share of a sector is known to an eighth."""
+
+
 def sectors_for(runs: int) -> int:
     """Return the number of samples per turn for a number of runs."""
     return max(min(BOUNDS.samples_per_turn, MOST_SAMPLES // max(runs, 1)), LEAST_SECTORS)
@@ -32,7 +36,12 @@ def thinned(observation: Observation, most: int = BOUNDS.samples_per_turn) -> Ob
     if len(raw) <= most:
         return observation
     sectors = min(most, max(len(raw) // BOUNDS.samples_per_sector, 1))
-    commanded = observation.commanded
+    finer = _averaged(observation, FINER * sectors) if len(raw) > FINER * sectors else observation
+    return replace(_averaged(finer, sectors), finer=(finer, sector_of(finer.raw, sectors)))
+
+
+def _averaged(observation: Observation, sectors: int) -> Observation:
+    raw, commanded = observation.raw, observation.commanded
     if commanded is not None:
         before = len(observation.lead_in_deg)
         commanded = np.vstack([commanded[:before], means(commanded[before:], sector_of(raw, sectors))])

@@ -44,7 +44,7 @@ def expected_circle(
     """
     # A ball set up under the spindle has no independent place, but its circle has a radius.
     setup = replace(observation.setup, place_known=True, set_up_errors=None)
-    sparse = replace(observation, raw=averaged(observation.raw, SECTORS), commanded=None, setup=setup)
+    sparse = replace(observation.with_samples(averaged(observation.raw, SECTORS)), setup=setup)
     motion = sparse.motion()
     identified = known_by if isinstance(known_by, IdentifiedModel) else None
     model = (known_by.model if isinstance(known_by, IdentifiedModel) else known_by).of_the_machine()

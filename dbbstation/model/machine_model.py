@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,7 +73,7 @@ class MachineModel:
             here, machine = motion, self.as_found
             if there is not None and fitted.source.weighs:
                 here, machine = there.seen_by(fitted.source, machine)
-            total += fitted.source.effect(here, machine, fitted.values)
+            total += here.seen(fitted.source, partial(fitted.source.effect, machine=machine, values=fitted.values))
         return total
 
     def acting(self, motion: Motion) -> tuple[Fitted, ...]:
@@ -182,7 +182,7 @@ class Actual:
     @cached_property
     def placed(self) -> Motion:
         """Return the motion at actual platform poses."""
-        return replace(self.motion, poses=self.frames.to_poses(self.hexapod.rotation))
+        return self.motion.moved(self.frames.to_poses(self.hexapod.rotation))
 
     @cached_property
     def machine(self) -> Machine:
@@ -195,7 +195,13 @@ class Actual:
 
     def by(self, fitted: Fitted) -> Effect:
         """Return one source's effect."""
-        return fitted.source.effect(*self.seen_by(fitted.source, self.model.as_found), fitted.values)
+        motion, machine = self.seen_by(fitted.source, self.model.as_found)
+        return motion.seen(fitted.source, partial(fitted.source.effect, machine=machine, values=fitted.values))
+
+    def derivative_of(self, source: ErrorSource, machine: Machine, values: Floats) -> Effect:
+        """Return the derivative of a source's effect, shape (..., p); the source need not be in the model."""
+        motion, machine = self.seen_by(source, machine)
+        return motion.seen(source, partial(source.derivative, machine=machine, values=values), 1)
 
     def derivative(self, fitted: Fitted) -> Effect:
         """Return the effect's derivative by one source's parameters, shape (..., p).
@@ -207,7 +213,7 @@ class Actual:
             ModelError: the source needs missing data.
         """
         source, values, found = fitted.source, fitted.values, self.model.as_found
-        own = source.derivative(*self.seen_by(source, found), values)
+        own = self.derivative_of(source, found, values)
         if source.found_compliance(self.model.machine, values) is None:
             return own
         stretch = Effect()
@@ -250,7 +256,7 @@ class BarReading:
 
         The source need not be in the model.
         """
-        return self._by(lambda actual: source.derivative(*actual.seen_by(source, machine), values))
+        return self._by(lambda actual: actual.derivative_of(source, machine, values))
 
     def by_fitted(self, fitted: Fitted) -> Floats:
         """Return the derivative by a model source's parameters, including its effect on other sources, shape (n, p)."""

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.contract import Motion, Setup
+from dbbstation.sources.contract import FinerMotion, Motion, Setup
 from dbbstation.trace.columns import each, temperatures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.trace.circle import RawCircle
 
 STANDING = 3
@@ -31,6 +31,7 @@ class Observation:
         started_s: after the session's start; None if unknown.
         commanded: commanded poses at lead-in and raw samples; None for the plan's circle.
         stood: pose during the set-up of a ball under the spindle, shape (6,); None for the ball's place.
+        finer: the run whose means over sectors this one has, and its samples' sectors, shape (m,); None for a run as recorded.
     """
 
     test: str
@@ -40,6 +41,11 @@ class Observation:
     started_s: float | None = None
     commanded: Floats | None = None
     stood: Floats | None = None
+    finer: tuple[Observation, Integers] | None = None
+
+    def with_samples(self, raw: RawCircle) -> Observation:
+        """Return the run with other samples of the plan's circle."""
+        return replace(self, raw=raw, commanded=None, finer=None)
 
     @property
     def label(self) -> str:
@@ -78,6 +84,7 @@ class Observation:
             put_up=None if self.setup.place_known else self._standing(None if time is None else time[0]),
             reading_mm=_held_back(raw.length_mm, before),
             reading_is_measured=True,
+            finer=None if self.finer is None else _finer(*self.finer),
         )
 
     @property
@@ -110,3 +117,8 @@ class Motions:
 
 def _held_back(values: Floats, count: int) -> Floats:
     return np.concatenate([np.repeat(values[:1], count, axis=0), values])
+
+
+def _finer(run: Observation, sector: Integers) -> FinerMotion:
+    before = len(run.lead_in_deg)
+    return FinerMotion(run.motion(), np.concatenate([np.arange(before), before + sector]))

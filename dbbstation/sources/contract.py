@@ -27,7 +27,7 @@ from dbbstation.trace.columns import WithLogged
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Compliance, Hexapod, Machine
     from dbbstation.plan.plan import Plate
     from dbbstation.sources.c_form import CForm
@@ -145,6 +145,7 @@ class Motion(WithLogged):
         reading_is_measured: True for noisy readings, False for a model's.
         put_up: resting motion during the set-up under the spindle; the ball is at the tip's actual last place. None for
             a known place.
+        finer: rows whose means this motion's are; None if its rows are samples.
     """
 
     poses: Floats
@@ -158,6 +159,7 @@ class Motion(WithLogged):
     reading_mm: Floats | None = None
     reading_is_measured: bool = False
     put_up: Motion | None = None
+    finer: FinerMotion | None = None
     _known: dict[str, tuple[Hexapod | None, object]] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
@@ -180,9 +182,23 @@ class Motion(WithLogged):
 
     def commanded(self, frames: Frames, machine: Machine) -> Motion:
         """Return the motion with other commanded frames."""
-        motion = replace(self, poses=frames.to_poses(machine.hexapod.rotation))
+        motion = self.moved(frames.to_poses(machine.hexapod.rotation))
         motion._known["frames"] = machine.hexapod, frames  # noqa: SLF001 - of the same class
         return motion
+
+    def moved(self, poses: Floats) -> Motion:
+        """Return the motion at other poses, shape (n, 6) [mm, deg]."""
+        return replace(self, poses=poses, finer=None)
+
+    def seen(self, source: ErrorSource, effect: Callable[[Motion], Effect], parameters: int = 0) -> Effect:
+        """Return a source's effect on this motion: means of its effect on finer rows, if it is sharp.
+
+        Args:
+            parameters: last axes of parameters: 0 for an effect, 1 for a derivative.
+        """
+        if self.finer is None or not source.is_sharp:
+            return effect(self)
+        return effect(self.finer.motion).changed(self.finer.means, parameters)
 
     def stretch(self, rows: slice) -> Motion:
         """Return some rows in time order, all of them kept."""
@@ -200,7 +216,7 @@ class Motion(WithLogged):
     def _of_rows(self, change: Callable[[Floats, str], Floats]) -> Motion:
         changed = {name: change(values, name) for name, values in self._rows().items()}
         logged = {name: changed.pop(name) for name in self.logged}
-        return replace(self, kept=slice(None), logged=logged, put_up=None, **changed)  # type: ignore[arg-type]
+        return replace(self, kept=slice(None), logged=logged, put_up=None, finer=None, **changed)  # type: ignore[arg-type]
 
     @cached_property
     def provides(self) -> frozenset[Need]:
@@ -209,6 +225,27 @@ class Motion(WithLogged):
         given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
         given[Need.READING] = self.reading_mm is not None
         return frozenset(need for need, there in given.items() if there)
+
+
+@dataclass(frozen=True, eq=False)
+class FinerMotion:
+    """Samples of which a motion has means.
+
+    A step within a row's samples changes their mean by a share of the step, and a wave's mean is smaller than the wave.
+
+    Attributes:
+        row: each sample's row, from 0 without gaps, shape (m,).
+    """
+
+    motion: Motion
+    row: Integers
+
+    def means(self, samples: Floats) -> Floats:
+        """Return each row's mean of samples, shape (m, ...)."""
+        order = np.argsort(self.row, kind="stable")
+        count = np.bincount(self.row)
+        first = np.cumsum(count) - count
+        return np.add.reduceat(samples[order], first, axis=0) / count.reshape(-1, *[1] * (samples.ndim - 1))
 
 
 def of_each_strut(
@@ -257,10 +294,14 @@ class Effect:
 
     def rows(self, rows: slice) -> Effect:
         """Return the effect in some rows."""
+        return self.changed(lambda array: array[rows])
+
+    def changed(self, of_samples: Callable[[Floats], Floats], parameters: int = 0) -> Effect:
+        """Return the effect with other samples; parts without samples stay."""
         taken = {}
         for name, axes in EFFECT_SHAPES.items():
             array = getattr(self, name)
-            taken[name] = array[rows] if array is not None and np.ndim(array) > len(axes) else array
+            taken[name] = of_samples(array) if array is not None and np.ndim(array) > len(axes) + parameters else array
         return Effect(**taken)
 
     def last(self, count: int) -> Effect:
@@ -344,6 +385,12 @@ class ErrorSource(ABC):
         Raises:
             ModelError: the machine file lacks an input, such as masses.
         """
+
+    @property
+    def is_sharp(self) -> bool:
+        """Return whether its effect has steps at reversals, or short waves of the machine or the bar."""
+        has_waves = self.belongs_to in {Owner.MACHINE, Owner.INSTRUMENT} and self.detail_mm < SMOOTH_MM
+        return Need.PATH in self.needs or has_waves
 
     @abstractmethod
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:

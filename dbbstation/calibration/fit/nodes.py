@@ -135,7 +135,7 @@ def nodes_of(run: Observation) -> RunNodes | None:
         triangle[begin : begin + AT_ONCE] = np.linalg.qr(system, mode="r")
     return RunNodes(
         run=run,
-        coarse=replace(run, raw=nodes),
+        coarse=replace(run, raw=nodes, finer=None),
         roots=np.ascontiguousarray(triangle[:, :-1, :-1]),
         seen=np.ascontiguousarray(triangle[:, :-1, -1]),
         unseen=float(np.linalg.norm(triangle[:, -1, -1])),

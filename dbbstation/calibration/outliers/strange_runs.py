@@ -127,7 +127,7 @@ def _looks_like(
     for other in others:
         if other.raw.circle == run.raw.circle or other.raw.circle.bar_mm != run.raw.circle.bar_mm:
             continue
-        there = replace(other, raw=replace(run.raw, circle=other.raw.circle), commanded=None)
+        there = other.with_samples(replace(run.raw, circle=other.raw.circle))
         left = run.raw.length_mm - calibration.model.bar(there.motion()).length_mm
         rest = rms_um(without_shift(there, left))
         if rest < best:

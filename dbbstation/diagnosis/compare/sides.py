@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -111,4 +111,4 @@ class Sides:
 
 def _thinned(run: Observation, pair: Pair) -> Observation:
     raw, most = run.raw, BOUNDS.samples_of_angle * len(pair.theta_deg)
-    return replace(run, raw=averaged(raw, most) if len(raw) > most else raw, commanded=None)
+    return run.with_samples(averaged(raw, most) if len(raw) > most else raw)

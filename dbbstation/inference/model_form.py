@@ -18,15 +18,18 @@ if TYPE_CHECKING:
 DEGREE = 3
 """Degree of the modulating polynomials: four functions over the range of a variable."""
 
+OF_FRICTION = 8
+"""Their degree for friction and wear, which vary over some tens of millimetres of a screw: nine functions over its range."""
+
 LATER = 2.0
 """Possible delay of a transit after a reversal, in samples: a degree of the turn."""
 
 
-def bernstein(values: Floats, low: float, high: float) -> Floats:
+def bernstein(values: Floats, low: float, high: float, degree: int = DEGREE) -> Floats:
     """Return Bernstein polynomials over a range, shape (..., degree + 1), summing to one [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]."""
     share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
-    k = np.arange(DEGREE + 1)
-    return comb(DEGREE, k) * share**k * (1.0 - share) ** (DEGREE - k)
+    k = np.arange(degree + 1)
+    return comb(degree, k) * share**k * (1.0 - share) ** (degree - k)
 
 
 def modulated(
@@ -37,8 +40,9 @@ def modulated(
     """Return effects of m actuators times smooth functions, over all runs, shape (n, q).
 
     Args:
-        signs: directions of travel per run, shape (n, m); None if irrelevant.
+        signs: directions of travel per run, shape (n, m), of friction and wear; None for other effects.
     """
+    degree = DEGREE if signs is None else OF_FRICTION
     effect, values = np.vstack(effects), np.vstack(along)
     ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
     found = []
@@ -46,7 +50,7 @@ def modulated(
         own, at = effect[:, mover], values[:, mover]
         if not own.any():
             continue
-        functions = bernstein(at, float(at.min()), float(at.max()))
+        functions = bernstein(at, float(at.min()), float(at.max()), degree)
         found += [functions * (own * way[:, mover])[:, None] for way in ways]
         if signs is not None:
             found.append(_other_transits(effects, signs, mover))

@@ -111,13 +111,14 @@ class ReversalSpike(ErrorSource):
         return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
-        """Return changes of the effect if each strut has its own decay constant, and if spikes rise abruptly."""
+        """Return changes of the effect if each strut has its own decay constant, and if its spikes of a direction rise abruptly."""
         since, fading = self._since(motion, machine)
         height, constant = _sizes(values)
         at_once = -np.sign(since) * height * np.exp(-((fading / constant) ** self._power))
         risen = at_once - self._along(motion, machine, values)[0]
         lengths = of_own_lengths(self, motion, machine, values).strut_mm
-        return Effect(strut_mm=np.concatenate([np.asarray(lengths), risen[:, :, None]], axis=2))
+        ways = [of_own_strut(risen * (way * since > 0.0)) for way in (1.0, -1.0)]
+        return Effect(strut_mm=np.concatenate([np.asarray(lengths), *ways], axis=2))
 
     def _along(self, motion: Motion, machine: Machine, values: Floats) -> tuple[Floats, Floats, Floats]:
         self.require(motion)

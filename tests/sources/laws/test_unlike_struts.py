@@ -71,6 +71,10 @@ def test_a_strut_that_is_behind_at_once(reference):
     motion = run((100, 100, -1150), (-10, 10), step_deg=0.5)
     travel = inverse(reference.hexapod, Frames.from_poses(motion.poses, reference.hexapod.rotation)).length_mm
     way, sense = np.abs(since_turning(travel)), np.sign(since_turning(travel))
-    at_once = ReversalSpike().left_open(motion, reference, np.array([*[WIDTH_UM] * 6, LENGTH_MM])).strut_mm[:, :, 6]
+    every = ReversalSpike().left_open(motion, reference, np.array([*[WIDTH_UM] * 6, LENGTH_MM])).strut_mm[:, :, 6:]
     expected = sense * (-WIDTH_UM * np.exp(-np.sqrt(way / LENGTH_MM)) - spike_um(way, LENGTH_MM))
-    assert np.allclose(1e3 * at_once, expected, atol=1e-9)
+    growing, shrinking = every[:, :, :6], every[:, :, 6:]
+    for strut in range(6):
+        for columns, own in ((growing, sense > 0.0), (shrinking, sense < 0.0)):
+            assert np.allclose(1e3 * columns[:, strut, strut], (expected * own)[:, strut], atol=1e-9)
+            assert not np.delete(columns[:, :, strut], strut, axis=1).any()

@@ -71,6 +71,7 @@ class CircleChannel:
         for key, source in self.sources.items():
             self._laid[key] = self._on_a_grid(source)
         self._refined: dict[tuple[str, str], tuple[Variant, ...]] = {}
+        self._refined_anew: set[tuple[str, str]] = set()
         self._former: list[Variant] = []
         self._last: tuple[Calibration, list[BarReading]] = calibration, self.readings
 
@@ -194,7 +195,12 @@ class CircleChannel:
 
     def refine(self, name: str, law: str, values: Mapping[str, Floats], fit: Calibration) -> None:
         """Add columns of a cause at parameter values, with tangents and slack."""
-        source = self.sources[name, law]
+        source, replaced = self.sources[name, law], self._refined.pop((name, law), ())
+        if (name, law) in self._refined_anew:
+            self._free(replaced)  # no comparison has used them
+        else:
+            self._former += replaced
+        self._refined_anew.add((name, law))
         readings = self._readings_about(fit)
         parameters = source.parameters(self.machine)
         shaped, shapes = is_shape(source, self.machine), [p for p in parameters if p.grid]
@@ -220,7 +226,6 @@ class CircleChannel:
         # A tangent covers about 2.5 grid points of a nonlinear parameter.
         covered = [len(p.grid) / (1.0 if p.listed else 2.5) for p in shapes]
         weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
-        self._former += self._refined.get((name, law), ())
         self._refined[name, law] = tuple(
             replace(
                 variant,
@@ -237,10 +242,14 @@ class CircleChannel:
         return [variables(motion, self.machine) for motion in self.motions]
 
     def give_back(self) -> None:
-        """Free the columns of replaced forms."""
+        """Free the columns of forms that were replaced after the last comparison."""
         former, self._former = self._former, []
-        if former:
-            columns = [part for one in former for part in (one.columns, one.slack, one.whole)]
+        self._refined_anew.clear()
+        self._free(former)
+
+    def _free(self, forms: Sequence[Variant]) -> None:
+        if forms:
+            columns = [part for one in forms for part in (one.columns, one.slack, one.whole)]
             self.columns.give_back(np.unique(np.concatenate(columns)))
 
     def _readings_about(self, fit: Calibration) -> list[BarReading]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.parts import is_shape
-from dbbstation.inference.model_form import modulated
+from dbbstation.inference.model_form import ALONG_SCREWS, DEGREE, modulated
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
@@ -74,7 +74,8 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
         along.append([values[motion.kept] for values in _followed_by_strut(source, known, motion, machine)])
         if source.varies_with in BY_DIRECTION:
             signs.append(known["strut-speed-sign"][motion.kept])
-    by_variable = [modulated(effects, one, signs or None) for one in zip(*along, strict=True)]
+    degree = ALONG_SCREWS if source.varies_with == "strut-speed-sign" else DEGREE
+    by_variable = [modulated(effects, one, signs or None, degree) for one in zip(*along, strict=True)]
     # The variables share the formula's inaccuracy.
     columns = np.hstack(by_variable) / np.sqrt(len(by_variable))
     return np.hstack([columns, _other_stages(source, machine, runs), _left_open(source, machine, runs)])

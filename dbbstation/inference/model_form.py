@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 DEGREE = 3
 """Degree of the modulating polynomials: four functions over the range of a variable."""
 
-OF_FRICTION = 8
-"""Their degree for friction and wear, which vary over some tens of millimetres of a screw: nine functions over its range."""
+ALONG_SCREWS = 8
+"""Their degree for friction and wear of screws, which vary over some tens of millimetres: nine functions over the range."""
 
 LATER = 2.0
 """Possible delay of a transit after a reversal, in samples: a degree of the turn."""
@@ -36,13 +36,13 @@ def modulated(
     effects: Sequence[Floats],
     along: Sequence[Floats],
     signs: Sequence[Floats] | None,
+    degree: int = DEGREE,
 ) -> Floats:
     """Return effects of m actuators times smooth functions, over all runs, shape (n, q).
 
     Args:
-        signs: directions of travel per run, shape (n, m), of friction and wear; None for other effects.
+        signs: directions of travel per run, shape (n, m); None if irrelevant.
     """
-    degree = DEGREE if signs is None else OF_FRICTION
     effect, values = np.vstack(effects), np.vstack(along)
     ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
     found = []

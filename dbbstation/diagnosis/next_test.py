@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from dbbstation.sources.contract import Need
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.explained import Explained
     from dbbstation.diagnosis.findings import SourceFinding
@@ -96,17 +96,16 @@ def propose(
     covariance = solve(blocks, known, noise_mm, channel.held).covariance
     own = slice(first, first + len(variant.columns))
 
-    def seen(proposal: Proposal, runs: slice) -> Floats:
-        directions = tuple(Direction)[runs]
-        return np.vstack([could_be.rows(proposal, direction, asked) for direction in directions])
+    def seen(proposal: Proposal, runs: slice) -> _Rows:
+        return _stacked([could_be.rows(proposal, direction, asked) for direction in tuple(Direction)[runs]])
 
-    def left(rows: Floats) -> float:
+    def left(rows: _Rows) -> float:
         return _size(_told(covariance, rows, noise_mm, own), variant)
 
     proposals = could_be.that_show(frozenset[Need]().union(*(s.needs for s, _ in asked)))
     # One direction suffices to select the tests for closer evaluation.
     one_way = {k: seen(proposal, slice(1)) for k, proposal in enumerate(proposals)}
-    both_ways: dict[int, Floats] = {}
+    both_ways: dict[int, _Rows] = {}
     chosen: list[Proposal] = []
     sigmas = [_sigmas(covariance[own, own], variant)]
     for _ in range(min(most, len(one_way))):
@@ -128,10 +127,26 @@ def propose(
     return ()
 
 
-def _told(covariance: Floats, rows: Floats, noise_mm: float, own: slice) -> Floats:
+_Rows: TypeAlias = tuple["Integers", "Floats"]
+"""Columns of base and sources, shape (q,), and rows over them, (r, q)."""
+
+
+def _stacked(several: Sequence[_Rows]) -> _Rows:
+    columns = np.unique(np.concatenate([own for own, _ in several]))
+    stacked = []
+    for own, rows in several:
+        wide = np.zeros((len(rows), len(columns)))
+        wide[:, np.searchsorted(columns, own)] = rows
+        stacked.append(wide)
+    return columns, np.vstack(stacked)
+
+
+def _told(covariance: Floats, shown: _Rows, noise_mm: float, own: slice) -> Floats:
+    columns, rows = shown
     seen = np.flatnonzero(rows.any(axis=0))
-    gain = rows[:, seen] @ covariance[seen, own]
-    answer = rows[:, seen] @ covariance[np.ix_(seen, seen)] @ rows[:, seen].T + noise_mm**2 * np.eye(len(rows))
+    columns, rows = columns[seen], rows[:, seen]
+    gain = rows @ covariance[columns, own]
+    answer = rows @ covariance[np.ix_(columns, columns)] @ rows.T + noise_mm**2 * np.eye(len(rows))
     return covariance[own, own] - gain.T @ np.linalg.solve(answer, gain)
 
 

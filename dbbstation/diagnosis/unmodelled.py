@@ -60,8 +60,10 @@ class Unmodelled:
         own = channel.columns
         base = (np.hstack([own.base[rows], own.samples[rows][:, all_columns(members)]]) for rows in channel.runs)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
-        look = TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
-        found = looked_for(look, ranges(self.runs))
+        # The scan has a copy of the base, which no effect that is added needs.
+        found = looked_for(
+            TemplateScan(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm), ranges(self.runs)
+        )
         self._forget(self._looked_for - {member.name for member in best})
         before = set(self.follows)
         self._add(found)
@@ -86,8 +88,10 @@ class Unmodelled:
         more = [shape for family in families.values() for shape in family]
         if not more:
             return
-        pieces = [np.hstack([shape.columns(run) for shape in more]) for run in self.runs]
-        columns = self.channel.columns.add(np.vstack(pieces))
+        samples = np.empty((self.channel.runs[-1].stop, sum(shape.columns(self.runs[0]).shape[1] for shape in more)))
+        for rows, run in zip(self.channel.runs, self.runs, strict=True):
+            np.concatenate([shape.columns(run) for shape in more], axis=1, out=samples[rows])
+        columns = self.channel.columns.add(samples)
         for name, family in families.items():
             counts = np.cumsum([shape.columns(self.runs[0]).shape[1] for shape in family])
             own, columns = np.split(columns[: counts[-1]], counts[:-1]), columns[counts[-1] :]

@@ -15,7 +15,7 @@ from scipy.special import bdtrc
 
 from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.nc.spilled import Spilled
-from dbbstation.nc.toolpath import DECIMALS
+from dbbstation.nc.toolpath import DECIMALS, in_last_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -79,7 +79,7 @@ def marked(
     moves = np.flatnonzero(toolpath.is_move & (toolpath.unknown == 0))
     if not len(moves):
         return toolpath
-    numbers = _numbers(toolpath.numbers_written[moves], decimals)
+    numbers = in_last_decimals(toolpath.numbers_written[moves], decimals)
     free = _free(toolpath, moves, decimals)
     free[-1] &= not goes_on
     can = np.flatnonzero(free.any(axis=1))
@@ -108,7 +108,9 @@ def is_marked(toolpath: Toolpath) -> bool:
     sums = Spilled((np.uint64, 2))
     for numbers in _known(toolpath):
         groups = zip(_GROUPS, least, strict=True)
-        sums.add(np.column_stack([_sums(_numbers(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups]))
+        sums.add(
+            np.column_stack([_sums(in_last_decimals(numbers[:, axes], (n,) * 3), axes) for (axes, _), n in groups])
+        )
 
     def sums_with(decimals: Sequence[int]) -> _Blocks:
         # A number with few decimals continues with zeros.
@@ -144,7 +146,7 @@ def _with_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.uint64]:
 
 def sums_of(toolpath: Toolpath, decimals: Sequence[int]) -> NDArray[np.uint64]:
     """Return a sum of each pose's numbers that identifies the pose, shape (k,)."""
-    return np.concatenate([_sums(_numbers(each, decimals)) for each in _known(toolpath)])
+    return np.concatenate([_sums(in_last_decimals(each, decimals)) for each in _known(toolpath)])
 
 
 def _known(toolpath: Toolpath) -> Iterator[Floats]:
@@ -207,11 +209,6 @@ def _first_marked(
                 chosen[row] = step
                 break
     return chosen
-
-
-def _numbers(poses: Floats, decimals: Sequence[int]) -> Integers:
-    numbers: Integers = np.rint(poses * 10.0 ** np.array(decimals)).astype(np.int64)
-    return numbers
 
 
 def _sums(numbers: Integers, axes: slice = slice(None)) -> NDArray[np.uint64]:

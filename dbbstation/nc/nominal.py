@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import already_compensated, plain, says_compensated
 from dbbstation.nc.mark import decimals_of, is_marked
-from dbbstation.nc.toolpath import DECIMALS, RowKind
+from dbbstation.nc.toolpath import DECIMALS, RowKind, in_last_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -32,14 +32,14 @@ class ProgramChecksum:
     """
 
     def __init__(self, decimals: Sequence[int] = DECIMALS) -> None:
-        self._scale = 10.0 ** np.array(decimals)
+        self._decimals = decimals
         self._kinds, self._poses, self._dwells = hashlib.sha256(), hashlib.sha256(), hashlib.sha256()
 
     def add(self, part: Toolpath) -> None:
         """Count the next rows."""
         told = np.isin(part.kind, [RowKind.RAPID, RowKind.FEED, RowKind.DWELL, RowKind.PAUSE])
         counts = part.is_move & (part.unknown == 0)
-        poses = np.where(counts[:, None], np.rint(part.numbers_written * self._scale), 0.0)
+        poses = np.where(counts[:, None], in_last_decimals(part.numbers_written, self._decimals), 0)
         self._kinds.update(part.kind[told].astype("<i1").tobytes())
         self._poses.update(poses[told].astype("<i8").tobytes())
         self._dwells.update("".join(f"{seconds:.6e} " for seconds in part.dwell_s[part.dwell_s != 0.0]).encode())

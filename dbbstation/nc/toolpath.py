@@ -563,9 +563,14 @@ def in_pieces(pieces: Integers) -> tuple[Integers, Floats]:
     return row, number / pieces[row]
 
 
+def in_last_decimals(numbers: Floats, decimals: Sequence[int]) -> Integers:
+    """Return numbers, shape (n, k), in units of their last decimals, of which each column has its own."""
+    return np.rint(numbers * 10.0 ** np.array(decimals)).astype(np.int64)
+
+
 def rounded(poses: Floats, decimals: Sequence[int] = DECIMALS) -> Floats:
     """Return poses, shape (n, 6), rounded to the decimals of programs, without -0."""
-    return np.column_stack([np.round(poses[:, axis], places) for axis, places in enumerate(decimals)]) + 0.0
+    return in_last_decimals(poses, decimals) / 10.0 ** np.array(decimals)
 
 
 def lengths(vectors: Floats) -> Floats:

@@ -15,7 +15,7 @@ from dbbstation.errors import StationError
 from dbbstation.machine.compiled import compiled
 from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.spilled import Text
-from dbbstation.nc.toolpath import RowKind, rounded
+from dbbstation.nc.toolpath import RowKind, in_last_decimals, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -282,7 +282,7 @@ class WordDialect(Dialect):
         return written(text)
 
     def _words(self, toolpath: Toolpath, changed: Flags) -> list[str]:
-        numbers = np.rint(toolpath.numbers_written * 10.0 ** np.array(self.decimals)).astype(np.int64)
+        numbers = in_last_decimals(toolpath.numbers_written, self.decimals)
         names = [f" {word}".encode() for word in self.axis_words]
         ends = np.cumsum([0, *map(len, names)])
         letters = np.empty(len(numbers) * (int(ends[-1]) + len(names) * MOST_LETTERS + 1), dtype=np.uint8)

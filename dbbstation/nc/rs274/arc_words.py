@@ -104,6 +104,6 @@ def _turns(block: ProgramBlock) -> int:
     word = block.words.pop("P", None)
     if word is None:
         return 1
-    if word.value < 1.0 or word.value != int(word.value):
+    if not word.counts(1.0):
         raise block.fault(f"P{word.value:g} is not a number of turns", "give a whole number from 1", word)
     return int(word.value)

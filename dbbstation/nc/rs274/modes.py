@@ -201,12 +201,12 @@ class Modes:
         speed, tool = block.words.get("S"), block.words.get("T")
         if speed is not None and speed.value < 0.0:
             raise block.fault(f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4", speed)
-        if tool is not None and (tool.value < 0.0 or tool.value != int(tool.value)):
+        if tool is not None and not tool.counts(0.0):
             raise block.fault(f"T{tool.value:g} is no tool", "give a whole number", tool)
         change, number_set = block.codes.get(ModalGroup.TOOL), None
         if change is not None and change.value == SET_TOOL:
             number_set = block.words.pop("Q", None)
-            if number_set is None or number_set.value < 0.0 or number_set.value != int(number_set.value):
+            if number_set is None or not number_set.counts(0.0):
                 raise block.fault("M61 needs Q", "give the number of the tool", change)
         said = [block.words.pop("T", None), change, number_set]
         said += [block.codes.get(ModalGroup.SPEED), block.words.pop("S", None)]

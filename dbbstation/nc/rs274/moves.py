@@ -33,7 +33,7 @@ from dbbstation.nc.rs274.modes import ARCS, CLOCKWISE, LINEAR, MACHINE, POLAR, R
 
 MOST_ROWS = 4_000_000
 """Greatest number of moves and stops after arcs are divided into chords: 1000 full turns of 150 mm, or a path of 200 m in
-steps of 0.05 mm. Rows take 0.4 GB, and the program 0.3 kB a row while it is compensated."""
+steps of 0.05 mm. Rows take 0.4 GB of a temporary file."""
 
 FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
 """Largest coordinates that increments may reach, equal to the largest numbers of a program."""

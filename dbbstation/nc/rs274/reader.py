@@ -39,6 +39,8 @@ MOST_FAULTS = 20
 
 NO_END = "the program ends without M2, M30 or %: check that it is whole"
 
+AXES_ALONE = frozenset(AXES)
+
 PAUSE, OPTIONAL_STOP = 0.0, 1.0
 ENDS = frozenset({2.0, 30.0})
 
@@ -196,7 +198,7 @@ class _Interpreter(Moves):
             self.path.numbers = (*self.path.numbers[:1], int(block.words.pop("N").value))
         if block.comments or block.message:
             self._said(block)
-        if block.codes or self._per_move or len(block.words) > _moved(block):
+        if block.codes or self._per_move or block.words.keys() - AXES_ALONE:
             self._units(block)
             self._feed(block)
             self._shared_words(block)
@@ -313,7 +315,3 @@ class _Interpreter(Moves):
         for letter, word in block.words.items():
             what = f"nothing in this line uses {letter}{word.value:g}"
             raise block.fault(what, "remove it, or give the code that it belongs to", word)
-
-
-def _moved(block: ProgramBlock) -> int:
-    return sum(letter in AXES for letter in block.words)

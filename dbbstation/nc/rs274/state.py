@@ -79,11 +79,9 @@ class ControlState:
             raise block.fault("G10 with a rotation (R)", "post the program without rotation", turned)
         system = int(which.value) or self.system
         before, offset = self.offset_of(system), list(self.offset_of(system))
-        for axis, letter in enumerate(AXES):
-            value = self._taken(block, axis, letter)
-            if value is not None:
-                beside = self.g92[axis] + self.length[axis]
-                offset[axis] = value if kind.value == 2.0 else self._known(axis, block, word) - beside - value  # noqa: PLR2004
+        for axis, value in self._taken(block):
+            beside = self.g92[axis] + self.length[axis]
+            offset[axis] = value if kind.value == 2.0 else self._known(axis, block, word) - beside - value  # noqa: PLR2004
         self._systems[system] = tuple(offset)
         self._counted()
         words = " ".join(f"{letter}{digits(value)}" for letter, value in zip(AXES, offset, strict=True))
@@ -91,14 +89,12 @@ class ControlState:
 
     def _set_tool(self, block: ProgramBlock) -> str:
         word, which, radius = block.words.pop("L"), block.words.pop("P", None), block.words.pop("R", None)
-        if which is None or which.value < 1.0 or which.value != int(which.value):
+        if which is None or not which.counts(1.0):
             raise block.fault("G10 L1 without the number of a tool", "give P, a whole number from 1", word)
         tool, said = int(which.value), f"G10 L1 P{which.value:g}"
         length = list(self.lengths.get(tool, ZERO))
-        for axis, letter in enumerate(AXES):
-            value = self._taken(block, axis, letter)
-            if value is not None:
-                length[axis], said = value, f"{said} {letter}{digits(value)}"
+        for axis, value in self._taken(block):
+            length[axis], said = value, f"{said} {AXES[axis]}{digits(value)}"
         self.lengths[tool] = tuple(length)
         if radius is not None:
             self.diameters[tool], said = (
@@ -113,11 +109,9 @@ class ControlState:
         word, shift = block.codes[ModalGroup.ONCE], list(self.g92)
         if code in {52.0, 92.0} and block.words.keys().isdisjoint(AXES):
             raise block.fault(f"{name('G', code)} without axes", "give the axes that it sets", word)
-        for axis, letter in enumerate(AXES):
-            value = self._taken(block, axis, letter) if code in {52.0, 92.0} else None
-            if value is not None:
-                beside = self.offset_of(self.system)[axis] + self.length[axis]
-                shift[axis] = value if code == 52.0 else self._known(axis, block, word) - beside - value  # noqa: PLR2004
+        for axis, value in self._taken(block) if code in {52.0, 92.0} else ():
+            beside = self.offset_of(self.system)[axis] + self.length[axis]
+            shift[axis] = value if code == 52.0 else self._known(axis, block, word) - beside - value  # noqa: PLR2004
         if code in {92.1, 92.2}:
             self._suspended = self.g92 if code == 92.2 else ZERO  # noqa: PLR2004
             self.g92 = ZERO
@@ -181,9 +175,9 @@ class ControlState:
         place = float(self.pose[axis]) - self.offset[axis]
         return None if np.isnan(place) else place / (self.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
 
-    def _taken(self, block: ProgramBlock, axis: int, letter: str) -> float | None:
-        word = block.words.pop(letter, None)
-        return None if word is None else word.value * (self.unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
+    def _taken(self, block: ProgramBlock) -> list[tuple[int, float]]:
+        words = [(axis, block.words.pop(letter, None)) for axis, letter in enumerate(AXES)]
+        return [(axis, word.value * (self.unit_mm if axis < 3 else 1.0)) for axis, word in words if word]  # noqa: PLR2004
 
     def _known(self, axis: int, block: ProgramBlock, word: Word) -> float:
         if np.isnan(self.pose[axis]):

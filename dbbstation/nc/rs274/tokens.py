@@ -49,6 +49,10 @@ class Word(NamedTuple):
     value: float
     column: int
 
+    def counts(self, least: float) -> bool:
+        """Return whether the number is a whole one from `least` on."""
+        return self.value >= least and self.value == int(self.value)
+
 
 class ParameterSetting(NamedTuple):
     """A parameter, by number or lower-case name, and its value after the line."""

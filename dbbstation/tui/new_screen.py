@@ -17,7 +17,7 @@ from dbbstation.tui.questions import ChooseQuestion, TypeQuestion
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from textual.binding import BindingType
     from textual.widgets import OptionList
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.tui.row_screen import StationDesk
 
 _Kind = TypeVar("_Kind", Order, Gate)
+_Value = TypeVar("_Value")
 
 ROWS = tuple(SetUpPart)
 _OF_LINE = (SetUpPart.INSTRUMENT, SetUpPart.PORT)
@@ -109,89 +110,74 @@ class NewScreen(RowScreen):
         return frozenset(ROWS) - frozenset(_OF_LINE) if self.choice.goes_on else frozenset()
 
     def _choose_file(self, part: SetUpPart) -> None:
-        files = self._front.files(part)
-        labels = [*(f"{path.name:28} {path.parent}" for path in files), texts.TYPE_ANOTHER]
         now = getattr(self.choice, _FIELDS[part])
-
-        def answered(at: int | None) -> None:
-            if at is None:
-                return
-            if at < len(files):
-                self._take(**{_FIELDS[part]: files[at]})
-            else:
-                self._type(part, str(now or ""), lambda text: self._typed(part, text))
-
-        self._ask(part, labels, files.index(now) if now in files else 0, answered)
+        another = {texts.TYPE_ANOTHER: lambda: self._type(part, str(now or ""), lambda text: self._typed(part, text))}
+        self._choose(part, self._files(part), now, lambda path: self._take(**{_FIELDS[part]: path}), another)
 
     def _choose_bar(self) -> None:
-        files = self._front.files(SetUpPart.BAR)
-        labels = [*(f"{path.name:28} {path.parent}" for path in files), texts.MEASURE_BAR, texts.TYPE_REASON]
+        part, waiver = SetUpPart.BAR, self.choice.bar_waiver
+        others = {
+            texts.MEASURE_BAR: self._measure_bar,
+            texts.TYPE_REASON: lambda: self._type(part, waiver, lambda why: self._take(bar=None, bar_waiver=why)),
+        }
+        self._choose(part, self._files(part), None, self._take_bar, others)
 
-        def answered(at: int | None) -> None:
-            if at is None:
-                return
-            if at < len(files):
-                self._take(bar=files[at], bar_waiver="")
-            elif at == len(files):
-                self._measure_bar()
-            else:
-                self._type(SetUpPart.BAR, self.choice.bar_waiver, lambda text: self._take(bar=None, bar_waiver=text))
+    def _files(self, part: SetUpPart) -> dict[str, Path]:
+        return {f"{path.name:28} {path.parent}": path for path in self._front.files(part)}
 
-        self._ask(SetUpPart.BAR, labels, 0, answered)
+    def _take_bar(self, path: Path) -> None:
+        self._take(bar=path, bar_waiver="")
 
     def _measure_bar(self) -> None:
         line = self.choice.line
         if not line.instrument or not line.port:
             self._show()
             return
-        screen = BarScreen(self._front, line, lambda path: self._take(bar=path, bar_waiver=""))
-        self.app.push_screen(screen)
+        self.app.push_screen(BarScreen(self._front, line, self._take_bar))
 
     def _choose_instrument(self) -> None:
-        choices = self._front.instruments()
-        labels = [f"{name:26} {profile or texts.NO_PROFILE}" for name, profile in choices]
+        known = {
+            f"{name:26} {profile or texts.NO_PROFILE}": (name, profile) for name, profile in self._front.instruments()
+        }
         now = (self.choice.line.instrument, self.choice.line.profile)
+        another = {texts.TYPE_ANOTHER: lambda: self._type(SetUpPart.INSTRUMENT, "", lambda text: take((text, "")))}
 
-        def answered(at: int | None) -> None:
-            if at is None:
-                return
-            if at < len(choices):
-                name, profile = choices[at]
-                self._line(instrument=name, profile=profile, zero_mm=None)
-            else:
-                self._type(SetUpPart.INSTRUMENT, "", lambda text: self._line(instrument=text, profile="", zero_mm=None))
+        def take(chosen: tuple[str, str]) -> None:
+            self._line(instrument=chosen[0], profile=chosen[1], zero_mm=None)
 
-        self._ask(
-            SetUpPart.INSTRUMENT, [*labels, texts.TYPE_ANOTHER], choices.index(now) if now in choices else 0, answered
-        )
+        self._choose(SetUpPart.INSTRUMENT, known, now, take, another)
 
     def _choose_port(self) -> None:
-        found = self._front.ports()
-        names = [name for name, _ in found]
-        labels = [*(f"{name:34} {description}" for name, description in found), texts.TYPE_ANOTHER]
+        line = self.choice.line
+        ports = {f"{name:34} {description}": name for name, description in self._front.ports()}
+        another = {texts.TYPE_ANOTHER: lambda: self._type(SetUpPart.PORT, line.port, self._take_port)}
+        self._choose(SetUpPart.PORT, ports, line.port, self._take_port, another)
 
-        def answered(at: int | None) -> None:
-            if at is None:
-                return
-            if at < len(names):
-                self._line(port=names[at], baud=self.choice.line.baud)
-                self.action_probe()
-            else:
-                self._type(SetUpPart.PORT, self.choice.line.port, self._port_typed)
-
-        self._ask(
-            SetUpPart.PORT,
-            labels,
-            names.index(self.choice.line.port) if self.choice.line.port in names else 0,
-            answered,
-        )
-
-    def _port_typed(self, port: str) -> None:
+    def _take_port(self, port: str) -> None:
         self._line(port=port)
         self.action_probe()
 
-    def _ask(self, part: SetUpPart, labels: list[str], at: int, then: Callable[[int | None], None]) -> None:
-        self.app.push_screen(ChooseQuestion(texts.CHOOSE_TITLE.format(part=texts.PARTS[part]), labels, at), then)
+    def _choose(
+        self,
+        part: SetUpPart,
+        values: Mapping[str, _Value],
+        now: _Value | None,
+        take: Callable[[_Value], None],
+        others: Mapping[str, Callable[[], None]],
+    ) -> None:
+        found = list(values.values())
+
+        def answered(at: int | None) -> None:
+            if at is None:
+                return
+            if at < len(found):
+                take(found[at])
+            else:
+                list(others.values())[at - len(found)]()
+
+        at = found.index(now) if now in found else 0
+        title = texts.CHOOSE_TITLE.format(part=texts.PARTS[part])
+        self.app.push_screen(ChooseQuestion(title, [*values, *others], at), answered)
 
     def _type(self, part: SetUpPart, text: str, then: Callable[[str], None]) -> None:
         def answered(typed: str | None) -> None:

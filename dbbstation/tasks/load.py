@@ -11,14 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.control.commands import nominal_commands
 from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
-from dbbstation.nc.commanded import commanded_poses
 from dbbstation.sources.contract import Thermometer
 from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.declare import paths_of
@@ -182,6 +180,8 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     )
     if run.program is None:
         return observation
+    from dbbstation.nc.commanded import commanded_poses
+
     path, faults = run.program.path, list[Problem]()
     data = read_bytes(path, faults, is_input=False)  # its hash stands in the session
     text = None if data is None else decode(data, str(path), faults)
@@ -194,6 +194,8 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
 def _under(machine: Machine | None, observation: Observation) -> Observation:
     if machine is None:
         return observation
+    from dbbstation.control.commands import nominal_commands
+
     poses = np.vstack([observation.motion().poses, observation.standing_pose])
     commands = nominal_commands(machine, poses, known_sources())
     return replace(observation, commanded=commands[:-1], stood=commands[-1])

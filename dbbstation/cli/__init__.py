@@ -17,7 +17,7 @@ from dbbstation.cli.log import drop_output, drop_unwritable, flush_output, open_
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
 from dbbstation.computing.compiling import tell_of_compiling
-from dbbstation.errors import StationError, in_a_sentence
+from dbbstation.errors import InputError, StationError, in_a_sentence
 from dbbstation.files.inputs import input_book, virtual_so_far
 from dbbstation.system.signals import politely_ended
 
@@ -98,8 +98,6 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: A
       dbbstation COMMAND --help                        what a command does, with examples
     """  # noqa: D301 - \b is click's mark for "do not wrap"
     if settings is not None and not os.path.isfile(settings):  # noqa: PTH113 - before anything else is imported
-        from dbbstation.errors import InputError
-
         raise InputError.of(settings, "there is no such file", "check the path")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,8 +17,6 @@ from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from dbbstation.files.formats.bar import BarFile
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.trace.steady import Steady
@@ -95,8 +94,6 @@ def bar(
         --calibrator-mm 150.0003 --calibrator-u-um 0.25 --certified 2026-03-01 --temp-c 20.3 --out bar.yaml
       dbbstation check bar.yaml
     """
-    from datetime import UTC, datetime
-
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.bar import write_bar
     from dbbstation.service.bar_calibration import DRIFT

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
-from dbbstation.cli.output import echo, print_table
+from dbbstation.cli.figures import print_runs
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table
 from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, use_sentence, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
-from dbbstation.text.written import to_its_place
+from dbbstation.text.written import decimals_of, to_its_place
 
 if TYPE_CHECKING:
     from dbbstation.calibration.checks.scatter import ScatterCheck
@@ -70,8 +71,6 @@ IN_MM = frozenset({"cog-shift"})
 
 def show(result: CalibrationResult) -> None:
     """Print the parameters and the residual of the fit."""
-    from dbbstation.cli.figures import print_runs
-
     print_runs(result.runs)
     echo()
     _print_parameters(result)
@@ -87,9 +86,6 @@ def show(result: CalibrationResult) -> None:
 
 
 def _print_parameters(result: CalibrationResult) -> None:
-    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
-    from dbbstation.text.written import decimals_of
-
     rows = []
     for source in result.sources:
         if source.name in IN_A_TABLE_OF_THEIR_OWN:

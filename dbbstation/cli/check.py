@@ -11,14 +11,15 @@ import click
 
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE
-from dbbstation.cli.output import echo, echo_line
+from dbbstation.cli.output import echo, echo_line, print_plain_json, print_result, say
+from dbbstation.cli.progress import count_bar
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from dbbstation.errors import Problem
     from dbbstation.files.checking import Checked
     from dbbstation.nc.circle_program import Approach
     from dbbstation.results.checked import CheckedFile, CheckResult, DryRunResult, SampledPlanResult
@@ -82,9 +83,6 @@ def check(
       dbbstation check 2026-11-20-hexapod-7 --anchor 3f2a9c1b2d4e5f60
       dbbstation check --schema dbb-plan/1 > dbb-plan-1.schema.json
     """
-    from dbbstation.cli.output import print_result
-    from dbbstation.errors import refuse
-
     if schema is not None:
         if files:
             raise click.UsageError("--schema prints a format and takes no files")
@@ -160,8 +158,6 @@ def _file(result: Checked) -> CheckedFile:
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRunResult]) -> None:
-    from dbbstation.cli.output import say
-
     for result in results:
         for warning in result.warnings:
             say(f"note: {warning}")
@@ -190,7 +186,6 @@ def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[S
 
 
 def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
-    from dbbstation.errors import InputError
     from dbbstation.files.checking import Checked, check
     from dbbstation.files.yaml.text import load_yaml
 
@@ -229,8 +224,6 @@ def _dry_run(
     step_deg: float,
     approach: Approach | None,
 ) -> DryRunResult:
-    from dbbstation.cli.progress import count_bar
-    from dbbstation.errors import Problem
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.nc.export import dry_run
@@ -247,7 +240,6 @@ def _dry_run(
 
 
 def _print_schema(name: str) -> None:
-    from dbbstation.cli.output import print_plain_json
     from dbbstation.files.checking import SCHEMAS, json_schema
     from dbbstation.instrument.library import ProtocolFile
     from dbbstation.results.schemas import RESULTS, result_schema

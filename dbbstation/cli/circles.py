@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import CommandOutput, command, figure
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table
 from dbbstation.tasks.circles import circles as task
 from dbbstation.tasks.declare import Option
+from dbbstation.text.written import expanded_uncertainty, with_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +44,6 @@ circles = command(task, show, CommandOutput("table", table=True, field="csv"), f
 
 
 def _print(result: CirclesResult, *, several: bool) -> None:
-    from dbbstation.cli.output import EXPANDED, print_table
     from dbbstation.results.circles import RunWithoutCircle, why_not
 
     echo(f"figures of {result.edition}, filter: {result.filter}, lengths in µm, {EXPANDED}")
@@ -118,9 +118,6 @@ def _print(result: CirclesResult, *, several: bool) -> None:
 
 
 def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
-    from dbbstation.cli.output import COVERAGE_FACTOR
-    from dbbstation.text.written import expanded_uncertainty, with_uncertainty
-
     return with_uncertainty(value, expanded_uncertainty(run.uncertainty[name].u_um, COVERAGE_FACTOR))
 
 
@@ -130,7 +127,6 @@ def _noise(run: CircleFiguresResult) -> object:
 
 
 def _print_budgets(result: CirclesResult) -> None:
-    from dbbstation.cli.output import print_table
     from dbbstation.results.circles import not_stated, with_budgets
 
     rows: list[list[object]] = []
@@ -149,7 +145,6 @@ def _print_budgets(result: CirclesResult) -> None:
 
 
 def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> None:
-    from dbbstation.cli.output import print_table
     from dbbstation.quality.finding import FindingVerdict
 
     rows: list[list[object]] = [
@@ -178,9 +173,6 @@ def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> N
 
 
 def _print_quick_looks(looks: Sequence[QuickLookResult]) -> None:
-    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
-    from dbbstation.text.written import with_uncertainty
-
     rows: list[list[object]] = []
     for look in looks:
         name = [look.test, "+".join(look.directions), look.repeat]

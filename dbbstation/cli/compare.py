@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import command, figure
 from dbbstation.cli.effects import cancelling_text, parts_with_gain
-from dbbstation.cli.output import echo, echo_line
+from dbbstation.cli.output import echo, echo_line, print_table
 from dbbstation.tasks.compare import compare as task
 
 if TYPE_CHECKING:
@@ -35,8 +35,6 @@ def show(result: ComparisonResult) -> None:
 
 
 def _print_runs(result: ComparisonResult) -> None:
-    from dbbstation.cli.output import print_table
-
     echo(
         "B minus A [µm], largest first; found: rms of the found difference; sigmas: size in standard deviations; u: standard uncertainty by noise, balls and bars"
     )
@@ -69,7 +67,6 @@ def _tenths(value: float) -> str:
 
 
 def _print_causes(result: ComparisonResult) -> None:
-    from dbbstation.cli.output import print_table
     from dbbstation.results.comparison import ComparedCause
 
     there = [cause for cause in result.causes if isinstance(cause, ComparedCause) and cause.where is not None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import click
 
 from dbbstation.cli.declared import Answer, made
-from dbbstation.cli.output import echo, say
+from dbbstation.cli.output import echo, print_table, say
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option
 from dbbstation.tasks.options import numbers_of
@@ -31,8 +32,6 @@ class ModelOptions:
 
     def written(self, task: Callable[..., _Result], out: Path, **given: Any) -> _Result:  # noqa: ANN401 - as the task has it
         """Return the result of a task, and print its notes."""
-        from datetime import UTC, datetime
-
         from dbbstation.files.own_sources import every_source
 
         day, known = datetime.now(UTC).date().isoformat(), every_source(self.source_files)
@@ -129,7 +128,6 @@ def parameters(
       dbbstation control parameters --model model.yaml --out genhexkins
       dbbstation control parameters --model model.yaml --out genhexkins --volume -80,80,-80,80,-1050,-950 --tilt-deg 10
     """
-    from dbbstation.cli.output import print_table
     from dbbstation.tasks.control import parameters as task
 
     result = of.written(task, out, volume_mm=volume, tilt_deg=tilt_deg, ini=ini, force=force)

@@ -16,6 +16,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 import click
 
 from dbbstation.cli.figures import format_of, known_format
+from dbbstation.cli.output import echo, print_json, print_result, say
+from dbbstation.cli.progress import count_bar, task_bar
+from dbbstation.cli.provenance import provenance
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
 from dbbstation.tasks import options as o
@@ -58,8 +61,6 @@ class Finite(click.FloatRange):
 
 def save(result: Any, path: Path, *, force: bool) -> None:  # noqa: ANN401 - any result
     """Save the main product with its provenance."""
-    from dbbstation.cli.provenance import provenance
-
     result.save(path, force=force, provenance=provenance)
 
 
@@ -127,8 +128,6 @@ def command(
     with_force = "force" in task.parameters
 
     def run(**given: Any) -> None:  # noqa: ANN401 - each option has a type of its own
-        from dbbstation.cli.output import print_result
-
         as_json, own = given.pop("as_json"), {name: given.pop(name) for name in shown}
         paths = {one: given.pop(one.name) for one in outputs}
         paths = {one: path for one, path in paths.items() if path is not None}
@@ -165,8 +164,6 @@ class Answer:
 
     def tell(self, *, as_json: bool) -> None:
         """Print the answer."""
-        from dbbstation.cli.output import echo, print_json, print_result
-
         if as_json:
             (print_json if isinstance(self.data, dict) else print_result)(self.data)
         elif callable(self.words):
@@ -229,9 +226,6 @@ def _checked(one: TaskParameter) -> click.Parameter:
 
 def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any result
     """Run a task with its progress bar; an `ArgumentError` becomes a usage error that names the option."""
-    from dbbstation.cli.output import say
-    from dbbstation.cli.provenance import provenance
-
     try:
         with _bar(task, asked) as progress:
             now = getattr(import_module(function.__module__), function.__name__)  # a test may have put another there
@@ -247,8 +241,6 @@ def _done(function: Callable[..., Any], task: Declared, asked: Mapping[str, Any]
 
 @contextmanager
 def _bar(task: Declared, asked: Mapping[str, Any]) -> Iterator[Any]:
-    from dbbstation.cli.progress import count_bar, task_bar
-
     if task.stages is None:
         with count_bar(task.label) as tell:
             yield lambda _text, done=0, of=0: tell(done, of)
@@ -276,8 +268,6 @@ def _written(
     *,
     force: bool,
 ) -> Any:  # noqa: ANN401 - the same
-    from dbbstation.cli.output import say
-
     named = {one.name for one in fields(result)}
     for one, path in paths.items():
         if one.refused(result, path) is None:

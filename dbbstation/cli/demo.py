@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.output import echo, say
+from dbbstation.cli.figures import G_LOW_PASSED
+from dbbstation.cli.output import echo, print_json, print_table, say
 from dbbstation.cli.progress import COUNTED, ENDLESS, ProgressBar
+from dbbstation.errors import OutputError
+from dbbstation.files.places import unused_path
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -43,10 +46,7 @@ def demo(
       dbbstation demo --out try-it --seed 7
       sudo dbbstation demo --quick --control linuxcnc   (needs LinuxCNC; fifteen minutes)
     """
-    from dbbstation.cli.output import print_json
     from dbbstation.demo.whole_job import QUICK, run_demo
-    from dbbstation.errors import OutputError
-    from dbbstation.files.places import unused_path
 
     folder = out or unused_path(Path(), "dbbstation-demo")
     tests = QUICK if quick else None
@@ -98,8 +98,6 @@ class DemoShown:
 
 
 def _print(result: DemoResult) -> None:
-    from dbbstation.cli.figures import G_LOW_PASSED
-    from dbbstation.cli.output import print_table
     from dbbstation.facts.serialise import read_plain
     from dbbstation.facts.value import Value
 
@@ -138,9 +136,6 @@ def _print(result: DemoResult) -> None:
 
 
 def _print_ways(ways: Sequence[ControlWay]) -> None:
-    from dbbstation.cli.figures import G_LOW_PASSED
-    from dbbstation.cli.output import print_table
-
     echo("\nmeans over the circles [µm, measured], and LinuxCNC's time for them:")
     rows: list[list[object]] = []
     for way in ways:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.cli.declared import CommandOutput, command, figure, save
 from dbbstation.cli.effects import cancelling_text
 from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table, say
+from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.words import ending_sentences, mismatch_sentence, outlier_sentence
 from dbbstation.tasks.declare import Option
 from dbbstation.tasks.diagnose import diagnose as task
@@ -75,8 +76,6 @@ def _pair(value: float | None, u: float | None) -> tuple[str, str]:
 
 def say_model_warnings(identified: IdentifiedModel) -> None:
     """Print a model's warnings, one line each."""
-    from dbbstation.results.model_warnings import model_warnings
-
     for warning in model_warnings(identified):
         say(f"note: {warning}")
 
@@ -162,8 +161,6 @@ MOST_POINTS = 12
 
 
 def _print_curve(curve: Curve) -> None:
-    from dbbstation.cli.output import print_table
-
     points = curve.points
     echo(
         f"an error of unknown cause moves the readings by {curve.readings_um:.2f} µm rms, and kinematic parameters cannot imitate {curve.unconcealed_um:.2f} µm rms of this:"
@@ -198,8 +195,6 @@ def _print_gain(result: DiagnosisFigures) -> None:
 
 
 def _print_sources(sources: Sequence[SourceFinding]) -> None:
-    from dbbstation.cli.output import print_table
-
     rows = []
     for source in sources:
         hidden = "" if source.concealed is None else f"{100 * source.concealed:.0f} %"

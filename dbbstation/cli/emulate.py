@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import BAUD, PROGRAMS, ProtocolOptions, RateHz
 from dbbstation.cli.output import echo, json_text, say
+from dbbstation.errors import InputError
+from dbbstation.files.gateway import content_of
 from dbbstation.system.ports import marked_virtual
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, interrupt_on
 from dbbstation.tasks import options as o
@@ -109,7 +111,6 @@ def emulate(
 
 
 def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, seed: int) -> MachineModel:
-    from dbbstation.errors import InputError
     from dbbstation.files.formats.machine import machine_data
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
@@ -126,8 +127,6 @@ def _truth(machine: Machine, file: Path | None, source_files: o.SourcePaths, see
 
 
 def _programs(folder: Path) -> Callable[[str], CommandedPath]:
-    from dbbstation.errors import InputError
-    from dbbstation.files.gateway import content_of
     from dbbstation.station.programs import read_toolpath
     from dbbstation.virtual.path import path_of
 

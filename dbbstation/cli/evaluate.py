@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import command
-from dbbstation.cli.output import echo
+from dbbstation.cli.figures import print_runs, print_tolerances
+from dbbstation.cli.output import echo, print_table
 from dbbstation.cli.shop import shop_settings
 from dbbstation.results.words import evaluated_sentence
 from dbbstation.tasks.evaluate import evaluate as task
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 def show(result: EvaluationResult) -> None:
     """Print the residual of the model, and the tolerances."""
-    from dbbstation.cli.figures import print_runs, print_tolerances
-
     print_runs(result.runs, low_passed=True)
     echo()
     _print_predicted(result.runs)
@@ -43,8 +42,6 @@ def show(result: EvaluationResult) -> None:
 
 
 def _print_predicted(runs: Sequence[EvaluatedRun]) -> None:
-    from dbbstation.cli.output import print_table
-
     rows: list[list[object]] = []
     for run in runs:
         circular = run.circularity_30_upr_um

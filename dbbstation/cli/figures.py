@@ -77,8 +77,6 @@ def which_circles(tests: Sequence[str], directions: Sequence[str]) -> str:
 
 def print_tolerances(held: Sequence[EvaluatedTolerance], origin: str) -> None:
     """Print the worst run of every tolerance."""
-    from dbbstation.cli.output import print_table
-
     if not held:
         return
     echo()

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import click
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, print_result, print_table, say
+from dbbstation.cli.progress import count_bar
+from dbbstation.cli.provenance import provenance
+from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option
 
@@ -69,10 +72,6 @@ def fleet(
       dbbstation fleet sessions --task circles --table circles.parquet   (the table once more, as CSV or Parquet)
       dbbstation fleet /srv/ballbar --task calibrate --scheduler tcp://server:8786
     """
-    from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import count_bar
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.shop import shop_settings
     from dbbstation.files.atomic import refuse_outputs
     from dbbstation.files.formats.settings import Settings
     from dbbstation.tasks.fleet import FORMATS, write_fleet_table
@@ -129,7 +128,6 @@ def _refuse_options_of_others(task: str) -> None:
 
 
 def _print(result: FleetResult) -> None:
-    from dbbstation.cli.output import print_table
     from dbbstation.report.fleet_page import headline_of
 
     rows = [

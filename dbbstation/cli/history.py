@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command
-from dbbstation.cli.output import COVERAGE_FACTOR, echo, echo_line
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_line, print_table
+from dbbstation.cli.provenance import provenance
 from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks.history import history as task
 from dbbstation.tasks.telling import silent
@@ -27,7 +28,6 @@ def show(found: HistoryResult) -> None:
 
 
 def _write_page(found: HistoryResult, path: Path, *, force: bool) -> None:
-    from dbbstation.cli.provenance import provenance
     from dbbstation.files.atomic import write_bytes
     from dbbstation.report.history_page import history_html
 
@@ -42,7 +42,6 @@ def _remarks(found: HistoryResult) -> Iterator[str]:
 
 
 def _print(machine: MachineHistoryResult, found: HistoryResult) -> None:
-    from dbbstation.cli.output import EXPANDED, print_table
     from dbbstation.report.history_words import changes_in_words, headline
 
     sessions = machine.sessions

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
 from dbbstation.cli.effects import cancelling_text
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, print_table
 from dbbstation.tasks.drive import identify as task
 
 if TYPE_CHECKING:
@@ -85,8 +85,6 @@ def _print_locations(locations: Sequence[ForceLocation]) -> None:
 
 
 def _print_sources(sources: Sequence[DriveFinding]) -> None:
-    from dbbstation.cli.output import print_table
-
     rows = [
         [
             s.name,

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.mapping_options import MappingOptions
-from dbbstation.cli.output import echo, echo_line, print_result
+from dbbstation.cli.mapping_options import MappingOptions, chosen_mapping, read_tables
+from dbbstation.cli.output import echo, echo_line, print_result, print_table
+from dbbstation.cli.provenance import provenance
 from dbbstation.cli.session_options import SessionOptions
+from dbbstation.errors import InputError, OutputError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
-from dbbstation.text.written import printable
+from dbbstation.text.written import printable, repeats_in_order
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from datetime import datetime
 
     from dbbstation.cli.asking import Asker
     from dbbstation.files.formats.mapping import MappingFile
@@ -92,7 +94,6 @@ def import_(
         --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --dry-run
     """
     from dbbstation.cli.asking import Asker
-    from dbbstation.errors import OutputError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.mapping import write_mapping
     from dbbstation.tasks.importing.session import staged
@@ -152,16 +153,11 @@ def _read(
     said: _Told,
     noted: SessionOptions,
 ) -> _Import:
-    from datetime import UTC, datetime
-
-    from dbbstation.cli.mapping_options import chosen_mapping, read_tables
-    from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.formats.session import Note
     from dbbstation.tasks.importing.runs import Reader
     from dbbstation.tasks.importing.session import originals
-    from dbbstation.text.written import repeats_in_order
 
     tables = read_tables(files, of_mapping)
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
@@ -314,7 +310,6 @@ def _split(asker: Asker, mapping: MappingFile, tables: Sequence[ForeignTable]) -
 
 
 def _asked_centres(asker: Asker, runs: Sequence[ImportedRun], plan: Plan) -> list[str]:
-    from dbbstation.errors import InputError
     from dbbstation.tasks.importing.plausible import CHANCE
     from dbbstation.tasks.importing.runs import chance_of_runs
 
@@ -374,7 +369,6 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequ
 
 
 def _show(found: _Import) -> None:
-    from dbbstation.cli.output import print_table
     from dbbstation.trace.columns import LENGTH, TIME
 
     print_table(

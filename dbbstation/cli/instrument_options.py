@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from dbbstation.files.places import refuse_recorded
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
@@ -92,7 +93,6 @@ def spying(path: Path | None, protocol: Protocol, port: str, *, force: bool = Fa
     Raises:
         OutputError: the file exists, lies in a session, or cannot be written.
     """
-    from dbbstation.files.places import refuse_recorded
     from dbbstation.instrument.bytelog import ByteLog
 
     if path is None:

@@ -10,7 +10,10 @@ import click
 
 from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.mapping_options import AsWritten
-from dbbstation.cli.output import echo, echo_line
+from dbbstation.cli.output import echo, echo_line, print_table
+from dbbstation.cli.provenance import provenance
+from dbbstation.errors import InputError
+from dbbstation.files.formats.number_language import number_language
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -45,7 +48,6 @@ class SheetOptions(AsWritten):
         self, coverage: float | None, u_unit: str | None = None, *, of_one_holder: bool = False
     ) -> Sequence[Measured]:
         """Return the rows; arguments as for `read_sheet`."""
-        from dbbstation.files.formats.number_language import number_language
         from dbbstation.files.recordings.cmm_sheet import read_sheet
 
         return read_sheet(
@@ -112,8 +114,6 @@ def sheet(
       dbbstation jig sheet cmm.csv --jig plate.yaml --columns X=x --columns "U (k=2)=u" --coverage 2 --out new.yaml
       dbbstation jig sheet plate.dmo --jig plate.yaml --names SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
     """
-    from dbbstation.cli.output import print_table
-    from dbbstation.cli.provenance import provenance
     from dbbstation.files.formats.jig import jig_text, read_jig
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.cmm_sheet import jig_of_sheet
@@ -185,7 +185,6 @@ def holders(
       dbbstation jig holders mountings.csv
       dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --jig plate.yaml --out plate-2026.yaml
     """
-    from dbbstation.errors import InputError
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.plan.repeatability import repeatability
     from dbbstation.results.jig import HoldersResult
@@ -215,8 +214,6 @@ def holders(
 
 
 def _write_holders(found: Mapping[str, HolderResult], jig: Path, out: Path, sheet: Path, *, force: bool) -> None:
-    from dbbstation.cli.provenance import provenance
-    from dbbstation.errors import InputError
     from dbbstation.files.formats.jig import HolderSchema, checked_jig, jig_text, read_jig
     from dbbstation.files.provenance import write_table
 
@@ -232,7 +229,6 @@ def _write_holders(found: Mapping[str, HolderResult], jig: Path, out: Path, shee
 
 
 def _print_holders(found: Mapping[str, HolderResult]) -> None:
-    from dbbstation.cli.output import print_table
     from dbbstation.plan.repeatability import UNLIKE_AXES
 
     lines: list[list[object]] = []
@@ -283,8 +279,6 @@ def _texts(change_um: Sequence[float] | None) -> list[str]:
 def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str, list[Any]]:
     """Return centres by holder and place, shape (n, axes) each [µm]."""
     import numpy as np
-
-    from dbbstation.errors import InputError
 
     groups: dict[tuple[str, object], list[tuple[float, ...]]] = {}
     for row in rows:

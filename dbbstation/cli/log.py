@@ -21,6 +21,7 @@ import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
 from dbbstation.errors import unwritable
+from dbbstation.files.inputs import inputs_so_far
 from dbbstation.files.places import session_around
 from dbbstation.system.handles import open_nothing, open_private
 from dbbstation.text.written import printable
@@ -105,8 +106,6 @@ def _kept(context: click.Context) -> Iterator[None]:
 
 
 def _log_beginning(context: click.Context) -> None:
-    from dbbstation.files.inputs import inputs_so_far
-
     given = context.obj if isinstance(context.obj, tuple) else shlex.split(command_of(context))[1:]
     LOG.info("$ %s", shlex.join(["dbbstation", *given]))
     LOG.info("%s, Python %s, %s, in %s", PROGRAM, platform.python_version(), platform.platform(), Path.cwd())

@@ -12,6 +12,7 @@ import click
 from dbbstation.cli.instrument_options import ZERO_MM
 from dbbstation.cli.output import say
 from dbbstation.cli.shop import shop_settings
+from dbbstation.errors import InputError, Problem, refuse
 from dbbstation.files.formats.number_language import SEPARATORS, number_language
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -31,8 +32,6 @@ def shops_numbers() -> NumberLanguage | None:
 
     This is for commands in which a file overrides the settings.
     """
-    from dbbstation.files.formats.number_language import number_language
-
     values = shop_settings().values
     found = {key: values[name] for key in ("decimal", "separator") if (name := f"numbers.{key}") in values}
     if not found:
@@ -128,7 +127,6 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
         InputError: every fault of every file.
         click.UsageError: an option repeats a fact of the mapping.
     """
-    from dbbstation.errors import InputError, Problem, refuse
     from dbbstation.files.formats.mapping import read_mapping
 
     decimal, separator = options.decimal, options.separator
@@ -154,7 +152,6 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
 
 
 def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | None, encoding: str) -> ForeignTable:
-    from dbbstation.errors import InputError
     from dbbstation.files.recordings.foreign_csv import read_foreign
     from dbbstation.tasks.importing.proposal import EXPORTED
 

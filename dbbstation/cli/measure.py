@@ -14,7 +14,7 @@ import click
 
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import OpenLine, RateHz, spying
-from dbbstation.cli.output import echo, say
+from dbbstation.cli.output import echo, print_result, say
 from dbbstation.cli.session_options import RecordingOptions
 from dbbstation.system.ports import SLOWEST, is_virtual
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
@@ -224,7 +224,6 @@ def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
 
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
     from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
-    from dbbstation.cli.output import print_result
     from dbbstation.station.autopilot import Autopilot
 
     station, summary, talk = workplace.station, Summary(), Talk(asking=hands is None)

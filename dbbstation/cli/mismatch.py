@@ -15,7 +15,8 @@ from dbbstation.cli.effects import (
     print_finding,
     print_left,
 )
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, print_table
+from dbbstation.cli.provenance import provenance
 from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks.mismatch import mismatch as task
 
@@ -42,7 +43,6 @@ def show(result: MismatchResult | SimulatorResult) -> None:
 
 
 def _write_table(result: MismatchResult | SimulatorResult, path: Path, *, force: bool) -> None:
-    from dbbstation.cli.provenance import provenance
     from dbbstation.files.provenance import write_table
     from dbbstation.results.simulator import SimulatorResult
 
@@ -76,8 +76,6 @@ mismatch = command(
 
 
 def _print(result: MismatchResult) -> None:
-    from dbbstation.cli.output import print_table
-
     unit, held_out = result.unit, result.held_out_rms
     _print_first(result)
     echo("\n".join((*result.sentences(), "")))
@@ -141,8 +139,6 @@ def _print_whether(result: MismatchResult) -> None:
 
 
 def _print_findings(there: Sequence[CauseFinding], unit: str) -> None:
-    from dbbstation.cli.output import print_table
-
     tested = any(f.gains for f in there)
     rows = [
         [
@@ -248,8 +244,6 @@ MOST_VALUES_OF_TERM = 4
 
 
 def _print_terms(there: Sequence[PortTerm]) -> None:
-    from dbbstation.cli.output import print_table
-
     rows = [
         [
             f.name,
@@ -267,8 +261,6 @@ def _print_terms(there: Sequence[PortTerm]) -> None:
 
 
 def _print_refitted(parameters: Sequence[RefittedOfSimulator]) -> None:
-    from dbbstation.cli.output import print_table
-
     if not parameters:
         return
     echo("\nparameters of the simulator:")

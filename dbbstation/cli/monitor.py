@@ -11,7 +11,7 @@ import click
 
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE, ZERO_MM, LineOptions, Spy, spying
-from dbbstation.cli.output import echo, json_text
+from dbbstation.cli.output import echo, json_text, print_json
 from dbbstation.cli.provenance import provenance
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -114,7 +114,6 @@ def replay(
       dbbstation instrument replay bytes.txt
       dbbstation instrument replay bytes.txt --instrument streaming-encoder --json
     """
-    from dbbstation.cli.output import print_json
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
     from dbbstation.instrument.library import load_instrument, with_zero
     from dbbstation.instrument.reading import DOUBTFUL

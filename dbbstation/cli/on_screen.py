@@ -15,6 +15,7 @@ from dbbstation.cli.instrument_options import spying
 from dbbstation.cli.measure import say_sampling
 from dbbstation.cli.output import echo
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
+from dbbstation.files.places import SESSION_FILE, shipped_folder
 from dbbstation.system.ports import FASTEST, virtual_port
 from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered, ended_when_hung_up
 
@@ -85,15 +86,12 @@ def _with_virtual(asked: Asked) -> Asked:
 
 
 def _shipped(what: str) -> Path:
-    from dbbstation.files.places import shipped_folder
-
     folder, _, rest = _DEMO[what].partition("/")
     return shipped_folder(folder) / rest
 
 
 def _measured(asked: Asked, *, virtual: bool) -> int:
     from dbbstation.cli.measure_talk import Log
-    from dbbstation.files.places import SESSION_FILE
     from dbbstation.files.recordings.session import read_session
     from dbbstation.service.held_line import HeldLine
     from dbbstation.service.runner import opener

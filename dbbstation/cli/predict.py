@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, say
 from dbbstation.tasks.predict import predict as predict_task
 from dbbstation.tasks.simulate import simulate as simulate_task
 
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
 
 def show(result: PredictionResult) -> None:
     """Print the errors of the poses, with their uncertainties."""
-    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, say
-
     say(f"{result.poses} poses written to {result.file}")
     shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", result.common_shift_um, strict=True))
     say(
@@ -45,8 +44,6 @@ predict = command(predict_task, show, CommandOutput("table", table=True, field="
 
 def show_simulated(result: SimulatedSession) -> None:
     """Print what was written."""
-    from dbbstation.cli.output import say
-
     say(f"{result.runs} runs written to {result.session}")
 
 

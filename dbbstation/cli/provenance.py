@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from dbbstation import __version__
+from dbbstation.files.inputs import inputs_so_far, virtual_so_far
 from dbbstation.files.places import name_of
 
 if TYPE_CHECKING:
@@ -47,7 +48,6 @@ _GIVEN = frozenset({ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP, Pa
 
 def provenance() -> Provenance:
     """Return the provenance with the inputs read so far."""
-    from dbbstation.files.inputs import inputs_so_far, virtual_so_far
     from dbbstation.files.provenance import Provenance
 
     return Provenance(PROGRAM, command_of(click.get_current_context()), inputs_so_far(), virtual_so_far())

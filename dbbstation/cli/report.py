@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.declared import command
-from dbbstation.cli.output import echo, echo_line
+from dbbstation.cli.output import COVERAGE_FACTOR, echo, echo_line
+from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks.report import report as task
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ def _written(result: ReportResult) -> list[str]:
 
 def _of_the_shop() -> Mapping[str, object]:
     from dbbstation.cli.asking import Asker
-    from dbbstation.cli.output import COVERAGE_FACTOR
-    from dbbstation.cli.shop import shop_settings
 
     known = {"settings": shop_settings(), "coverage_factor": COVERAGE_FACTOR}
     given = click.get_current_context().params

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import click
 
 from dbbstation.cli.declared import Answer, made
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, print_table
+from dbbstation.errors import InputError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
+from dbbstation.text.written import repeats_in_order
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
 
@@ -47,11 +48,9 @@ def list_runs(folder: _Folder) -> Answer:
       dbbstation session list 2026-11-20-hexapod-7
       dbbstation session list 2026-11-20-hexapod-7 --json
     """
-    from dbbstation.cli.output import print_table
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.frame import of_facts
     from dbbstation.results.sessions import ListedRun, ListedSession
-    from dbbstation.text.written import repeats_in_order
 
     read = read_session(folder)
     missing, runs = _missing(read), repeats_in_order(read.runs)
@@ -164,8 +163,6 @@ def amend(
       dbbstation session amend 2026-11-20-hexapod-7 --reason "joint 3 measured again" --machine measured.yaml
       dbbstation session amend 2026-11-20-hexapod-7 --reason "ball 4-short was 0.1 mm off in the sheet"
     """
-    from datetime import UTC, datetime
-
     from dbbstation.files.recordings.amending import amend as noted
 
     if not reason.strip():
@@ -223,7 +220,6 @@ def log(folder: _Folder) -> Answer:
       dbbstation session log 2026-11-20-hexapod-7
       dbbstation session log 2026-11-20-hexapod-7 --json
     """
-    from dbbstation.cli.output import print_table
     from dbbstation.files.recordings.event_log import keys_told, read_event_log, runs_told
     from dbbstation.files.recordings.session import read_session
     from dbbstation.results.sessions import ListedEvent, SessionEvents
@@ -293,7 +289,6 @@ def _missing(read: SessionFolder) -> list[str]:
 def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
     import difflib
 
-    from dbbstation.errors import InputError
     from dbbstation.files.formats.session import RunState
     from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session_writer import SessionWriter

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,6 +11,7 @@ import click
 
 from dbbstation.cli.instrument_options import PROGRAMS, Spy
 from dbbstation.cli.shop import from_settings
+from dbbstation.files.places import SESSION_FILE
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -186,9 +188,6 @@ class RecordingOptions(SessionOptions):
         Raises:
             InputError: what is wrong with the bar, and what to do.
         """
-        from datetime import UTC, datetime
-
-        from dbbstation.files.places import SESSION_FILE
         from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 
         if job.details.bar_waiver or (job.folder / SESSION_FILE).is_file():

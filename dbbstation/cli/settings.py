@@ -9,8 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from dbbstation.cli.declared import made
+from dbbstation.cli.figures import which_circles
 from dbbstation.cli.lazy import made_ready
-from dbbstation.cli.output import echo, echo_line
+from dbbstation.cli.output import echo, echo_line, print_result, print_table
+from dbbstation.cli.shop import shop_settings
+from dbbstation.files.places import shipped_folder
+from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -62,9 +66,6 @@ def settings(
       dbbstation settings 2026-11-20-hexapod-7 --json
       dbbstation settings shipped                         (files of the program; `settings shipped --help`)
     """
-    from dbbstation.cli.output import print_result
-    from dbbstation.cli.shop import shop_settings
-
     if template:
         if folder is not None or as_json:
             raise click.UsageError("--template prints a settings file and allows no other option")
@@ -85,7 +86,6 @@ def built_in() -> dict[str, str | int | float | None]:
     """Return the program's own values by key, or None; without tolerances."""
     from dbbstation.files.formats.number_language import PLAIN
     from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
-    from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
     from dbbstation.plan.plan import LARGEST_LOSS_PERCENT
     from dbbstation.station.bar_known import USUAL_AGE_H
 
@@ -138,9 +138,6 @@ def _result(found: Settings) -> SettingsResult:
 
 
 def _print(found: Settings) -> None:
-    from dbbstation.cli.figures import which_circles
-    from dbbstation.cli.output import print_table
-
     result = _result(found)
     rows = []
     for key, one in result.values.items():
@@ -159,7 +156,6 @@ def _print(found: Settings) -> None:
 
 def _template() -> str:
     from dbbstation.files.formats.settings_schema import SettingsFile
-    from dbbstation.files.places import shipped_folder
     from dbbstation.files.yaml.schema import format_of
 
     text = (shipped_folder("fixtures") / "settings" / "every-key.yaml").read_text(encoding="utf-8")

@@ -8,6 +8,9 @@ from typing import Annotated
 import click
 
 from dbbstation.cli.declared import Answer, made
+from dbbstation.errors import StationError
+from dbbstation.files.gateway import content_of
+from dbbstation.files.places import shipped_folder
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 from dbbstation.text.written import on_one_line
@@ -97,9 +100,7 @@ def shipped(
       dbbstation settings shipped examples --out try
     """
     from dbbstation.catalogue import nearest
-    from dbbstation.errors import StationError
     from dbbstation.files.atomic import write_folder
-    from dbbstation.files.gateway import content_of
 
     files = shipped_files()
     if (name is None) != (out is None):
@@ -126,8 +127,6 @@ def shipped(
 
 def shipped_files() -> dict[str, Path]:
     """Return all files that come along, by kind and name with a slash between."""
-    from dbbstation.files.places import shipped_folder
-
     fixtures, protocols = shipped_folder("fixtures"), shipped_folder("protocols")
     folders = [(kind, fixtures / kind) for kind in (*_FIXTURES, _SESSION)]
     folders += [(kind, protocols / kind) for kind in ("plans", "instruments")]

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import Answer, made
+from dbbstation.cli.output import print_table
+from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -36,8 +38,6 @@ def sources(
       dbbstation sources gravity --machine machine.yaml
       dbbstation sources scale-bow --source-files scale_bow.py --json
     """
-    from dbbstation.cli.output import print_table
-    from dbbstation.errors import ModelError
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_sources import every_source
     from dbbstation.results.sources import SourcesResult, role_of, source_description

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Names, Option, task
+from dbbstation.tasks.declare import Names, Option, paths_of, task
 from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
@@ -92,7 +92,6 @@ def calibrate(
     from dbbstation.model.uncertainty import greatest_u_um
     from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.registry import sources_named
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.load import loaded
 
     telling = Telling(progress, stop, say)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.declare import File, Option, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -90,7 +90,6 @@ def program(
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
 
     telling = Telling(progress, stop, say)

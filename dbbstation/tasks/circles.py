@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Option, task
+from dbbstation.tasks.declare import Option, paths_of, task
 from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
@@ -74,7 +74,6 @@ def circles(
     from dbbstation.circles.path import Filter
     from dbbstation.results.circles import circles_result
     from dbbstation.tasks.circle_runs import load_circles
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)

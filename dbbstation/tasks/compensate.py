@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.declare import File, Option, paths_of, task
 from dbbstation.tasks.options import lengths_by_tool, named_numbers, numbers_of
 from dbbstation.tasks.telling import Telling, silent
 
@@ -158,7 +158,6 @@ def compensate(
     from dbbstation.nc.registry import dialect_of_file
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result, write_programs
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.programs import (
         NOT_CORRECTED,
         ProgramText,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import CalibrationError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Names, task
+from dbbstation.tasks.declare import Names, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -88,7 +88,6 @@ def diagnose(
     from dbbstation.diagnosis.effects import effects_of
     from dbbstation.files.own_sources import every_source
     from dbbstation.results.diagnosis import diagnosis_figures, diagnosis_result, kept_of
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.diagnosed import diagnosed_of
 
     telling = Telling(progress, stop, say)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Files, Names, Option, task
+from dbbstation.tasks.declare import Files, Names, Option, paths_of, task
 from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
@@ -82,7 +82,6 @@ def identify(
     from dbbstation.files.recordings.drive_csv import given_drive, read_drive
     from dbbstation.laws.contract import MOVING
     from dbbstation.results.drive import drive_result
-    from dbbstation.tasks.declare import paths_of
 
     telling = Telling(progress, stop, say)
     named = drive_sources_named(known_drive_sources() if sources is None else tuple(sources))

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import task
+from dbbstation.tasks.declare import paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -73,7 +73,6 @@ def evaluate(
     from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.frame import of_facts
     from dbbstation.results.model_warnings import model_warnings
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.load import loaded
     from dbbstation.tasks.models import model_of
 

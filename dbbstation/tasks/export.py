@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from dbbstation.errors import ArgumentError
 from dbbstation.files.inputs import in_a_book
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.declare import File, Option, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -69,7 +69,6 @@ def export(
     from dbbstation.files.recordings.session import read_session
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.export import ExportResult
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.exporting import exporting, write_csv, write_parquet
 
     path = Path(out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.declare import File, Option, paths_of, task
 from dbbstation.tasks.telling import never, silent
 
 if TYPE_CHECKING:
@@ -63,7 +63,6 @@ def history(
     from pathlib import Path
 
     from dbbstation.history.trend import TrendOptions
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.histories import histories_in
 
     asked = TrendOptions(coverage_factor, tolerances, false_alarms, tuple(tests), tuple(exclude))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Files, Names, Option, task
+from dbbstation.tasks.declare import File, Files, Names, Option, paths_of, task
 from dbbstation.tasks.drawing import drawing
 from dbbstation.tasks.telling import Telling, never, silent
 
@@ -186,7 +186,6 @@ def mismatch(
     from dbbstation.files.formats.number_language import number_language
     from dbbstation.files.own_classes import load_sources
     from dbbstation.results.mismatch import mismatch_result
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.tables import (
         TableOptions,
         load_rows,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Option, task
+from dbbstation.tasks.declare import Option, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -87,7 +87,6 @@ def predict(
     from dbbstation.model.uncertainty import predicted_poses
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.prediction import prediction_result
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
 
     telling = Telling(progress, stop, say)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.errors import StationError
 from dbbstation.files.inputs import in_a_book
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.declare import File, Option, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -101,7 +101,6 @@ def report(
     from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
     from dbbstation.report.html import chromium, printed, report_html
     from dbbstation.tasks.circle_runs import load_circles
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
     from dbbstation.tasks.reporting import logo_of, modelled_runs, ranked_causes, read_runs
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.declare import File, Option, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -72,7 +72,6 @@ def simulate(
     from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.sessions import SimulatedSession
-    from dbbstation.tasks.declare import paths_of
     from dbbstation.tasks.models import model_of
     from dbbstation.virtual.truth import SetUp, put_up
 

@@ -49,27 +49,7 @@ def _print(result: CirclesResult, *, several: bool) -> None:
     echo(f"figures of {result.edition}, filter: {result.filter}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
     rows: list[list[object]] = []
-    titles = [
-        "test",
-        "dir",
-        "n",
-        "G",
-        "U",
-        "G(LS)",
-        "U",
-        "Fmax",
-        "U",
-        "Fmin",
-        "U",
-        "X",
-        "U",
-        "Y",
-        "U",
-        "step",
-        "closure",
-        "drift",
-        "noise",
-    ]
+    titles = ["test", "dir", "n", *_titles(_OF_RUN), "step", "closure", "drift", "noise"]
     for run in result.runs:
         name: list[object] = [run.session] if several else []
         name += [run.test, run.direction, run.repeat]
@@ -81,16 +61,11 @@ def _print(result: CirclesResult, *, several: bool) -> None:
         rows.append(
             [
                 *name,
-                *_figure(run, "G", run.g_um),
-                *_figure(run, "G(LS)", run.g_least_squares_um),
-                *_figure(run, "Fmax", run.f_um.max),
-                *_figure(run, "Fmin", run.f_um.min),
-                *_figure(run, "X", run.centre_um.x),
-                *_figure(run, "Y", run.centre_um.y),
+                *_figures(run, _OF_RUN),
                 max(steps) if steps else "-",
                 "-" if run.closure is None else run.closure.height_um,
                 "-" if drift is None else drift,
-                _noise(run),
+                _fixed(run.noise_um.of_a_reading),
             ]
         )
     print_table([*head, *titles], rows)
@@ -99,31 +74,29 @@ def _print(result: CirclesResult, *, several: bool) -> None:
         rows = []
         for pair in result.pairs:
             name = [pair.session] if several else []
-            rows.append(
-                [
-                    *name,
-                    pair.test,
-                    pair.repeat,
-                    *_figure(pair, "G(b)", pair.g_um),
-                    *_figure(pair, "G(b)(LS)", pair.g_least_squares_um),
-                    *_figure(pair, "D", pair.d_um),
-                    *_figure(pair, "H", pair.h_um),
-                    pair.h_deg,
-                ]
-            )
-        print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "U", "D", "U", "H", "U"], "at [deg]"], rows)
+            rows.append([*name, pair.test, pair.repeat, *_figures(pair, _OF_PAIR), pair.h_deg])
+        print_table([*head, "test", "n", *_titles(_OF_PAIR), "at [deg]"], rows)
     echo("\nG, F and H exclude the contribution of noise; --budget states this contribution.")
     for line in why_not(result):
         echo(line)
 
 
-def _figure(run: CircleFiguresResult | PairFigures, name: str, value: float) -> tuple[str, str]:
-    return with_uncertainty(value, expanded_uncertainty(run.uncertainty[name].u_um, COVERAGE_FACTOR))
+_OF_RUN = ("G", "G(LS)", "Fmax", "Fmin", "X", "Y")
+_OF_PAIR = ("G(b)", "G(b)(LS)", "D", "H")
 
 
-def _noise(run: CircleFiguresResult) -> object:
-    noise = run.noise_um.of_a_reading
-    return "-" if noise is None else f"{noise:.2f}"
+def _titles(figures: Sequence[str]) -> list[str]:
+    return [title for figure in figures for title in (figure, "U")]
+
+
+def _figures(run: CircleFiguresResult | PairFigures, figures: Sequence[str]) -> list[str]:
+    budgets = [run.uncertainty[figure] for figure in figures]
+    shown = [with_uncertainty(one.value_um, expanded_uncertainty(one.u_um, COVERAGE_FACTOR)) for one in budgets]
+    return [cell for pair in shown for cell in pair]
+
+
+def _fixed(number: float | None, decimals: int = 2) -> str:
+    return "-" if number is None else f"{number:.{decimals}f}"
 
 
 def _print_budgets(result: CirclesResult) -> None:
@@ -134,8 +107,7 @@ def _print_budgets(result: CirclesResult) -> None:
         for quantity, budget in run.uncertainty.items():
             name = [run.test, getattr(run, "direction", "both"), run.repeat, quantity]
             rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget.terms_um.items()]
-            u = budget.u_um
-            rows.append([*name, "u, all together", "-" if u is None else f"{u:.3f}"])
+            rows.append([*name, "u, all together", _fixed(budget.u_um, 3)])
             if budget.as_read_um != budget.value_um:
                 taken = abs(budget.as_read_um - budget.value_um)
                 rows.append([*name, "added by noise, taken off", f"{taken:.3f}"])
@@ -147,26 +119,25 @@ def _print_budgets(result: CirclesResult) -> None:
 def _print_findings(runs: Sequence[CircleFiguresResult | RunWithoutCircle]) -> None:
     from dbbstation.quality.finding import FindingVerdict
 
+    found = [(run, finding) for run in runs for finding in run.findings or ()]
     rows: list[list[object]] = [
         [
             run.test,
             run.direction,
             run.repeat,
             finding.name,
-            "-" if finding.value is None else f"{finding.value:.2f}",
-            "-" if finding.limit is None else f"{finding.limit:.2f}",
+            _fixed(finding.value),
+            _fixed(finding.limit),
             finding.unit,
             finding.verdict,
         ]
-        for run in runs
-        for finding in run.findings or ()
+        for run, finding in found
     ]
     echo("\nfindings")
     print_table(["test", "dir", "n", "finding", "value", "limit", "unit", "verdict"], rows)
     wrong = [
         f"{run.test} {run.direction} {run.repeat}: {finding.name}: {finding.text}"
-        for run in runs
-        for finding in run.findings or ()
+        for run, finding in found
         if finding.verdict == FindingVerdict.WRONG
     ]
     echo("\n".join(wrong) if wrong else "nothing is wrong")

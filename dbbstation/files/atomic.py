@@ -52,17 +52,8 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
     if not rewrites:
         refuse_recorded(path)
         _refuse_input(path)
-    path = real_path(path)  # a link stays a link, what it leads to is replaced
-    with _told(path):
-        temporary = _temporary(path)
-        try:
-            _write_synced(temporary, data)
-            replace(temporary, path)
-        except BaseException:
-            remove(temporary)
-            raise
-        sync_folder(path.parent)
-    _LOG.info("wrote %s", path)
+    with _replacing(path) as file:
+        file.write(data)
 
 
 @contextlib.contextmanager
@@ -74,20 +65,24 @@ def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
     """
     refuse_existing(path, force=force)
     _refuse_input(path)
-    target = real_path(path)
+    with _replacing(path) as file:
+        yield file
+
+
+@contextlib.contextmanager
+def _replacing(path: Path) -> Iterator[BinaryIO]:
+    path = real_path(path)  # a link stays a link, what it leads to is replaced
     with _told(path):
-        temporary = _temporary(target)
+        temporary = _temporary(path)
         try:
-            with temporary.open("wb") as file:
+            with _synced(temporary) as file:
                 yield file
-                file.flush()
-                os.fsync(file.fileno())
-            replace(temporary, target)
+            replace(temporary, path)
         except BaseException:
             remove(temporary)
             raise
-        sync_folder(target.parent)
-    _LOG.info("wrote %s", target)
+        sync_folder(path.parent)
+    _LOG.info("wrote %s", path)
 
 
 def write_folder(
@@ -231,9 +226,7 @@ def _fill(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[s
             path.mkdir(parents=True, exist_ok=True)
             continue
         path.parent.mkdir(parents=True, exist_ok=True)
-        _write_synced(path, content.encode() if isinstance(content, str) else content)
-        if read_only(name):
-            set_read_only(path)
+        _write_whole(path, content, read_only=read_only(name))
     for inner in {folder, *(path for path in folder.rglob("*") if path.is_dir())}:
         sync_folder(inner)
 
@@ -247,9 +240,7 @@ def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Call
             if not name.endswith("/"):
                 temporary = _temporary(path)
                 written.append((temporary, path))
-                _write_synced(temporary, content.encode() if isinstance(content, str) else content)
-                if read_only(name):
-                    set_read_only(temporary)
+                _write_whole(temporary, content, read_only=read_only(name))
         for temporary, path in written:
             replace(temporary, path)
     except BaseException:
@@ -279,10 +270,18 @@ def _wanted_mode(path: Path) -> int:
     return 0o600 if _WITH_NAMES.fullmatch(path.name) else 0o666
 
 
-def _write_synced(path: Path, data: bytes) -> None:
+def _write_whole(path: Path, content: str | bytes, *, read_only: bool) -> None:
+    with _synced(path) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+    if read_only:
+        set_read_only(path)
+
+
+@contextlib.contextmanager
+def _synced(path: Path) -> Iterator[BinaryIO]:
     opener = open_private if _WITH_NAMES.fullmatch(path.name) else None
     with open(path, "wb", opener=opener) as file:
-        file.write(data)
+        yield file
         file.flush()
         os.fsync(file.fileno())
 

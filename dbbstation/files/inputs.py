@@ -62,6 +62,11 @@ class InputBook:
 _BOOK: ContextVar[InputBook | None] = ContextVar("inputs", default=None)
 
 
+def _book() -> InputBook:
+    """Return the open book, or one that nobody reads."""
+    return _BOOK.get() or InputBook()
+
+
 @contextmanager
 def input_book() -> Iterator[InputBook]:
     """Note every input that is read within the context."""
@@ -87,46 +92,36 @@ def in_a_book(task: Callable[Given, Result]) -> Callable[Given, Result]:
 def note_input(path: Path, digest: str) -> None:
     """Note and log a file that was read."""
     _LOG.info("read %s, sha256 %s", path, digest)
-    book = _BOOK.get()
-    if book is not None:
-        book.note(path, digest)
+    _book().note(path, digest)
 
 
 def note_known(path: Path, digest: str) -> None:
     """Note a file known from an earlier reading."""
-    book = _BOOK.get()
-    if book is not None:
-        book.note(path, digest)
-        book.note_read(path)
+    book = _book()
+    book.note(path, digest)
+    book.note_read(path)
 
 
 def note_virtual(name: str) -> None:
     """Note that an input of this name comes from a virtual machine."""
-    book = _BOOK.get()
-    if book is not None:
-        book.note_virtual(name)
+    _book().note_virtual(name)
 
 
 def virtual_so_far() -> tuple[str, ...]:
     """Return the names of all read sessions and models of virtual machines."""
-    book = _BOOK.get()
-    return () if book is None else tuple(book.virtual)
+    return tuple(_book().virtual)
 
 
 def note_read(path: Path) -> None:
     """Note a file that no output may replace."""
-    book = _BOOK.get()
-    if book is not None:
-        book.note_read(path)
+    _book().note_read(path)
 
 
 def was_read(path: Path) -> bool:
     """Return whether this command has read a file; False without a book."""
-    book = _BOOK.get()
-    return book is not None and book.was_read(path)
+    return _book().was_read(path)
 
 
 def inputs_so_far() -> dict[str, str]:
     """Return the SHA-256 of every read input by name; empty without a book."""
-    book = _BOOK.get()
-    return {} if book is None else book.named()
+    return _book().named()

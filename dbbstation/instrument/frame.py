@@ -28,10 +28,9 @@ if TYPE_CHECKING:
 
 Number: TypeAlias = DecimalText | Integer | Ieee
 
-PlainPart: TypeAlias = Annotated[
-    Literally | SignField | DecimalText | Integer | Ieee | ChoiceField | Flags | SkipField | Text | ErrorTable,
-    Field(discriminator="kind"),
-]
+_Plain: TypeAlias = Literally | SignField | Number | ChoiceField | Flags | SkipField | Text | ErrorTable
+
+PlainPart: TypeAlias = Annotated[_Plain, Field(discriminator="kind")]
 
 
 class Optionally(Schema):
@@ -81,21 +80,7 @@ class Optionally(Schema):
         return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
 
 
-Part: TypeAlias = Annotated[
-    Literally
-    | SignField
-    | DecimalText
-    | Integer
-    | Ieee
-    | ChoiceField
-    | Flags
-    | Checksum
-    | SkipField
-    | Text
-    | ErrorTable
-    | Optionally,
-    Field(discriminator="kind"),
-]
+Part: TypeAlias = Annotated[_Plain | Checksum | Optionally, Field(discriminator="kind")]
 
 
 class Frame(Schema):

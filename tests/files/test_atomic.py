@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 
@@ -46,7 +48,7 @@ def test_a_folder_that_is_missing_is_told(tmp_path: Path) -> None:
         write_bytes(tmp_path / "none" / "a", b"")
 
 
-@pytest.mark.parametrize("step", ["_write_synced", "replace"])
+@pytest.mark.parametrize("step", ["_synced", "replace"])
 def test_a_failure_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
     path = tmp_path / "a.yaml"
     path.write_text("old")
@@ -54,7 +56,7 @@ def test_a_failure_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatch:
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(atomic if step == "_write_synced" else Path, step, fail)
+    monkeypatch.setattr(atomic if step == "_synced" else Path, step, fail)
     with pytest.raises(OutputError, match="no space left on device"):
         write_text(path, "new", force=True)
     assert listing(tmp_path) == ["a.yaml"]
@@ -65,7 +67,7 @@ def test_an_interrupt_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypat
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(atomic, "_write_synced", interrupt)
+    monkeypatch.setattr(atomic, "_synced", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_text(tmp_path / "a.yaml", "new")
     assert listing(tmp_path) == []
@@ -93,16 +95,16 @@ def test_of_a_folder_all_files_or_none(tmp_path: Path, monkeypatch: pytest.Monke
     if there:
         folder.mkdir()
         (folder / "a.ngc").write_text("old")
-    write = atomic._write_synced
+    write = atomic._synced
     count = [0]
 
-    def fails_at_third(path: Path, data: bytes) -> None:
+    def fails_at_third(path: Path) -> AbstractContextManager[BinaryIO]:
         count[0] += 1
         if count[0] == 3:
             raise OSError(28, "No space left on device")
-        write(path, data)
+        return write(path)
 
-    monkeypatch.setattr(atomic, "_write_synced", fails_at_third)
+    monkeypatch.setattr(atomic, "_synced", fails_at_third)
     before = listing(tmp_path)
     with pytest.raises(OutputError, match="no space left"):
         write_folder(folder, {f"{name}.ngc": name for name in "abcd"}, force=True)

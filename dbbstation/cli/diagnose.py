@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.cli.declared import CommandOutput, command, figure, save
-from dbbstation.cli.effects import cancelling_text
+from dbbstation.cli.effects import SAID, cancelling_text, print_locations, probability_text
 from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table, say
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.results.words import ending_sentences, mismatch_sentence, outlier_sentence
@@ -113,8 +113,7 @@ def _print(result: DiagnosisFigures) -> None:
         echo(f"\n{cancelling_text(result.cancelling)}")
     if result.locations:
         echo("\nlargest misfit of the kinematic calibration:")
-        for location in result.locations[:5]:
-            echo(f"  {location.text} ({100 * location.share:.0f} % of it)")
+        print_locations(result.locations)
     _print_gain(result)
     if result.workspace:
         _print_workspace(result.workspace)
@@ -201,7 +200,7 @@ def _print_sources(sources: Sequence[SourceFinding]) -> None:
         gain = "" if source.gain is None else str(round(source.gain))
         again = "" if source.stability is None else f"{100 * source.stability:.0f} %"
         alike = ", ".join(source.ambiguous_with or source.equivalent[1:])
-        rows.append([source.name, source.verdict, _probable(source), gain, hidden, again, alike])
+        rows.append([source.name, source.verdict, probability_text(source.probability), gain, hidden, again, alike])
     titles = [
         "cause",
         "verdict",
@@ -220,17 +219,6 @@ def _print_sources(sources: Sequence[SourceFinding]) -> None:
             for name, number in source.parameters.items():
                 echo(f"{source.name}: {name} {number.in_words}")
             echo(f"  {source.text}")
-
-
-SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
-"""Verdicts of causes whose values are printed."""
-
-
-def _probable(source: SourceFinding) -> str:
-    if source.probability is None:
-        return ""
-    surest = 0.999
-    return f"> {surest}" if source.probability > surest else f"{source.probability:.3f}"
 
 
 diagnose = command(

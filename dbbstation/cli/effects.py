@@ -9,8 +9,11 @@ from dbbstation.errors import OutputError
 from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
+    from dbbstation.diagnosis.drive.findings import ForceLocation
+    from dbbstation.diagnosis.findings import Location
     from dbbstation.inference.cancelling import Cancelling
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")
 """Verdicts of effects that the recording proves."""
+
+SAID = frozenset({*SURELY_FOUND, "ambiguous"})
+"""Verdicts of causes whose values are printed."""
 
 LIKELY = 0.5
 """Least probability of an uncertain effect that is printed; the JSON has all."""
@@ -31,6 +37,20 @@ MOST_NAMES = 6
 def parts_with_gain(gains: Gains | None, *, acts: str = "always") -> str:
     """Return the number of held-out parts with gain as text; empty if other parts cannot confirm the effect."""
     return gains.counted if gains is not None and acts == "always" else ""
+
+
+def probability_text(probability: float | None) -> str:
+    """Return a cause's probability as text; empty if it has none."""
+    surest = 0.999
+    if probability is None:
+        return ""
+    return f"> {surest}" if probability > surest else f"{probability:.3f}"
+
+
+def print_locations(locations: Sequence[Location | ForceLocation]) -> None:
+    """Print where the largest misfits are."""
+    for location in locations[:5]:
+        echo(f"  {location.text} ({100 * location.share:.0f} % of it)")
 
 
 def cancelling_text(cancelling: Cancelling) -> str:

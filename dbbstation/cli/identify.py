@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
-from dbbstation.cli.effects import cancelling_text
+from dbbstation.cli.effects import SAID, cancelling_text, print_locations, probability_text
 from dbbstation.cli.output import echo, print_table
 from dbbstation.tasks.drive import identify as task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.diagnosis.drive.findings import DriveFinding, ForceLocation, HeldOutForce
+    from dbbstation.diagnosis.drive.findings import DriveFinding, HeldOutForce
     from dbbstation.results.drive import DriveResult
 
 
@@ -49,7 +49,7 @@ def show(result: DriveResult) -> None:
         echo(f"  not in the model, since these recordings do not decide on it: {', '.join(left_out)}")
     if result.locations:
         echo("\nwhere the misfit of mass and viscous friction is largest:")
-        _print_locations(result.locations)
+        print_locations(result.locations)
     _print_rest(result)
 
 
@@ -59,10 +59,10 @@ def _print_rest(result: DriveResult) -> None:
         for effect in result.unexplained.effects[:3]:
             echo(
                 f"  {effect.text}: {effect.rms_n:.2g} N rms, from {effect.low:.4g} to {effect.high:.4g} {effect.unit} "
-                f"(probability {_probability(effect.probability)})"
+                f"(probability {probability_text(effect.probability)})"
             )
         echo(f"It is {result.unexplained.rms_n:.2g} N rms; largest:")
-        _print_locations(result.unexplained.locations[:3])
+        print_locations(result.unexplained.locations[:3])
     if result.cancelling:
         echo(cancelling_text(result.cancelling))
     for sentence in result.cannot_tell:
@@ -79,17 +79,12 @@ def _print_if_worse(held: HeldOutForce | None) -> None:
         )
 
 
-def _print_locations(locations: Sequence[ForceLocation]) -> None:
-    for location in locations[:5]:
-        echo(f"  {location.text} ({100 * location.share:.0f} % of it)")
-
-
 def _print_sources(sources: Sequence[DriveFinding]) -> None:
     rows = [
         [
             s.name,
             s.verdict,
-            _probability(s.probability),
+            probability_text(s.probability),
             f"{s.gain:.0f}",
             f"{100 * s.concealed:.0f} %",
             ", ".join(s.ambiguous_with),
@@ -100,7 +95,7 @@ def _print_sources(sources: Sequence[DriveFinding]) -> None:
         ["cause", "verdict", "probability", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows
     )
     for source in sources:
-        if source.verdict in {"identified", "happened", "does-not-predict", "ambiguous"}:
+        if source.verdict in SAID:
             echo()
             _print_parts(source)
             echo(f"  {source.text}")
@@ -115,10 +110,6 @@ def _print_parts(source: DriveFinding) -> None:
         when = f"from {part.t_s[0]:.3f} to {part.t_s[1]:.3f} s, " if part.t_s else ""
         numbers = ", ".join(f"{name} {number.in_words}" for name, number in part.parameters.items())
         echo(f"{source.name}: {when}{numbers}")
-
-
-def _probability(probability: float) -> str:
-    return "> 0.999" if probability > 0.999 else f"{probability:.3f}"  # noqa: PLR2004 - three digits are shown
 
 
 identify = command(

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 def show(result: MismatchResult | SimulatorResult) -> None:
     """Print the findings."""
-    from dbbstation.cli.mismatch import show_simulator
     from dbbstation.results.simulator import SimulatorResult
 
     if isinstance(result, SimulatorResult):
@@ -108,14 +107,16 @@ def _print(result: MismatchResult) -> None:
 def _print_first(result: MismatchResult) -> None:
     unit, held_out = result.unit, result.held_out_rms
     if held_out and held_out.worse and result.levels.follows:
-        echo(
-            f"Held-out rows are predicted worse than as simulated: {held_out.after:.3g} corrected, {held_out.as_simulated:.3g} "
-            f"{unit} rms as simulated.\n".replace("  ", " ")
-        )
+        _print_worse("rows", held_out.after, held_out.as_simulated, unit)
     if result.stopped:
         echo(
             f"Ended early: {result.stopped}. This is the best answer so far; with fewer columns (--variables) the search is shorter.\n"
         )
+
+
+def _print_worse(what: str, corrected: float, as_simulated: float, unit: str) -> None:
+    sizes = f"{corrected:.3g} corrected, {as_simulated:.3g} {unit} rms as simulated.\n".replace("  ", " ")
+    echo(f"Held-out {what} are predicted worse than as simulated: {sizes}")
 
 
 def _print_whether(result: MismatchResult) -> None:
@@ -212,10 +213,7 @@ def show_simulator(result: SimulatorResult) -> None:
 def _print_simulated(result: SimulatorResult) -> None:
     unit, rms, held_out = result.unit, result.rms, result.held_out_rms
     if held_out and held_out.worse:
-        echo(
-            f"Held-out parts are predicted worse than as simulated: {held_out.corrected:.3g} corrected, "
-            f"{held_out.as_simulated:.3g} {unit} rms as simulated.\n".replace("  ", " ")
-        )
+        _print_worse("parts", held_out.corrected, held_out.as_simulated, unit)
     if result.stopped:
         echo(f"Ended early: {result.stopped}. Allow more with --most-runs.\n")
     echo("\n".join((*result.sentences(), "")))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
-from dbbstation.model.compensation import compensated, shifted
+from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.simulation import setup_of, simulate_circle
 from dbbstation.sources.contract import Motion
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.plan.plan import Plan
@@ -308,3 +309,14 @@ def _median(values: Sequence[float] | NDArray[np.float64]) -> float:
 def _spread(values: Sequence[float] | NDArray[np.float64]) -> Mapping[str, Any]:
     low, median, high = np.percentile(values, [5.0, 50.0, 95.0]).tolist()
     return {"median": median, "range": [low, high], "greatest": float(np.max(values))}
+
+
+def shifted(model: MachineModel, wanted: Motion) -> Floats:
+    """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
+
+    This first-order method leaves the orientation wrong; it is kept for comparison.
+    """
+    error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
+    poses = wanted.poses.copy()
+    poses[:, :3] -= error[:, :3]
+    return poses

@@ -132,13 +132,6 @@ class Compiling:
 
 
 @contextmanager
-def progress_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show a bar; yield a callback for the completed part of `total`."""
-    with count_bar(label) as tell:
-        yield lambda done: tell(done, total)
-
-
-@contextmanager
 def count_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """Show a bar; yield a callback for done and total.
 

@@ -116,17 +116,6 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[Floats, Passed]:
     return stretch.commanded(stretch.with_history()), stretch.passed()
 
 
-def shifted(model: MachineModel, wanted: Motion) -> Floats:
-    """Return poses shifted by minus the predicted error, tilt unchanged [GRAV 4.1], shape (n, 6) [mm, deg].
-
-    This first-order method leaves the orientation wrong; it is kept for comparison.
-    """
-    error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
-    poses = wanted.poses.copy()
-    poses[:, :3] -= error[:, :3]
-    return poses
-
-
 def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
     there = (f for f in own.acting(motion) if f.source.has_history)
     return tuple(sorted(there, key=lambda fitted: not fitted.source.builds_up))

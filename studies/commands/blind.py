@@ -57,13 +57,13 @@ def blind(
       python -m studies blind hidden --figure reliability.svg
     """
     from dbbstation.cli.output import print_json, say
-    from dbbstation.cli.progress import progress_bar
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.sources.registry import known_sources
     from dbbstation.tasks.diagnosed import default_candidates
     from studies.blind import cost, judge_sessions, read_answers
     from studies.blind_score import numbers, score
+    from studies.commands.progress import progress_bar
 
     if figure is not None:
         refuse_existing(figure, force=force)

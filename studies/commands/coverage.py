@@ -63,10 +63,10 @@ def coverage(
       python -m studies coverage --part circles --draws 1000 --keep draws
     """
     from dbbstation.cli.output import print_json
-    from dbbstation.cli.progress import progress_bar
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.places import shipped_folder
+    from studies.commands.progress import progress_bar
     from studies.coverage import coverage as experiment
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
@@ -106,7 +106,7 @@ def _plans(plan: str | None, part: str | None) -> list[str]:
 
 def _rows(which: str, draws: int | None, seed: int, keep: Path | None) -> list[Row]:
     """Return rows of a part with single draws."""
-    from dbbstation.cli.progress import progress_bar
+    from studies.commands.progress import progress_bar
     from studies.coverage_calibration import CASES, OF_BARS, coverage_of_calibration
     from studies.coverage_feed import coverage_of_feed
     from studies.coverage_noises import coverage_of_noises
@@ -143,7 +143,7 @@ def _print_rows(rows: list[Row]) -> None:
 def _circles(draws: int, seed: int, keep: Path | None, *, as_json: bool) -> dict[str, Any]:
     """Print how often U about circle figures contains the truth."""
     from dbbstation.cli.output import print_table
-    from dbbstation.cli.progress import progress_bar
+    from studies.commands.progress import progress_bar
     from studies.coverage_circles import CELLS, KINDS, coverage_of_circles, pooled
 
     with progress_bar("circles", draws * len(CELLS)) as advance:

@@ -40,11 +40,11 @@ def gravity(*, machines: int, seed: int, figure: Path | None, force: bool, as_js
       python -m studies gravity --machines 20 --figure gravity.svg --json
     """
     from dbbstation.cli.output import print_json, say
-    from dbbstation.cli.progress import progress_bar
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.places import shipped_folder
+    from studies.commands.progress import progress_bar
     from studies.gravity import gravity_study
     from studies.gravity_figure import gravity_figure
 

@@ -35,10 +35,10 @@ def table_iii(*, machines: int, rigid: bool, seed: int, as_json: bool) -> None:
       python -m studies table-iii --machines 20 --rigid --json
     """
     from dbbstation.cli.output import print_json
-    from dbbstation.cli.progress import progress_bar
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.places import shipped_folder
+    from studies.commands.progress import progress_bar
     from studies.table_iii import table_iii as experiment
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")

@@ -10,13 +10,14 @@ import pytest
 from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.machine.rotation import Frames, Rotation
-from dbbstation.model.compensation import compensated, shifted
+from dbbstation.model.compensation import compensated
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
+from studies.gravity import shifted
 
 KNOWN = known_sources()
 CIRCLE = Circle((0, 100, -1008), (0, 100, -1008), 144, (-20, 5, 2), 1000, 0, 45, 1.5, 0, Direction.CCW)

@@ -18,7 +18,7 @@ from dbbstation.files.gateway import content_of
 from dbbstation.files.places import SESSION_FILE, unused_path
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_of, read_document, validate
+from dbbstation.files.yaml.schema import format_of, read_valid
 from dbbstation.instrument.library import load_instrument
 from dbbstation.quality.conformity import Conformity
 from dbbstation.service.after import After
@@ -211,11 +211,10 @@ def instrument_of(path: Path, job: JobFile) -> str:
 
 def instrument_faults(path: Path) -> list[Problem]:
     """Return faults of a job's instrument or variant."""
-    faults: list[Problem] = []
-    document = read_document(path, JobFile, faults)
-    job = None if document is None else validate(document, JobFile, faults)
-    if document is None or job is None:
+    read = read_valid(path, JobFile, [])
+    if read is None:
         return []
+    document, job = read
     try:
         load_instrument(instrument_of(path, job), job.profile or None)
     except InputError as error:

@@ -43,6 +43,8 @@ _RUN_KEYS = {
     "p": "A pause: nothing is waited for. P again goes on.",
 }
 
+_ROW_KEYS = {"up": "The row above.", "down": "The row below."}
+
 HELP = {
     "measure": Help(
         "Measure",
@@ -115,7 +117,7 @@ HELP = {
             "One job, decided beforehand by its file. The first row begins it, or goes on with a session of it that is not complete.",
             "The rows below it are what may be changed. Below the list stand the limits and what a person looks after before the first circle.",
         ),
-        {"enter": "Begin, or change the row.", "up": "The row above.", "down": "The row below."},
+        {"enter": "Begin, or change the row.", **_ROW_KEYS},
     ),
     "operate": Help(
         "Set-up and circle",
@@ -172,8 +174,7 @@ HELP = {
             "b": "Begin: read and check everything, then the checklist.",
             "l": "Listen at the port: what answers there.",
             "delete": "Empty the row.",
-            "up": "The row above.",
-            "down": "The row below.",
+            **_ROW_KEYS,
             "escape": "Back to the sessions.",
         },
     ),
@@ -189,8 +190,7 @@ HELP = {
         {
             "enter": "Change the row.",
             "b": "Read the bar.",
-            "up": "The row above.",
-            "down": "The row below.",
+            **_ROW_KEYS,
             "escape": "Back; readings that are being taken are given up.",
         },
     ),
@@ -269,8 +269,7 @@ HELP = {
             "enter": "Hold the session against the chosen one.",
             "h": "Choose another session before.",
             "k": "End the comparison that is being made.",
-            "up": "The row above.",
-            "down": "The row below.",
+            **_ROW_KEYS,
             "escape": "Back to the results.",
         },
     ),

@@ -16,7 +16,7 @@ from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import OpenLine, RateHz, spying
 from dbbstation.cli.output import echo, print_result, say
 from dbbstation.cli.session_options import RecordingOptions
-from dbbstation.system.ports import SLOWEST, is_virtual
+from dbbstation.system.ports import SLOWEST
 from dbbstation.system.signals import CTRL_C, KILLED_POLITELY, answered, interrupt_on
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from dbbstation.cli.instrument_options import LineOptions
-    from dbbstation.files.formats.session import ReadBy
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.plan.circle import Direction
     from dbbstation.plan.plan import Plan
@@ -97,18 +96,9 @@ class Asked:
             folder=self.out,
             details=self.noted.details(protocol.length.stroke_mm),
             programs={} if programs is None else load_programs(programs, whole.to_domain(), nominal),
-            rate_hz=protocol.fastest_hz(self.line.baud),
-            range_mm=protocol.length.range_mm,
             model=self.noted.judging_model(),
-            instrument=self.read_by(protocol),
         )
-        return job, protocol
-
-    def read_by(self, protocol: Protocol) -> ReadBy:
-        """Return the session's note on the instrument."""
-        from dbbstation.files.formats.session import ReadBy
-
-        return ReadBy(protocol.name, self.line.profile or "", self.line.port, is_virtual(self.line.port))
+        return job.read_by(protocol, self.line.profile or "", self.line.port, self.line.baud), protocol
 
 
 _WAITING_SCALE = 100.0
@@ -179,7 +169,7 @@ def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
     from dbbstation.virtual.wire_clock import ScaledClock
 
     job, protocol = asked.job()
-    line, time_scale, read_by = asked.line, asked.time_scale, asked.read_by(protocol)
+    line, time_scale = asked.line, asked.time_scale
     hands = None if auto is None else VirtualHands(auto)
     stands_s = -math.inf if hands is None else hands.stands_since_s()
     waits = math.isfinite(stands_s)
@@ -190,10 +180,11 @@ def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
         clock=MachineTime(1.0 / protocol.fastest_hz(line.baud), stands_s) if waits else ScaledClock(scale),
         time_scale=scale,
         # A real machine neither has a control address of `instrument emulate` nor runs faster than it does.
-        instrument=replace(
-            read_by,
+        instrument=job.instrument
+        and replace(
+            job.instrument,
             port=f"{line.port}, in machine time" if waits else line.port,
-            virtual=auto is not None or time_scale != 1.0 or read_by.virtual,
+            virtual=auto is not None or time_scale != 1.0 or job.instrument.virtual,
         ),
     )
     job.check(str(asked.plan))

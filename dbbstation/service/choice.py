@@ -21,7 +21,6 @@ from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.opening import check_not_mixed
 from dbbstation.station.programs import load_programs
 from dbbstation.station.schedule import Schedule
-from dbbstation.system.ports import is_virtual
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -212,16 +211,8 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         choice.folder,
         details,
         programs,
-        rate_hz=protocol.fastest_hz(choice.line.baud),
-        range_mm=protocol.length.range_mm,
         model=model,
-        instrument=ReadBy(
-            protocol.name,
-            choice.line.profile,
-            choice.line.port,
-            choice.line.virtual or is_virtual(choice.line.port),
-        ),
-    )
+    ).read_by(protocol, choice.line.profile, choice.line.port, choice.line.baud)
     job.check(str(plan_file))
     domain = plan.to_domain()
     if not (choice.goes_on or choice.line.virtual or details.bar_waiver):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, refuse
-from dbbstation.files.formats.session import RunState, SessionDetails
+from dbbstation.files.formats.session import ReadBy, RunState, SessionDetails
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_checks import unlike_bar
 from dbbstation.instrument.reading import DOUBTFUL
@@ -23,6 +23,7 @@ from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer, Waiting
 from dbbstation.station.storage import Storage, time_of_day
 from dbbstation.system.mounts import free_bytes
+from dbbstation.system.ports import is_virtual, time_scale_of
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
@@ -30,9 +31,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.formats.session import ReadBy, RunEntry
+    from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
+    from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
@@ -143,6 +145,12 @@ class Job:
     range_mm: tuple[float, float] | None = None
     model: IdentifiedModel | None = None
     instrument: ReadBy | None = None
+
+    def read_by(self, protocol: Protocol, profile: str, port: str, baud: int | None) -> Job:
+        """Return the job with its instrument."""
+        by = ReadBy(protocol.name, profile, port, time_scale_of(port) is not None or is_virtual(port))
+        rate_hz = protocol.fastest_hz(baud)
+        return replace(self, rate_hz=rate_hz, range_mm=protocol.length.range_mm, instrument=by)
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan before an instrument is opened.

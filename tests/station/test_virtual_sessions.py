@@ -16,6 +16,7 @@ from dbbstation.files.formats.session import ReadBy
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
+from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
 from dbbstation.service.choice import Choice, prepare
 from dbbstation.service.front import line_to_go_on
@@ -66,6 +67,13 @@ def measured(plan_file: Path, folder: Path, by: ReadBy | None) -> Path:
     workplace.station.run()
     workplace.close()
     return folder
+
+
+@pytest.mark.parametrize("line", [REAL_LINE, VIRTUAL_LINE])
+def test_a_job_knows_a_virtual_port_by_its_name(plan_file: Path, tmp_path: Path, line: Line) -> None:
+    protocol = load_instrument("streaming-encoder")
+    by = job(plan_file, tmp_path, None).read_by(protocol, "", line.port, None).instrument
+    assert by == ReadBy("streaming-encoder", "", line.port, virtual=line.virtual)
 
 
 def test_session_and_runs_say_what_read_them(plan_file: Path, tmp_path: Path) -> None:

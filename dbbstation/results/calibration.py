@@ -12,6 +12,7 @@ from dbbstation.facts.value import Value, finite
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.provenance import Provenance
 from dbbstation.model.identified import IdentifiedModel
+from dbbstation.results.evaluation import rows_of
 from dbbstation.results.frame import Framed
 
 
@@ -57,3 +58,7 @@ class CalibrationResult(Framed, CalibrationFigures):
             for one in self.sources
             for name, each in one.parameters.items()
         ]
+
+    def run_rows(self) -> list[dict[str, object]]:
+        """Return figures of runs before and after as rows."""
+        return rows_of(self.runs)

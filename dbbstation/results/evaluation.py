@@ -37,13 +37,18 @@ class EvaluationResult(Framed):
     tolerances: Annotated[tuple[EvaluatedTolerance, ...] | None, Absent] = ()
 
     def rows(self) -> list[dict[str, object]]:
-        """Return one row per run; lengths in µm."""
-        rows = []
-        for run in self.runs:
-            row: dict[str, object] = {"test": run.test, "direction": run.direction, "repeat": run.repeat}
-            for when, of in (("measured", run.measured), ("before", run.before), ("after", run.after)):
-                row[f"{when}_centre_deviation_um"] = of.centre_deviation_um
-                row[f"{when}_mean_radial_error_um"] = of.mean_radial_error_um
-                row[f"{when}_circularity_um"] = of.circularity_um
-            rows.append(row)
-        return rows
+        """Return one row per run."""
+        return rows_of(self.runs)
+
+
+def rows_of(runs: tuple[EvaluatedRun, ...]) -> list[dict[str, object]]:
+    """Return figures of runs as rows; lengths in µm."""
+    rows = []
+    for run in runs:
+        row: dict[str, object] = {"test": run.test, "direction": run.direction, "repeat": run.repeat}
+        for when, of in (("measured", run.measured), ("before", run.before), ("after", run.after)):
+            row[f"{when}_centre_deviation_um"] = of.centre_deviation_um
+            row[f"{when}_mean_radial_error_um"] = of.mean_radial_error_um
+            row[f"{when}_circularity_um"] = of.circularity_um
+        rows.append(row)
+    return rows

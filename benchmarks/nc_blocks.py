@@ -2,7 +2,7 @@
 
     python -m benchmarks.nc_blocks 50000
 
-A surface in lines of 0.5 mm, on the reference machine with drawn errors. Commits that have no `Text` need the joined lines.
+A surface in lines of 0.5 mm, on the reference machine with drawn errors. Commits that have no `LongText` need the joined lines.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.registry import dialect_named
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 
@@ -50,11 +50,11 @@ def main(blocks: int) -> None:
     model = MachineModel(machine, (struts, Fitted(sources["base-joints"], drawn.normal(0.0, 0.2, 18))))
     linuxcnc = dialect_named("linuxcnc")
 
-    def done(text: Text) -> None:
+    def done(text: LongText) -> None:
         compensated_program(linuxcnc.toolpath(text, "surface.ngc"), linuxcnc, Inverse(model))
 
-    done(Text(program(200)))  # compiles
-    text = Text(program(blocks))
+    done(LongText(program(200)))  # compiles
+    text = LongText(program(blocks))
     before_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     begin = time.process_time()
     done(text)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from unicodedata import normalize
 
 from dbbstation.errors import InputError, StationError
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 from dbbstation.nc.toolpath import DECIMALS, joined
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Dialect(ABC):
     """How far the control looks ahead in moves that turn A, B or C; None: unknown, so that feeds are not checked."""
     takes_setup: ClassVar[bool] = False
     takes_text: ClassVar[bool] = False
-    """Whether `read` takes a `Text`, too, which may be longer than memory."""
+    """Whether `read` takes a `LongText`, too, which may be longer than memory."""
     decimals: ClassVar[Sequence[int]] = DECIMALS
     """Decimals of X, Y, Z [mm], A, B, C [deg] for the mark and the check of compensated programs."""
     rotation: ClassVar[Rotation | None] = None
@@ -76,11 +76,13 @@ class Dialect(ABC):
         `toolpath.name` and `toolpath.run` identify the program, if a control needs a name or number.
         """
 
-    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> Text:
+    def write_parts(
+        self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]
+    ) -> LongText:
         """Return the program of a toolpath in parts; `head` returns header and `numbers` once all parts are made."""
         toolpath = joined(list(parts))
         header, numbers = head()
-        return Text.of(self.write(replace(toolpath, numbers=numbers), header))
+        return LongText.of(self.write(replace(toolpath, numbers=numbers), header))
 
     name_letters: ClassVar[str] = r"\s\S"
     """Letters that a program's name may have, as in brackets of a regular expression; others become underscores."""
@@ -111,7 +113,7 @@ class Dialect(ABC):
         """
 
     def toolpath(
-        self, text: str | Text, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
+        self, text: str | LongText, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         """Return the result of `read` for a program with moves.
 

@@ -26,7 +26,7 @@ from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.nc.remarks import check_kept, remarks_on
 from dbbstation.nc.setup import offset_text
-from dbbstation.nc.spilled import Spilled, Text
+from dbbstation.nc.spilled import LongText, Spilled
 from dbbstation.nc.toolpath import in_pieces
 from dbbstation.sources.contract import Motion
 
@@ -81,7 +81,7 @@ class Program:
     """
 
     name: str
-    content: Text
+    content: LongText
     points: int
     greatest_um: float | None = None
     chord_um: float | None = None
@@ -220,7 +220,7 @@ def _program(
     order = dialect.rotation or own
     written = path.in_order(order)
     if inverse is None:
-        return Program(name, Text.of(dialect.write(written, header)), _points(written))
+        return Program(name, LongText.of(dialect.write(written, header)), _points(written))
     check_joints(inverse.model.machine)
     asked_um, prefer = 1e3 * chord_mm, inverse.prefer
     # The same machine, with angles in the order of the program that is written.

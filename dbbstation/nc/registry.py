@@ -15,7 +15,7 @@ from dbbstation.nc.dialect import Dialect
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.nc.spilled import Text
+    from dbbstation.nc.spilled import LongText
 
 GROUP = "dbbstation.dialects"
 """Entry points of this group name classes that derive from `Dialect`."""
@@ -50,7 +50,7 @@ def dialect_named(name: str) -> Dialect:
     return looked_up(name, known_dialects(), called="NC dialect", error=StationError, how_to_add=HOW_TO_ADD)
 
 
-def dialect_of_file(file: str, text: str | Text) -> Dialect:
+def dialect_of_file(file: str, text: str | LongText) -> Dialect:
     """Return a program's dialect by its extension, or by its text if several dialects share the extension.
 
     Raises:

@@ -105,7 +105,7 @@ def forget(values: NDArray[Any]) -> None:
         base.madvise(mmap.MADV_DONTNEED)
 
 
-class Text:
+class LongText:
     """A text as UTF-8, perhaps long.
 
     Attributes:
@@ -119,9 +119,9 @@ class Text:
             self.add(block)
 
     @classmethod
-    def of(cls, text: str | Text) -> Text:
+    def of(cls, text: str | LongText) -> LongText:
         """Return a text as this class."""
-        if isinstance(text, Text):
+        if isinstance(text, LongText):
             return text
         pieces = (text[begin : begin + BLOCK_BYTES] for begin in range(0, len(text), BLOCK_BYTES))
         return cls(piece.encode("utf-8", "surrogatepass") for piece in pieces)

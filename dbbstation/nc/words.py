@@ -14,7 +14,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.machine.compiled import compiled
 from dbbstation.nc.dialect import Dialect, plain
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 from dbbstation.nc.toolpath import RowKind, in_last_decimals, rounded
 
 if TYPE_CHECKING:
@@ -93,13 +93,17 @@ class WordDialect(Dialect):
         """
         return str(self._written(toolpath.parts(), lambda: (header, toolpath.numbers)))
 
-    def write_parts(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> Text:
+    def write_parts(
+        self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]
+    ) -> LongText:
         """Return the program of a toolpath in parts, each written as soon as it is made."""
         return (self._written if type(self).write is WordDialect.write else super().write_parts)(parts, head)
 
-    def _written(self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]) -> Text:
+    def _written(
+        self, parts: Iterable[Toolpath], head: Callable[[], tuple[Sequence[str], tuple[int, ...]]]
+    ) -> LongText:
         # The header, which is known last, comes first.
-        text, first, state = Text(), None, _Modal()
+        text, first, state = LongText(), None, _Modal()
         for part in parts:
             first = part if first is None else first
             text.add(self._checked(self._body(part, state)))

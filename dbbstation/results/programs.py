@@ -12,7 +12,7 @@ from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.files.atomic import streamed
 from dbbstation.files.provenance import Provenance
 from dbbstation.nc.remarks import said_acceleration
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 from dbbstation.results.frame import Framed, of_facts, picked
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class WrittenProgram:
     feed_s: float | None
     nominal_feed_s: float | None
     remarks: tuple[str, ...]
-    content: Annotated[Text, AsItIs, Kept] = field(repr=False)
+    content: Annotated[LongText, AsItIs, Kept] = field(repr=False)
 
     @property
     def text(self) -> str:
@@ -90,7 +90,7 @@ class ProgramsResult(Framed):
         return [picked(one, "file", "points", *sizes) for one in self.programs]
 
 
-def write_programs(path: Path, contents: Iterable[Text], *, force: bool) -> None:
+def write_programs(path: Path, contents: Iterable[LongText], *, force: bool) -> None:
     """Write programs into one file; see `streamed`."""
     with streamed(path, force=force) as file:
         file.writelines(block for content in contents for block in content.blocks())

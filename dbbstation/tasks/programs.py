@@ -15,7 +15,7 @@ from dbbstation.files.source_text import blocks_of
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
 from dbbstation.nc.setup import FIRST_PARAMETERS, ControlSetup
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 from dbbstation.tasks.models import model_of
 
@@ -116,26 +116,26 @@ def source_of(program: str | PathLike[str] | ProgramText) -> Path | ProgramText:
     return program if isinstance(program, ProgramText) else Path(program)
 
 
-def program_of(path: Path | ProgramText) -> Text:
+def program_of(path: Path | ProgramText) -> LongText:
     """Return a program, from UTF-8, UTF-16 with a byte order mark, or else Windows' code page, which matters in comments only.
 
     Raises:
         InputError: it cannot be read.
     """
     if isinstance(path, ProgramText):
-        return Text.of(path.text)
-    content = Text(blocks_of(path))
+        return LongText.of(path.text)
+    content = LongText(blocks_of(path))
     if content.letters[:2].tobytes() in {codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE}:
-        return Text(_as_utf8(content, "utf-16", "replace"))
+        return LongText(_as_utf8(content, "utf-16", "replace"))
     try:
         for _ in _as_utf8(content, "utf-8", "strict"):
             pass
     except UnicodeDecodeError:
-        return Text(_as_utf8(content, "cp1252", "replace"))
+        return LongText(_as_utf8(content, "cp1252", "replace"))
     return content
 
 
-def _as_utf8(content: Text, encoding: str, errors: str) -> Iterator[bytes]:
+def _as_utf8(content: LongText, encoding: str, errors: str) -> Iterator[bytes]:
     decoder = codecs.getincrementaldecoder(encoding)(errors)
     yield from (decoder.decode(block).encode("utf-8", "surrogatepass") for block in content.blocks())
     yield decoder.decode(b"", final=True).encode()

@@ -13,8 +13,8 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.nc import spilled
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.rs274 import lines
-from dbbstation.nc.rs274.lines import Lines
-from dbbstation.nc.spilled import Spilled, Text, forget
+from dbbstation.nc.rs274.lines import ProgramLines
+from dbbstation.nc.spilled import LongText, Spilled, forget
 from dbbstation.tasks.programs import program_of
 from tests.nc.grammar import part
 from tests.nc.test_long_programs import LINES
@@ -61,13 +61,13 @@ def test_values_are_those_that_were_added(monkeypatch, kind, has_room):
 @pytest.mark.parametrize("text", ["", "\n", "a", "\nb\n\n", "Fräser µ\n" * 40, "x" * 200 + "\ny\n", "\ud800\nz"])
 @USES
 def test_lines_are_those_of_the_text(text):
-    wanted, read = text.split("\n"), Lines()
+    wanted, read = text.split("\n"), ProgramLines()
     for _ in range(2):
-        found = dict(read.append(Text.of(text).letters, np.isin(np.arange(256), [ord("y"), ord("b")])))
+        found = dict(read.append(LongText.of(text).letters, np.isin(np.arange(256), [ord("y"), ord("b")])))
         assert list(found.values()) == [line for line in wanted if {"y", "b"} & set(line)]
     order = np.random.default_rng(1).permutation(len(read)).tolist()
     assert [read[at] for at in order] == [(wanted + wanted)[at] for at in order]
-    assert str(Text.of(text)) == text
+    assert str(LongText.of(text)) == text
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -105,10 +105,10 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.registry import dialect_named
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 linuxcnc, blocks = dialect_named("linuxcnc"), int(sys.argv[1])
 lines = (f"G1 X{k % 1000 / 10:.3f} Y{k // 1000 / 10:.3f}\\n".encode() for k in range(blocks))
-text = Text([b"G21 G90\\nG0 X0 Y0 Z-1000 A0 B0 C0\\nF600\\n"])
+text = LongText([b"G21 G90\\nG0 X0 Y0 Z-1000 A0 B0 C0\\nF600\\n"])
 for line in lines:
     text.add(line)
 text.add(b"M2\\n")

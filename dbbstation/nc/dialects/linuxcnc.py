@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.setup import ControlSetup
-    from dbbstation.nc.spilled import Text
+    from dbbstation.nc.spilled import LongText
     from dbbstation.nc.toolpath import Toolpath
 
 MODES = "G21 G90 G94 G17 G40 G49"
@@ -64,7 +64,7 @@ class LinuxCNC(WordDialect):
     )
 
     def read(
-        self, text: str | Text, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
+        self, text: str | LongText, name: str, *, start: Floats | None = None, setup: ControlSetup | None = None
     ) -> Toolpath:
         return read_program(text, name, start=start, setup=setup)
 

@@ -12,11 +12,11 @@ import numpy as np
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
 from dbbstation.nc.rs274.expressions import ValueReader
-from dbbstation.nc.rs274.lines import Lines
+from dbbstation.nc.rs274.lines import ProgramLines
 from dbbstation.nc.rs274.plain import plain_lines
 from dbbstation.nc.rs274.tokens import BadLine, Place
 from dbbstation.nc.setup import ControlSetup
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -109,7 +109,7 @@ class Flow:
         self._o_lines: dict[int, OLine] = {}
         self._macros: dict[int, OLine] = {}
         self._labels: dict[str, list[OLine]] = {}
-        self._lines = Lines()
+        self._lines = ProgramLines()
         self.files: tuple[tuple[int, str], ...] = ()
         self._append(text, file)
         self._own_lines = self._count
@@ -141,7 +141,7 @@ class Flow:
             file, text = self._setup.subprogram(name) or ("", "")
             if file and file not in begun:
                 self._append(
-                    Text.of("\n".join("" if is_percent(line) else line for line in text.split("\n"))).letters, file
+                    LongText.of("\n".join("" if is_percent(line) else line for line in text.split("\n"))).letters, file
                 )
         return [one for one in self._labels.get(label, []) if one.keyword == keyword]
 

@@ -37,7 +37,7 @@ class _Stretch(NamedTuple):
     begins: Integers
 
 
-class Lines:
+class ProgramLines:
     """Lines by index, from 0; the lines of files that are appended follow."""
 
     def __init__(self) -> None:

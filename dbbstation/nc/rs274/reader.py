@@ -16,7 +16,7 @@ from dbbstation.nc.rs274.plain import LEAST_LINES
 from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup
-from dbbstation.nc.spilled import Text
+from dbbstation.nc.spilled import LongText
 from dbbstation.nc.toolpath import (
     MESSAGE,
     Ending,
@@ -46,7 +46,7 @@ ENDS = frozenset({2.0, 30.0})
 
 
 def read_program(
-    text: str | Text, file: str, *, start: Floats | None = None, setup: ControlSetup | None = None
+    text: str | LongText, file: str, *, start: Floats | None = None, setup: ControlSetup | None = None
 ) -> Toolpath:
     """Return the toolpath that a program commands.
 
@@ -57,7 +57,7 @@ def read_program(
     Raises:
         InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
     """
-    interpreter = _Interpreter(Text.of(text).lines(), file, start, setup or ControlSetup())
+    interpreter = _Interpreter(LongText.of(text).lines(), file, start, setup or ControlSetup())
     try:
         interpreter.run_all()
     except BadLine as fault:

@@ -67,3 +67,10 @@ def csv_rows(
             what = f"a cell has more than {csv.field_size_limit():,} characters"
             raise InputError.of(file, what, "check its quotation marks, or name another file", line=line) from error
         yield first_line - 1 + reader.line_num, cells
+
+
+def csv_cells(line: str, separator: str, file: str, number: int) -> list[str]:
+    """Return the cells of one line with a number in its file; raises as `csv_rows`."""
+    if '"' in line or len(line) > csv.field_size_limit():
+        return next(csv_rows([line], separator, file, first_line=number))[1]
+    return line.split(separator)  # several times as fast

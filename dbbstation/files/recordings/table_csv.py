@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, refuse
-from dbbstation.files.csv_rows import csv_rows, csv_text
+from dbbstation.files.csv_rows import csv_cells, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
 
@@ -106,13 +106,13 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
         raise InputError.of(file, "the file has no columns and no rows", "begin with a line of names")
     header, head = lines[0]
     separator = numbers.separator if numbers else max(SEPARATORS, key=head.count)
-    names = [name.strip() for name in next(csv_rows([head], separator, file, first_line=header))[1]]
+    names = [name.strip() for name in csv_cells(head, separator, file, header)]
     faults = _faults_of_names(names, needed, file, header)
     if not faults and len(lines) == 1:
         faults.append(Problem(file, header, 0, "there are no rows below this line"))
     rows, places = [], []
     for number, line in lines[1:]:
-        cells = [cell.strip() for cell in next(csv_rows([line], separator, file, first_line=number))[1]]
+        cells = [cell.strip() for cell in csv_cells(line, separator, file, number)]
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
             remedy = f"compare the line with the header; {(numbers or PLAIN).text}"

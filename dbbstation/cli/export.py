@@ -9,7 +9,7 @@ from dbbstation.cli.output import echo_line
 from dbbstation.tasks.export import export as task
 
 if TYPE_CHECKING:
-    from dbbstation.results.export import ExportResult
+    from dbbstation.results.exchange import ExportResult
 
 
 def show(result: ExportResult) -> None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Plan
-    from dbbstation.results.imported import ImportResult
+    from dbbstation.results.exchange import ImportResult
     from dbbstation.tasks.importing.names import RunName
     from dbbstation.tasks.importing.runs import ImportedRun, Reader
 
@@ -196,7 +196,7 @@ def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
 
 
 def _result(found: _Import, out: Path, *, written: bool) -> ImportResult:
-    from dbbstation.results.imported import ImportResult, TakenRun
+    from dbbstation.results.exchange import ImportResult, TakenRun
 
     runs = tuple(
         TakenRun(Path(one.file).name, one.name, len(one.run.columns.get("t_s", ())), tuple(one.computed))

@@ -10,8 +10,8 @@ import numpy as np
 from dbbstation.calibration.checks.missing_physics import is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.left_where import where_left
+from dbbstation.diagnosis.parts import SESSION_TIME, variable_of
 from dbbstation.diagnosis.shapes import SIGNED
-from dbbstation.diagnosis.variables import SESSION_TIME, variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel, Law

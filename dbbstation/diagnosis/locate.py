@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import Location
-from dbbstation.diagnosis.variables import SESSION_TIME
+from dbbstation.diagnosis.parts import SESSION_TIME
 from dbbstation.inference.blocks import runs_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import smooth

@@ -1,4 +1,4 @@
-"""Forms of a cause: all parts, one part, or a common amplitude."""
+"""Forms of a cause: all parts, one part, or a common amplitude; and the variable that it follows."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 ALIKE = "all struts alike"
 """Label of the form that has one amplitude for all struts."""
+
+SESSION_TIME = "the time of the session"
+"""Variable of warm-up and drift over a session, in which held-out tests are between others."""
 
 
 def is_shape(source: ErrorSource, machine: Machine) -> Flags:
@@ -86,3 +89,8 @@ def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
     if sets == 1 and [p.strut for p in amplitudes] == [*STRUT_NUMBERS]:
         kinds.append([(ALIKE, every)])
     return [Part(label, own, -float(np.log(len(kinds) * len(kind)))) for kind in kinds for label, own in kind]
+
+
+def variable_of(source: ErrorSource) -> str:
+    """Return a named cause's variable; its own name without a single variable."""
+    return SESSION_TIME if source.varies_with == "time" else source.varies_with or source.name

@@ -13,10 +13,9 @@ from dbbstation.results.control import KinematicsResult, ParametersResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
 from dbbstation.results.evaluation import EvaluationResult
-from dbbstation.results.export import ExportResult
+from dbbstation.results.exchange import ExportResult, ImportResult
 from dbbstation.results.fleet import FleetResult
 from dbbstation.results.history import HistoryResult
-from dbbstation.results.imported import ImportResult
 from dbbstation.results.instruments import InstrumentsResult
 from dbbstation.results.jig import HoldersResult, SheetResult
 from dbbstation.results.mismatch import MismatchResult

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.files.provenance import Provenance
-    from dbbstation.results.export import ExportResult
+    from dbbstation.results.exchange import ExportResult
     from dbbstation.tasks.telling import Progress
 
     States = str | Sequence[str]
@@ -68,7 +68,7 @@ def export(
     from dbbstation.files.provenance import from_python, refuse_existing_table
     from dbbstation.files.recordings.session import read_session
     from dbbstation.plan.plan import chosen_of
-    from dbbstation.results.export import ExportResult
+    from dbbstation.results.exchange import ExportResult
     from dbbstation.tasks.exporting import exporting, write_csv, write_parquet
 
     path = Path(out)

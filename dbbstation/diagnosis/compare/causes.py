@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
-from dbbstation.diagnosis.parts import ALIKE, amplitudes, at_point, by_amplitudes, parts_of
+from dbbstation.diagnosis.parts import ALIKE, amplitudes, at_point, by_amplitudes, parts_of, variable_of
 from dbbstation.diagnosis.shapes import variables
-from dbbstation.diagnosis.variables import variable_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import Law
 from dbbstation.sources.contract import Effect, LinearSource, Need

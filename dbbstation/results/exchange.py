@@ -1,4 +1,4 @@
-"""The result of `import`."""
+"""The results of `import` and `export`."""
 
 from __future__ import annotations
 
@@ -30,3 +30,13 @@ class ImportResult:
     mapping: Mapping[str, object]
     runs: tuple[TakenRun, ...]
     statements: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ExportResult:
+    """A written table."""
+
+    table: str
+    runs: int
+    rows: int
+    columns: tuple[str, ...]

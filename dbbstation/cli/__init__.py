@@ -109,7 +109,8 @@ imports 150,000. The peak memory of `check`, `report` and `diagnose` is the same
 def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> None:
     """Run the command line, or another group of commands, and exit with its code."""
     open_missing()
-    gc.set_threshold(NEW_OBJECTS)
+    if arguments is None:  # the process is this command's alone
+        gc.set_threshold(NEW_OBJECTS)
     # All work of this process is the program's own: the threads that `dbbstation.computing.threads` takes away are not even started.
     # Read when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import codecs
 import mmap
-import os
 import tempfile
 import weakref
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from dbbstation.system.handles import reserve
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -85,9 +86,7 @@ class Spilled:
 
     def _mapped(self, length: int, size: int) -> NDArray[Any]:
         file = self._file or tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed with this object
-        if hasattr(os, "posix_fallocate"):
-            os.posix_fallocate(file.fileno(), 0, size)  # a full disk shows here, not at a later access
-        file.truncate(size)
+        reserve(file.fileno(), size)  # a full disk shows here, not at a later access
         mapped: NDArray[Any] = np.ndarray(length, self._kind, buffer=mmap.mmap(file.fileno(), size))
         if self._file is None:
             mapped[: len(self._all)] = self._all

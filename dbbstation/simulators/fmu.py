@@ -94,8 +94,12 @@ class FmuSimulator(ExchangedSimulator):
             name: self._variables.get(name, self._of(signal)) for name, signal in self._signals.items()
         }
         try:
+            # FMPy leaves a file open whose description it cannot read, so this one is closed here.
+            with self._path.open("rb") as file:
+                description = fmpy.read_model_description(file)
             found = fmpy.simulate_fmu(
                 str(self._path),
+                model_description=description,
                 start_time=float(t[0]),
                 stop_time=float(t[-1]),
                 output_interval=float(np.min(np.diff(t))),

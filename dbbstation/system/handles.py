@@ -96,6 +96,17 @@ def write_at(handle: int, data: bytes, at: int) -> None:
         left = left[os.write(handle, left) :]
 
 
+def reserve(handle: int, size: int) -> None:
+    """Make a file `size` bytes long, where the system can with all its place on the disk.
+
+    Raises:
+        OSError: the disk is full, or the file cannot be as long.
+    """
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(handle, 0, size)
+    os.truncate(handle, size)
+
+
 def open_nothing() -> int:
     """Return a descriptor of the null device, open for reading and writing; it has the lowest free number."""
     return os.open(os.devnull, os.O_RDWR)

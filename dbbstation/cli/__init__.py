@@ -106,17 +106,23 @@ NEW_OBJECTS = 200_000
 imports 150,000. The peak memory of `check`, `report` and `diagnose` is the same without any collection."""
 
 
-def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> None:
-    """Run the command line, or another group of commands, and exit with its code."""
+def _begun(arguments: Sequence[str] | None) -> list[str]:
+    """Prepare the process, and return its arguments."""
     open_missing()
-    if arguments is None:  # the process is this command's alone
-        gc.set_threshold(NEW_OBJECTS)
     # All work of this process is the program's own: the threads that `dbbstation.computing.threads` takes away are not even started.
     # Read when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = _noted
     tell_of_compiling(Compiling())
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is not None:
+        return list(arguments)
+    gc.set_threshold(NEW_OBJECTS)  # the process is this command's alone
+    return sys.argv[1:]
+
+
+def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> None:
+    """Run the command line, or another group of commands, and exit with its code."""
+    given = _begun(arguments)
     debug = _DEBUG in given
     try:
         # Not `cli.main`, which answers Ctrl-C with an empty line of its own.

@@ -5,6 +5,7 @@ Ports are FMU inputs of the port's name; signals are its variables.
 
 from __future__ import annotations
 
+import io
 import zipfile
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from dbbstation.catalogue import FOREIGN
 from dbbstation.diagnosis.simulator.ports import SimulationFault
-from dbbstation.files.gateway import opened
+from dbbstation.files.gateway import content_of, opened
 from dbbstation.simulators.exchanged import ExchangedSimulator
 
 if TYPE_CHECKING:
@@ -94,9 +95,8 @@ class FmuSimulator(ExchangedSimulator):
             name: self._variables.get(name, self._of(signal)) for name, signal in self._signals.items()
         }
         try:
-            # FMPy leaves a file open whose description it cannot read, so this one is closed here.
-            with self._path.open("rb") as file:
-                description = fmpy.read_model_description(file)
+            # FMPy leaves a file open whose description it cannot read, so it gets the content.
+            description = fmpy.read_model_description(io.BytesIO(content_of(self._path)))
             found = fmpy.simulate_fmu(
                 str(self._path),
                 model_description=description,

@@ -63,7 +63,7 @@ _BOOK: ContextVar[InputBook | None] = ContextVar("inputs", default=None)
 
 
 def _book() -> InputBook:
-    """Return the open book, or one that nobody reads."""
+    """Return the open book, or a new one that is discarded."""
     return _BOOK.get() or InputBook()
 
 

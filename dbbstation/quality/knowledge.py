@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
+    from dbbstation.quality.finding import Finding
     from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.recording import Recording
 
@@ -175,6 +176,11 @@ class Seen:
     def stretches(self) -> dict[int, NDArray[np.uint64]]:
         """Return a cache of sorted stretches of readings, by length, for `copied`."""
         return {}
+
+    @cached_property
+    def alone(self) -> list[Finding]:
+        """Return a cache of the findings for which a run and its own expectation suffice, for `by_itself`."""
+        return []
 
     @cached_property
     def u_um(self) -> float:

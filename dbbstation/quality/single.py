@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.special import bdtrik
@@ -250,10 +249,10 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
     if one.analysis is None:
         return no_circle(one)
     expected = one.run.expected
-    if one not in _ALONE:
+    if not one.alone:
         reversals = () if expected is None else expected.reversals_deg
         raw = one.analysis.raw
-        _ALONE[one] = bump(one.analysis, reversals), spike(one.analysis, reversals), held(raw), repeated(raw)
+        one.alone.extend([bump(one.analysis, reversals), spike(one.analysis, reversals), held(raw), repeated(raw)])
     closed = closure(one.analysis, others, expected)
     slower = _slower(one, others) if closed.wrong else None
     return (
@@ -261,13 +260,9 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
         noise(one.analysis, others),
         closed,
         drift(one.analysis, others, expected),
-        *_ALONE[one],
+        *one.alone,
         slower or feed(one, others),
     )
-
-
-_ALONE: WeakKeyDictionary[Seen, tuple[Finding, ...]] = WeakKeyDictionary()
-"""Findings that need nothing but the run."""
 
 
 def _slower(one: Seen, others: Others) -> Finding | None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.quality.beside import NearAssignments, Readings, mean_of
+from dbbstation.quality.beside import SIZES, NearAssignments, Readings, mean_of
 from dbbstation.quality.finding import Finding, FindingVerdict, Name
 from dbbstation.quality.knowledge import COEFFICIENTS, along_travel
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
@@ -76,13 +76,22 @@ class Assigned:
     Args:
         effects: on the plan's circles, relative to the same reference.
         runs: the last one is new; `finding` decides its circle.
+        before: the decision on earlier runs with the same effects; its bounds are used if only the last run is new.
     """
 
-    def __init__(self, effects: PlanEffects, runs: Sequence[Seen], reference: FormerSitting | None = None) -> None:
+    def __init__(
+        self,
+        effects: PlanEffects,
+        runs: Sequence[Seen],
+        reference: FormerSitting | None = None,
+        before: Assigned | None = None,
+    ) -> None:
         self.reference, self.effects, self.circles = reference, effects, effects.circles
         self.runs = [one for one in runs if one.analysis is not None]
         self.read = [self.effects.run(one) for one in self.runs]
         self.planned = [one.planned for one in self.read]
+        self._bounds: dict[_Changes, dict[tuple[int, ...], Floats]] = {}
+        self._before = before._bounds if before is not None and before.runs == self.runs[:-1] else {}  # noqa: SLF001 - the same class
 
     def odds(self, one: Seen) -> float:
         """Return the log odds against a run's planned circle."""
@@ -91,10 +100,10 @@ class Assigned:
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
         """Return a good finding if all runs together show that a run is its planned circle, else `undecided`."""
-        against = self.odds(one) + self._cost
-        if against > self._cost - 2.0 * LOG_ODDS_LIMIT:
+        against = self.odds(one) + self.cost
+        if against > self.cost - 2.0 * LOG_ODDS_LIMIT:
             return undecided
-        limit, text = self._cost, f"all {len(self.runs)} circles together show it"
+        limit, text = self.cost, f"all {len(self.runs)} circles together show it"
         return Finding(undecided.name, max(against, 0.0), limit, "", FindingVerdict.GOOD, text)
 
     def suspects(self) -> dict[Seen, Finding]:
@@ -110,7 +119,7 @@ class Assigned:
         return found
 
     def _wrong(self, one: Seen, label: int, *, certain: bool) -> Finding:
-        value, limit = max(self.odds(one), 0.0) + self._cost, self._cost
+        value, limit = max(self.odds(one), 0.0) + self.cost, self.cost
         if label < 0:
             name, what = _OTHERWISE[label]
         elif self.circles[label].test == one.run.test:
@@ -123,7 +132,8 @@ class Assigned:
         )
 
     @cached_property
-    def _cost(self) -> float:
+    def cost(self) -> float:
+        """Return the cost of one mistake."""
         return MISTAKE + float(np.log(len(self.circles)))
 
     @cached_property
@@ -137,7 +147,7 @@ class Assigned:
                 self._follow(changes, known)
             best = sorted(known, key=known.__getitem__, reverse=True)[:WIDE]
             # If one mistake alone loses more than its cost, a further one cannot repay it.
-            best = [changes for changes in best if known[changes] >= known[()] - self._cost]
+            best = [changes for changes in best if known[changes] >= known[()] - self.cost]
         return known
 
     def _follow(self, base: _Changes, known: dict[_Changes, float]) -> None:
@@ -146,10 +156,11 @@ class Assigned:
             self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels)
         )
         known.setdefault(base, beside.log - self._mistakes(base))
-        least = known[()] + self._cost - 2.0 * LOG_ODDS_LIMIT
+        least = known[()] - max(self.cost, 2.0 * LOG_ODDS_LIMIT)
         asked = [_Asked(self, base, beside, *each, least) for each in self._changes]
+        self._bounds[base] = {tuple(run): row for each in asked for run, row in each.bounds}
         while True:
-            limits = _Limits.of(known, self._cost, len(self.runs) - 1)
+            limits = _Limits.of(known, self.cost, len(self.runs) - 1)
             wanted = [each.wanted(limits) for each in asked]
             ranked = np.sort(np.concatenate(wanted, axis=None))[-AT_ONCE:]
             if ranked[-1] == -np.inf:
@@ -160,6 +171,18 @@ class Assigned:
                 for runs, instead, log in each.scored(places) if len(places[0]) else ():
                     changes = self._with(base, runs, instead)
                     known.setdefault(changes, log - self._mistakes(changes))
+
+    def bounds(self, base: _Changes, runs: Integers, labels: int) -> Floats:
+        """Return upper bounds of log densities near an assignment from before the last run; infinite if unknown.
+
+        Args:
+            runs: shape (m, k).
+            labels: number of alternatives, j.
+        """
+        known, unknown = self._before.get(base, {}), np.full(labels, np.inf)
+        # However well the last run is predicted, its reading scatters by its own part.
+        most = -self.read[-1].half_log_determinants[self.planned[-1]]
+        return most + np.array([known.get(tuple(each), unknown) for each in runs.tolist()])
 
     def _labels(self, changes: _Changes) -> list[int]:
         labels = dict(changes)
@@ -218,7 +241,7 @@ class Assigned:
         involved[-1] = False
         shared = involved[of_run[runs]].any(axis=1)[:, None] | involved[of_label[instead]].any(axis=2)
         # Changes of the same tests may count as one mistake.
-        return np.where(shared, self._cost, self._mistakes(base) + self._cost)
+        return np.where(shared, self.cost, self._mistakes(base) + self.cost)
 
     def _mistakes(self, changes: _Changes) -> float:
         """Return the cost of mistakes; a mounting filed under another test, or an exchange of two mountings, counts as one."""
@@ -232,7 +255,7 @@ class Assigned:
                 whole.add(frozenset({self.runs[runs[0]].run.test, shown[0]}))
             else:
                 single += len(shown)
-        return self._cost * (len(whole) + single)
+        return self.cost * (len(whole) + single)
 
     @cached_property
     def _group_of(self) -> Mapping[int, int]:
@@ -280,7 +303,11 @@ class Assigned:
 
 
 class _Asked:
-    """Assignments near a given one, with upper bounds of their log posterior densities."""
+    """Assignments near a given one, with upper bounds of their log posterior densities.
+
+    Args:
+        least: log posterior density below which none can affect a decision.
+    """
 
     def __init__(
         self,
@@ -293,10 +320,19 @@ class _Asked:
     ) -> None:
         self._beside, self._base, self._planned = beside, dict(base), sitting.planned
         self._runs, self._instead = runs, instead
-        self._logs = beside.most(runs, instead, least)
         self._fewest = sitting.fewest_mistakes(base, runs, instead)
+        self._bounds = sitting.bounds(base, runs, instead.shape[1])
+        asked = np.flatnonzero((self._bounds - self._fewest >= least).any(axis=1))
+        self._logs = np.full((len(SIZES), *self._bounds.shape), -np.inf)
+        self._logs[:, asked] = beside.most(runs[asked], instead[asked], least + sitting.cost)
+        self._bounds[asked] = np.minimum(self._bounds[asked], mean_of(self._logs[:, asked]))
         given = (instead == beside.labels[runs][:, None, :]).all(axis=2)
-        self._most = np.where(given, -np.inf, mean_of(self._logs) - self._fewest)
+        self._most = np.where(given, -np.inf, self._bounds - self._fewest)
+
+    @property
+    def bounds(self) -> Iterator[tuple[list[int], Floats]]:
+        """Return runs, and upper bounds of the log densities with their other labels, shape (j,)."""
+        return zip(self._runs.tolist(), self._bounds, strict=True)
 
     def wanted(self, limits: _Limits) -> Floats:
         """Return upper bounds of assignments that can affect a decision, shape (m, j); minus infinity elsewhere."""
@@ -313,6 +349,7 @@ class _Asked:
         self._most[places] = -np.inf
         limit = self._limit[places] + self._fewest[places]
         logs = self._beside.changed(runs, instead, self._logs[:, places[0], places[1]], limit)
+        self._bounds[places] = logs
         for k in np.flatnonzero(logs >= limit):
             yield runs[k].tolist(), instead[k].tolist(), float(logs[k])
 

@@ -67,6 +67,7 @@ class RunJudge:
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}
         self._together = SessionRuns([])
+        self._decided_before: Assigned | None = None
         self._former = former
         self._doubted: dict[events.RunId, Finding] = {}
         kept = {RunState.ACCEPTED: self._counting, RunState.REJECTED: self._rejected}
@@ -140,7 +141,8 @@ class RunJudge:
         known = {(one.test, one.circle.direction) for one in self._circles}
         if any((one.run.test, one.run.circle.direction) not in known for one in runs):
             return None
-        return Assigned(self._effects, runs, self._reference)
+        self._decided_before = Assigned(self._effects, runs, self._reference, self._decided_before)
+        return self._decided_before
 
     @cached_property
     def _effects(self) -> PlanEffects:

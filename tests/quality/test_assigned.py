@@ -173,7 +173,7 @@ def every_score(assigned: Assigned) -> dict[tuple[tuple[int, int], ...], float]:
     followed: set[tuple[tuple[int, int], ...]] = set()
     while True:
         ranked = sorted(known, key=known.__getitem__, reverse=True)[:WIDE]
-        best = [each for each in ranked if known[each] >= known[()] - assigned._cost and each not in followed]
+        best = [each for each in ranked if known[each] >= known[()] - assigned.cost and each not in followed]
         if not best:
             return known
         for base in best:
@@ -206,6 +206,28 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
     assert assigned._looked_up[()] == pytest.approx(wanted, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_from_before_a_run_change_no_decision(sitting, seed: int) -> None:
+    """A sitting in which circles are exchanged at random grows run by run; every decision is taken anew beside it."""
+    rng = np.random.default_rng(seed)
+    instead = {}
+    for one, other in rng.choice(6, (2, 2), replace=False):
+        instead |= {PLANNED[one]: PLANNED[other]} | ({PLANNED[other]: PLANNED[one]} if seed % 2 else {})
+    whole, before, spared = shown(sitting, instead), None, 0
+    for count in range(1, 7):
+        anew = Assigned(whole.effects, whole.runs[:count])
+        before = Assigned(whole.effects, whole.runs[:count], before=before)
+        assert before.suspects() == anew.suspects()
+        for name in (Name.TEST, Name.DIRECTION):
+            found, wanted = (one.finding(whole.runs[count - 1], undecided(name, "")) for one in (before, anew))
+            assert found == wanted
+        known = [
+            before.bounds(base, runs, labels.shape[1]) for base in before._bounds for runs, labels in before._changes
+        ]
+        spared += sum(int(np.isfinite(each).sum()) for each in known)
+    assert spared
 
 
 def test_all_labels_at_once_score_as_each_under_the_whole_covariance(sitting) -> None:

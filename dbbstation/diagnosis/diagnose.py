@@ -140,9 +140,9 @@ def doubtful(explained: Explained) -> set[str]:
     # causes remain.
     settled, found = explained.settled, set()
     of = partial(form_uncertainty, explained.channel.sources)
-    every = Alternatives(settled.comparison, settled.causes, settled.posterior, settled.best, of, settled.members)
+    every = Alternatives(settled, of, settled.members)
     for name, equal in every.classes.items():
-        if len(equal) == 1 and every.probability(equal) < EVEN and not every.ambiguity(name):
+        if len(equal) == 1 and settled.posterior.probability(equal) < EVEN and not every.ambiguity(name):
             found.add(name)
     return found
 

@@ -78,7 +78,9 @@ def without(explained: Explained, names: Collection[str]) -> Explained:
     settled = explained.settled
     posterior = settled.posterior
     best = next((h for h in posterior.hypotheses if not h.names.intersection(names)), Hypothesis((), 0.0))
-    return replace(explained, settled=_fitted_as_named(explained.channel, replace(settled, best=best)))
+    return replace(
+        explained, settled=_fitted_as_named(explained.channel, replace(settled, posterior=posterior.led_by(best)))
+    )
 
 
 def _with_set_up(
@@ -151,15 +153,14 @@ class _Settling:
         best = _steady(posterior, self._fitted)
         self._seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[: BOUNDS.seeds])}
         return SettledCircles(
-            self._fit,
-            posterior,
-            best,
-            comparison,
-            target,
-            causes,
-            unmodelled,
-            noise,
-            misfit_of(self._fit, noise),
+            after=self._fit,
+            posterior=posterior.led_by(best),
+            comparison=comparison,
+            target=target,
+            causes=causes,
+            unmodelled=unmodelled,
+            noise=noise,
+            left=misfit_of(self._fit, noise),
             scatter=self._scatter,
         )
 
@@ -198,14 +199,10 @@ class _Settling:
 
 
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:
-    best, named = settled.best, [cause for cause in settled.causes if cause.named]
+    named = [cause for cause in settled.causes if cause.named]
     pairs = [(member, member) for member in settled.members]
     pairs += [(member, rival) for member in settled.members for rival in _by_other_laws(settled, member)]
-    return pairs + [
-        (member, rival)
-        for member in settled.members
-        for rival in in_place_of(member.name, settled.comparison, named, best)
-    ]
+    return pairs + [(member, rival) for member in settled.members for rival in in_place_of(member.name, settled, named)]
 
 
 def _by_other_laws(settled: SettledCircles, member: Member) -> list[Member]:
@@ -269,17 +266,12 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
     joint = _joint(channel, settled.comparison, settled.best)
     if joint is not None:
         return replace(settled, after=joint, left=misfit_of(joint, settled.noise))
-    named = [h for h in settled.posterior.hypotheses if {m.name for m in h.members if m.cause.named} == fitted]
-    return (
-        replace(settled, best=named[0])
-        if named
-        else replace(
-            settled,
-            after=channel.calibration,
-            best=Hypothesis((), 0.0),
-            left=misfit_of(channel.calibration, settled.noise),
-        )
-    )
+    posterior, before = settled.posterior, channel.calibration
+    for one in posterior.hypotheses:
+        if {m.name for m in one.members if m.cause.named} == fitted:
+            return replace(settled, posterior=posterior.led_by(one))
+    nothing = posterior.led_by(Hypothesis((), 0.0))
+    return replace(settled, after=before, posterior=nothing, left=misfit_of(before, settled.noise))
 
 
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:

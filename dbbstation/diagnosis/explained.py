@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import CLOSE, search
+from dbbstation.inference.settled import Outcome
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
@@ -17,37 +18,30 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.channel import CircleChannel
     from dbbstation.diagnosis.unmodelled import Unmodelled
     from dbbstation.inference.harmonics import Misfit, Spectrum
-    from dbbstation.inference.hypotheses import Hypothesis, Posterior
-    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+    from dbbstation.inference.model_comparison import Member
 
 
-@dataclass(frozen=True, eq=False)
-class SettledCircles:
-    """The outcome of the comparison.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SettledCircles(Outcome):
+    """The outcome of the comparison, linearised about the joint fit.
 
     Attributes:
         after: joint fit of base and named causes.
-        posterior: relinearised about this fit.
         noise: estimated with all causes.
         scatter: of balls, in stated standard deviations.
     """
 
     after: Calibration
-    posterior: Posterior
-    best: Hypothesis
-    comparison: ModelComparison
     target: Floats
-    causes: tuple[Cause, ...]
     unmodelled: Unmodelled
     noise: Spectrum
     left: Misfit
     scatter: float = 1.0
-    stopped: bool = False
 
     def second_start_agrees(self) -> bool:
         """Return whether a search without seeds agrees."""
         anew = search(self.comparison, self.causes, most_members=BOUNDS.members, likely=CLOSE)
-        return anew.best.names == self.posterior.best.names
+        return anew.best.names == max(self.posterior.weights, key=self.posterior.weights.__getitem__)
 
     @property
     def members(self) -> tuple[Member, ...]:

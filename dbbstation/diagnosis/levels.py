@@ -66,15 +66,13 @@ def outcome_of(explained: Explained) -> Settled:
         rows_are="tests",
     )
     bank = CircleBank(rows, circles, settled)
-    posterior, best = settled.posterior, settled.best
-    others = tuple(one for one in posterior.hypotheses if one.names != best.names)
     return Settled(
         channel=rows,
         bank=bank,
         noise=bank.noise,
         causes=settled.causes,
         comparison=settled.comparison,
-        posterior=replace(posterior, hypotheses=(best, *others)),
+        posterior=settled.posterior,
         stopped=settled.stopped,
     )
 

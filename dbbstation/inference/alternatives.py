@@ -14,9 +14,9 @@ from dbbstation.inference.verdict import SURE
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.hypotheses import Hypothesis, Posterior
+    from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
+    from dbbstation.inference.settled import Outcome
 
 EVEN = 0.5
 """Probability above which an uncertain cause is more probably present than absent."""
@@ -39,48 +39,37 @@ class Alternatives:
 
     def __init__(
         self,
-        comparison: ModelComparison,
-        causes: Sequence[Cause],
-        posterior: Posterior,
-        best: Hypothesis,
+        settled: Outcome,
         form_uncertainty: Callable[[Member], float],
         of: Iterable[Member],
     ) -> None:
-        self._comparison, self._causes, self._best = comparison, causes, best
-        self._form_uncertainty = form_uncertainty
-        self._inside, self._weights, self._place = _inclusions(posterior)
+        self._settled, self._comparison, self._best = settled, settled.comparison, settled.best
+        self._form_uncertainty, self._posterior = form_uncertainty, settled.posterior
+        probability = self._posterior.probability
         self.classes = {member.name: self._class(member) for member in of}
         self.ambiguities = {
-            name: self.ambiguity(name) for name, equal in self.classes.items() if self.probability(equal) < SURE
+            name: self.ambiguity(name) for name, equal in self.classes.items() if probability(equal) < SURE
         }
-
-    def probability(self, names: Iterable[str]) -> float:
-        """Return the probability that at least one of the causes is present."""
-        columns = [self._place[name] for name in names if name in self._place]
-        # Rounding can make a partial sum exceed the whole.
-        return min(1.0, float(self._weights @ self._inside[:, columns].any(axis=1))) if columns else 0.0
 
     def ambiguity(self, name: str) -> tuple[str, ...]:
         """Return alternatives, most probable first: if the named cause is absent, one of these is present."""
         chosen = list(next((equal for equal in self.classes.values() if name in equal), (name,)))
-        own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
-        both = (self._weights * own) @ self._inside
-        every = self._weights @ self._inside
-        # A cause that is mostly present together with it is no alternative.
-        alone = {
-            other: float(every[k] - both[k])
-            for other, k in self._place.items()
-            if other not in chosen and both[k] < EVEN * self.probability((name,))
-        }
+        probability, shares, own = self._posterior.probability, self._posterior.shares, self._posterior.inside([name])
+        alone = {}
+        for other, places in self._posterior.sets_of.items():
+            both = float(shares[places] @ own[places])
+            # A cause that is mostly present together with it is no alternative.
+            if other not in chosen and both < EVEN * probability([name]):
+                alone[other] = probability([other]) - both
         for other in sorted(alone, key=lambda n: -alone[n]):
-            if self.probability(chosen) >= SURE or len(chosen) > BOUNDS.alternatives:
+            if probability(chosen) >= SURE or len(chosen) > BOUNDS.alternatives:
                 break
             chosen.append(other)
-        return tuple(other for other in chosen if other != name) if self.probability(chosen) >= SURE else ()
+        return tuple(other for other in chosen if other != name) if probability(chosen) >= SURE else ()
 
     def _class(self, member: Member) -> tuple[str, ...]:
         others = self._best.without(member.name)
-        rivals = [c for c in self._causes if c.name not in self._best.names and not c.setup]
+        rivals = [c for c in self._settled.causes if c.name not in self._best.names and not c.setup]
         return (member.name, *(c.name for c in rivals if self._is_alike(member, c, others)))
 
     def _is_alike(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
@@ -144,9 +133,10 @@ MOST_ALIKE = 3
 jig is ambiguous with a step over time in two of two sessions; with 6 four sessions do not change."""
 
 
-def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:
+def in_place_of(name: str, settled: Outcome, causes: Sequence[Cause]) -> list[Member]:
     """Return the best replacements of a member, each with over half of its log Bayes factor."""
-    scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
+    best = settled.best
+    scan = settled.comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
     enough = max(0.5 * best.log_factor(name), 0.0)
     return [scan.best[k] for k in np.argsort(-scan.log_factor)[: BOUNDS.rivals] if scan.log_factor[k] > enough]
 
@@ -168,17 +158,6 @@ def norm_over_sigma(products: Floats, values: Floats, covariance: Floats) -> flo
         return 0.0
     slope = products @ values / norm
     return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
-
-
-def _inclusions(posterior: Posterior) -> tuple[Flags, Floats, dict[str, int]]:
-    top = max(posterior.weights.values())
-    sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
-    place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
-    inside = np.zeros((len(sets), len(place)), dtype=bool)
-    for row, (key, _) in enumerate(sets):
-        inside[row, [place[name] for name in key]] = True
-    weights = np.exp(np.array([weight for _, weight in sets]) - top)
-    return inside, weights / weights.sum(), place
 
 
 def _inverse_root(products: Floats) -> Floats:

@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import logsumexp
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.levels import RUN, TIME
 from dbbstation.inference.model_comparison import FLEXIBLE, all_columns, belong_to
 from dbbstation.inference.patterns import Family
@@ -97,17 +95,9 @@ def follow_of(settled: Settled) -> Callable[[str], frozenset[str]]:
     return lambda name: frozenset({TIME}) if name in begun else followed_by(settled.bank, name)
 
 
-def weighted(settled: Settled) -> list[tuple[Settled, float]]:
-    """Return outcomes from all initial noise models, with probabilities."""
-    every = [settled, *settled.others]
-    logs = np.array([one.log_probability for one in every])
-    return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
-
-
 def probability_of_any(settled: Settled) -> float:
     """Return the probability that at least one cause is present."""
-    none = (share * one.posterior.probability_of(lambda names: not names) for one, share in weighted(settled))
-    return max(0.0, 1.0 - float(sum(none)))  # rounding can make the sum exceed one
+    return min(1.0, sum(share * one.posterior.probability(one.posterior.sets_of) for one, share in settled.weighted))
 
 
 class VariableProbabilities:
@@ -115,13 +105,11 @@ class VariableProbabilities:
 
     def __init__(self, settled: Settled) -> None:
         self._sets: dict[frozenset[str], float] = {}
-        for one, share in weighted(settled):
-            follow, weights = follow_of(one), one.posterior.weights
-            total = float(logsumexp(list(weights.values())))
-            for names, weight in weights.items():
-                if weight > total - NEGLIGIBLE:
-                    key = frozenset[str]().union(*(follow(name) for name in names))
-                    self._sets[key] = self._sets.get(key, 0.0) + share * float(np.exp(weight - total))
+        for one, share in settled.weighted:
+            follow, posterior = follow_of(one), one.posterior
+            for names, probability in zip(posterior.weights, posterior.shares.tolist(), strict=True):
+                key = frozenset[str]().union(*(follow(name) for name in names))
+                self._sets[key] = self._sets.get(key, 0.0) + share * probability
 
     def of(self, names: Iterable[str]) -> float:
         """Return the probability that at least one of these variables is followed."""
@@ -361,6 +349,6 @@ def way_probability(settled: Settled, wanted: Collection[str], way: str) -> floa
 
     each = (
         share * one.posterior.probability([cause.name for cause in one.causes if inside(cause, one)])
-        for one, share in weighted(settled)
+        for one, share in settled.weighted
     )
     return min(1.0, float(sum(each)))  # rounding can make the sum exceed one

@@ -20,6 +20,7 @@ from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.model_comparison import Around, Cause, ModelComparison, Scan, Variant
 
 LIKELY = 8.0
@@ -132,23 +133,39 @@ class Posterior:
 
     @property
     def best(self) -> Hypothesis:
-        """Return the most probable set."""
+        """Return the selected set, usually the most probable one."""
         return self.hypotheses[0]
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Return the probability of each set, in the order of `weights`, shape (s,)."""
+        weights = np.array(list(self.weights.values()))
+        return np.exp(weights - logsumexp(weights))
+
+    @cached_property
+    def sets_of(self) -> dict[str, Integers]:
+        """Return the places of each cause's sets in `shares`, by name in order."""
+        found: dict[str, list[int]] = {}
+        for place, names in enumerate(self.weights):
+            for name in names:
+                found.setdefault(name, []).append(place)
+        return {name: np.array(found[name]) for name in sorted(found)}
+
+    def inside(self, names: Iterable[str]) -> Flags:
+        """Return which sets have at least one cause, shape (s,)."""
+        found = np.zeros(len(self.weights), dtype=bool)
+        for name in names:
+            found[self.sets_of.get(name, [])] = True
+        return found
+
+    def led_by(self, best: Hypothesis) -> Posterior:
+        """Return the posterior with another set first."""
+        return replace(self, hypotheses=(best, *(one for one in self.hypotheses if one.names != best.names)))
 
     def probability(self, names: Iterable[str]) -> float:
         """Return the probability that at least one cause is present."""
-        wanted = frozenset(names)
-        return self.probability_of(lambda key: bool(key & wanted))
-
-    def probability_of(self, holds: Callable[[frozenset[str]], bool]) -> float:
-        """Return the probability of sets with a property."""
-        inside = [weight for key, weight in self.weights.items() if holds(key)]
         # Rounding can make a partial sum exceed the whole.
-        return min(1.0, float(np.exp(logsumexp(inside) - self._total))) if inside else 0.0
-
-    @cached_property
-    def _total(self) -> float:
-        return float(logsumexp(list(self.weights.values())))
+        return min(1.0, float(self.shares[self.inside(names)].sum()))
 
 
 def search(

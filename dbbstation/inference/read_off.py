@@ -145,10 +145,7 @@ class CauseJudge:
         self._members = {member.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
         self._alternatives = Alternatives(
-            settled.comparison,
-            settled.causes,
-            settled.posterior,
-            self._best,
+            settled,
             form_uncertainty or (lambda member: laws[member.name].form_uncertainty if member.name in laws else 0.0),
             [m for m in self._best.members if m.name not in settled.bank.nameless],
         )
@@ -176,7 +173,7 @@ class CauseJudge:
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._equal(cause.name)
-        probability = self._settled.averaged(self._alternatives.probability(equal), equal)
+        probability = self._settled.probability(equal)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not limit the size that could be hidden.
@@ -291,7 +288,7 @@ class CauseJudge:
     def _alike(self, name: str) -> str:
         """Return a member equivalent to a cause or ambiguous with it; may be empty."""
         equal = any(name in names for names in self._classes.values())
-        if self.is_catalogue and not equal and self._alternatives.probability((name,)) <= ABSENT:
+        if self.is_catalogue and not equal and self._settled.posterior.probability([name]) <= ABSENT:
             return ""
         if found := self._levels.alike(name):
             return found

@@ -179,7 +179,15 @@ def _settled(
         starts = [grown(comparison, causes, members, work) for members in (*starts, best)]
         posterior = search(comparison, causes, [*starts, *seeds.values()], how.most_expanded, work=work)
         seeds |= {h.names: h.members for h in posterior.hypotheses[: BOUNDS.seeds]}
-        settled = met = Settled(channel, bank, bank.noise, causes, comparison, posterior, dict(bank.refused))
+        settled = met = Settled(
+            channel=channel,
+            bank=bank,
+            noise=bank.noise,
+            causes=causes,
+            comparison=comparison,
+            posterior=posterior,
+            refused=dict(bank.refused),
+        )
         best = posterior.best.members
         compared = settled if looking else None
         if rough := _rough(settled, laid_out, work):
@@ -335,7 +343,7 @@ def _laws_of(settled: Settled) -> list[Member]:
     found = [m for m in best.members if m.name in laws]
     rivals = [cause for cause in settled.causes if cause.name in laws]
     for member in best.members:
-        found += in_place_of(member.name, settled.comparison, rivals, best)
+        found += in_place_of(member.name, settled, rivals)
     return list({m.name: m for m in found}.values())
 
 

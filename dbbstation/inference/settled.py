@@ -7,6 +7,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import logsumexp
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -31,30 +32,43 @@ class Beginning(Enum):
     NOTHING_LONG_TAILS = "nothing, with long tails"
 
 
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """The outcome of a comparison.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome:
+    """The outcome of a comparison of sets of causes.
 
     Attributes:
-        stopped: whether the search reached its limit of work; the result is then the best so far.
+        stopped: whether the search ended early; the result is then the best so far.
     """
 
-    channel: Channel
-    bank: Bank
-    noise: Coloured
     causes: tuple[Cause, ...]
     comparison: ModelComparison
     posterior: Posterior
-    refused: Mapping[str, str] = field(default_factory=dict)
-    beginning: Beginning = Beginning.EVERYTHING
-    log_probability: float = 0.0
-    others: tuple[Settled, ...] = ()
     stopped: bool = False
 
     @property
     def best(self) -> Hypothesis:
-        """Return the most probable hypothesis."""
+        """Return the selected hypothesis."""
         return self.posterior.best
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Settled(Outcome):
+    """The outcome with its noise."""
+
+    channel: Channel
+    bank: Bank
+    noise: Coloured
+    refused: Mapping[str, str] = field(default_factory=dict)
+    beginning: Beginning = Beginning.EVERYTHING
+    log_probability: float = 0.0
+    others: tuple[Settled, ...] = ()
+
+    @property
+    def weighted(self) -> list[tuple[Settled, float]]:
+        """Return the outcomes from all initial noise models, with their probabilities."""
+        every = [self, *self.others]
+        logs = np.array([one.log_probability for one in every])
+        return list(zip(every, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
 
     def effect(self, names: Collection[str] | None = None, members: Sequence[Member] | None = None) -> Floats:
         """Return the effect of some members over all rows, in the residual's unit, shape (n,).
@@ -82,19 +96,14 @@ class Settled:
         """Return the residual beside the members, over all rows, shape (n,)."""
         return self.channel.residual - self.predicted()
 
-    def averaged(self, probability: float, names: Collection[str]) -> float:
-        """Return the probability of causes, averaged over initial noise models.
+    def probability(self, names: Collection[str]) -> float:
+        """Return the probability that at least one cause is present, averaged over initial noise models.
 
         Args:
             names: causes; found patterns of one family over equal variables count together.
         """
-        if not self.others:
-            return probability
-        kinds = {self.bank.kind_of(name) for name in names}
-        every = [probability]
-        for other in self.others:
-            alike = {cause.name for cause in other.causes if other.bank.kind_of(cause.name) in kinds}
-            every.append(other.posterior.probability(alike | set(names)))
-        weights = np.array([self.log_probability, *(other.log_probability for other in self.others)])
-        weights = np.exp(weights - weights.max())
-        return min(1.0, float(weights @ np.array(every) / weights.sum()))  # it can round to more
+        kinds, total = {self.bank.kind_of(name) for name in names}, 0.0
+        for one, share in self.weighted:
+            alike = [] if one is self else [c.name for c in one.causes if one.bank.kind_of(c.name) in kinds]
+            total += share * one.posterior.probability([*names, *alike])
+        return min(1.0, total)  # it can round to more

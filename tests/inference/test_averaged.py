@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,10 +16,12 @@ def test_noise_models_count_by_their_own_probabilities():
     other = SimpleNamespace(
         causes=[SimpleNamespace(name="a2"), SimpleNamespace(name="b1")],
         bank=bank,
-        posterior=SimpleNamespace(probability=lambda names: 0.2 if names == {"a1", "a2"} else np.nan),
+        posterior=SimpleNamespace(probability=lambda names: 0.2 if names == ["a1", "a2"] else np.nan),
         log_probability=np.log(0.3),
     )
-    alone = Settled(None, bank, None, (), None, None, log_probability=np.log(0.1))
-    both = Settled(None, bank, None, (), None, None, log_probability=np.log(0.1), others=(other,))
-    assert alone.averaged(0.8, ["a1"]) == 0.8
-    assert both.averaged(0.8, ["a1"]) == pytest.approx((0.1 * 0.8 + 0.3 * 0.2) / 0.4)
+    own = SimpleNamespace(probability=lambda names: 0.8 if names == ["a1"] else np.nan)
+    alone = Settled(
+        channel=None, bank=bank, noise=None, causes=(), comparison=None, posterior=own, log_probability=np.log(0.1)
+    )
+    assert alone.probability(["a1"]) == pytest.approx(0.8)
+    assert replace(alone, others=(other,)).probability(["a1"]) == pytest.approx((0.1 * 0.8 + 0.3 * 0.2) / 0.4)

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.inference.channel import Law
-    from dbbstation.inference.hypotheses import Hypothesis
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
 
@@ -225,10 +224,9 @@ def log_possible(fitted: DriveFit) -> float:
 def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[str, Value]:
     """Return base parameters with uncertainty over likely hypotheses."""
     posterior = settled.posterior
-    likely: list[tuple[float, Hypothesis]] = [
-        (posterior.probability_of(h.names.__eq__), h) for h in posterior.hypotheses[: BOUNDS.likely_sets]
-    ]
-    fits = [(p, measured(drive, settled, h.members).base) for p, h in likely if p > LIKELY and h is not settled.best]
+    shares = dict(zip(posterior.weights, posterior.shares.tolist(), strict=True))
+    likely = [(shares[h.names], h) for h in posterior.hypotheses[1 : BOUNDS.likely_sets]]
+    fits = [(p, measured(drive, settled, h.members).base) for p, h in likely if p > LIKELY]
     found = {}
     for name, value in best.base.items():
         between = sum(p * (base[name].value - value.value) ** 2 for p, base in fits)

@@ -123,7 +123,7 @@ WITHIN = "it is less than what the terms at its port may be off by"
 def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Mapping[str, str]]:
     outside = {one.name: one for one in node.outside}
     more = [member.name for member in settled.best.members if member.name in outside]
-    if settled.averaged(settled.posterior.probability(outside), outside) < SURE:
+    if settled.probability(outside) < SURE:
         more = []  # no further term is sure
     small = within_forms(node, settled, more)
     if small and len(small) == len(more):

@@ -47,7 +47,7 @@ class ProtocolFile(Protocol):
     profiles: dict[Name, Profile] = Field(default_factory=dict)
 
 
-def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protocol | None:
+def variant(document: YamlDocument, name: str) -> Protocol | None:
     """Return one variant of a protocol file; None with faults added.
 
     Args:
@@ -55,7 +55,7 @@ def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protoco
         name: one not under `profiles` is the usual one.
     """
     chosen = _merged(document, name if name in document.data.get("profiles", {}) else "")
-    protocol = validate(chosen, Protocol, faults)
+    protocol = validate(chosen, Protocol)
     return None if protocol is None else protocol.whole()
 
 
@@ -185,12 +185,12 @@ def read_protocol(path: Path, profile: str | None = None) -> Protocol:
 def _read(path: Path) -> dict[str, Protocol]:
     faults: list[Problem] = []
     document = load_yaml(path, faults)
-    file = validate(document, ProtocolFile, faults) if document is not None else None
+    file = validate(document, ProtocolFile) if document is not None else None
     if document is None or file is None:
         raise InputError(faults)
     if file.name != path.stem:
         remedy = f"rename the file to {file.name}.yaml or change the name in it"
-        faults.append(document.problem(("name",), f"the name {file.name!r} is not the file's", remedy))
-    variants = {name: variant(document, name, faults) for name in (file.profile, *file.profiles)}
+        document.fault(("name",), f"the name {file.name!r} is not the file's", remedy)
+    variants = {name: variant(document, name) for name in (file.profile, *file.profiles)}
     refuse(set(faults))
     return {name: one for name, one in variants.items() if one is not None}

@@ -138,7 +138,7 @@ runs:
 
 
 def parsed(text: str) -> SessionFile:
-    return validate(parse_yaml(text, "session.yaml", []), SessionFile, [])
+    return validate(parse_yaml(text, "session.yaml", []), SessionFile)
 
 
 def test_a_recording_that_is_missing_is_named_with_its_line(capsys, folder):

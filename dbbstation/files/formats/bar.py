@@ -125,7 +125,7 @@ def parse_bar(path: Path, faults: list[Problem]) -> BarFile | None:
         return None
     document, bar = read
     if bar.misread:
-        faults.append(document.problem(("readings", "mean_mm"), bar.misread, AFTER_MISREAD))
+        document.fault(("readings", "mean_mm"), bar.misread, AFTER_MISREAD)
         return None
     return bar
 

@@ -98,12 +98,12 @@ def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
     document = read_document(path, JigFile, faults)
     if document is None:
         return None
-    jig = validate(document, JigFile, faults)
-    check_balls(document, document.data.get("jig"), document.data.get("holders"), faults)
+    jig = validate(document, JigFile)
+    check_balls(document, document.data.get("jig"), document.data.get("holders"))
     return jig
 
 
-def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Problem]) -> None:  # noqa: ANN401
+def check_balls(document: YamlDocument, jig: Any, holders: Any) -> None:  # noqa: ANN401
     """Check the bores and holders of balls in the raw data, independently of other faults.
 
     Args:
@@ -111,21 +111,21 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
     """
     bores = _plain_bores(jig)
     for location, ball in document.entries("balls"):
-        _check_placed(document, location, ball, faults)
+        _check_placed(document, location, ball)
         if ball.get("placed") == UNDER_SPINDLE:
             continue
         holder = ball.get("holder")
         if isinstance(holders, dict | set) and isinstance(holder, str) and holder not in holders:
             known = ", ".join(sorted(map(str, holders))) or "none"
             what = f"{dotted(location)}: the holder `{holder}` is not in `holders`"
-            faults.append(document.problem((*location, "holder"), what, f"known: {known}"))
+            document.fault((*location, "holder"), what, f"known: {known}")
         bore, centre = ball.get("bore"), ball.get("centre_mm")
         if bores is None or not isinstance(bore, int):
             continue
         if bore not in bores:
             known = ", ".join(map(str, bores))
             what = f"{dotted(location)}: bore {bore} is not on the jig"
-            faults.append(document.problem((*location, "bore"), what, f"known: {known}"))
+            document.fault((*location, "bore"), what, f"known: {known}")
         elif isinstance(centre, tuple) and len(centre) == 3 and all(isinstance(c, int | float) for c in centre):  # noqa: PLR2004
             nearest = min(bores, key=lambda b: math.dist(bores[b], centre[:2]))
             # A holder may lean, but never over to the next bore.
@@ -135,21 +135,21 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
                     f"{dotted(location)}: the centre lies {off:.1f} mm from bore {bore}, at bore {nearest}; "
                     "expected mm in the jig frame"
                 )
-                faults.append(document.problem((*location, "centre_mm"), what, "check bore, centre and unit"))
+                document.fault((*location, "centre_mm"), what, "check bore, centre and unit")
 
 
-def _check_placed(document: YamlDocument, location: Location, ball: dict[Any, Any], faults: list[Problem]) -> None:
+def _check_placed(document: YamlDocument, location: Location, ball: dict[Any, Any]) -> None:
     if ball.get("placed") == UNDER_SPINDLE:
         for key in _OF_THE_CMM:
             if ball.get(key) is not None:
                 what = f"{dotted(location)}: a ball that is put up under the spindle has no `{key}`"
                 remedy = "take it out, or take `placed` out where a CMM measured the ball"
-                faults.append(document.problem((*location, key), what, remedy, at_key=True))
+                document.fault((*location, key), what, remedy, at_key=True)
     elif ball.get("placed", BY_CMM) == BY_CMM:
         for key in ("holder", "uncertainty_um"):
             if ball.get(key) is None:
                 what = f"{dotted(location)}: the key `{key}` is missing"
-                faults.append(document.problem((*location, key), what, "add it"))
+                document.fault((*location, key), what, "add it")
 
 
 def _plain_bores(jig: Any) -> dict[int, tuple[float, float]] | None:  # noqa: ANN401 - raw data
@@ -192,9 +192,9 @@ def checked_jig(text: str, file: str) -> JigFile:
     """
     faults: list[Problem] = []
     document = parse_yaml(text, file, faults)
-    jig = None if document is None else validate(document, JigFile, faults)
+    jig = None if document is None else validate(document, JigFile)
     if document is not None:
-        check_balls(document, document.data.get("jig"), document.data.get("holders"), faults)
+        check_balls(document, document.data.get("jig"), document.data.get("holders"))
     if jig is None or faults:
         raise InputError([replace(fault, line=0, column=0) for fault in faults])
     return jig

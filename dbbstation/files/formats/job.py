@@ -86,27 +86,23 @@ def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
     if job.bar:
         parse_bar(path.parent / job.bar, faults)
     if job.model and not (path.parent / job.model).is_file():
-        faults.append(document.problem(("model",), f"there is no file {job.model}", "check the path"))
+        document.fault(("model",), f"there is no file {job.model}", "check the path")
     if job.bar and job.bar_waiver:
-        faults.append(document.problem(("bar_waiver",), "a bar and why there is none", "leave one of both out"))
+        document.fault(("bar_waiver",), "a bar and why there is none", "leave one of both out")
     if misspelt(job.port):
         what = f"`{job.port}` is no virtual machine"
         names = f"write `{virtual_port()}`, or `{virtual_port(10.0)}`, with {SLOWEST:g} to {FASTEST:g} in place of 10"
-        faults.append(document.problem(("port",), what, names))
+        document.fault(("port",), what, names)
     if not (job.bar or job.bar_waiver or time_scale_of(job.port)):
-        faults.append(
-            document.problem(
-                ("bar",), "neither a bar nor why there is none", "name its file, or say why in `bar_waiver`"
-            )
-        )
+        document.fault(("bar",), "neither a bar nor why there is none", "name its file, or say why in `bar_waiver`")
     if plan is not None:
-        _check_tests(document, job, set(plan.to_domain().tests), faults)
+        _check_tests(document, job, set(plan.to_domain().tests))
     return job
 
 
-def _check_tests(document: YamlDocument, job: JobFile, tests: set[str], faults: list[Problem]) -> None:
+def _check_tests(document: YamlDocument, job: JobFile, tests: set[str]) -> None:
     for place, tolerance in enumerate(job.tolerances):
         for unknown in sorted(set(tolerance.tests) - tests):
             known = ", ".join(sorted(tests))
             what = f"the plan has no test `{unknown}`"
-            faults.append(document.problem(("tolerances", place, "tests"), what, f"it has {known}"))
+            document.fault(("tolerances", place, "tests"), what, f"it has {known}")

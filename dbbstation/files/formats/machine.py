@@ -112,4 +112,4 @@ def read_machine(path: Path) -> Machine:
 def parse_machine(path: Path, faults: list[Problem]) -> MachineFile | None:
     """Read a machine file; None with faults added to `faults`."""
     document = read_document(path, MachineFile, faults)
-    return None if document is None else validate(document, MachineFile, faults)
+    return None if document is None else validate(document, MachineFile)

@@ -192,7 +192,7 @@ class MappingFile(Schema):
 def parse_mapping(path: Path, faults: list[Problem]) -> MappingFile | None:
     """Read a mapping; None with every fault added to `faults`."""
     document = read_document(path, MappingFile, faults)
-    return None if document is None else validate(document, MappingFile, faults)
+    return None if document is None else validate(document, MappingFile)
 
 
 def read_mapping(path: Path) -> MappingFile:

@@ -147,7 +147,7 @@ def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Probl
     if file.provenance is not None and file.provenance.virtual:
         note_virtual(path.name)
     machine = file.machine.to_domain()
-    reader = _Sources(document, machine, known, faults)
+    reader = _Sources(document, machine, known)
     fitted = [reader.fitted(("sources", i), source) for i, source in enumerate(file.sources)]
     effects = enumerate(file.measurement_effects)
     fitted += [reader.fitted(("measurement_effects", i), effect, effect.shared) for i, effect in effects]
@@ -155,13 +155,13 @@ def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Probl
     if _is_square(file.covariance):
         count = len(file.covariance.rows)  # none at all in a model that was written by hand
         covariance = np.array(file.covariance.matrix, dtype=np.float64).reshape(count, count)
-    _check_rows(document, file, faults)
-    _check_lengths(document, file, faults)
+    _check_rows(document, file)
+    _check_lengths(document, file)
     if covariance is None:
         what = f"covariance.matrix: {len(file.covariance.rows)} rows of as many numbers were expected, one per row name"
-        faults.append(document.problem(("covariance", "matrix"), what, "restore the file as it was written"))
+        document.fault(("covariance", "matrix"), what, "restore the file as it was written")
     elif (fault := covariance_fault(covariance)) is not None:
-        faults.append(document.problem(("covariance", "matrix"), f"covariance.matrix: {fault}", "restore the file"))
+        document.fault(("covariance", "matrix"), f"covariance.matrix: {fault}", "restore the file")
     if faults or covariance is None:
         return None
     of_formulas = file.covariance.formula_variance
@@ -180,13 +180,10 @@ def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Probl
 class _Sources:
     """Turns the named sources of a document into fitted sources."""
 
-    def __init__(
-        self, document: YamlDocument, machine: Machine, known: Mapping[str, ErrorSource], faults: list[Problem]
-    ) -> None:
-        self._document = document
+    def __init__(self, document: YamlDocument, machine: Machine, known: Mapping[str, ErrorSource]) -> None:
         self._machine = machine
         self._known = known
-        self._faults = faults
+        self._fault = document.fault
         self._seen: set[tuple[str, str]] = set()
 
     def fitted(self, location: Location, entry: SourceSchema, shared: str = "") -> Fitted | None:
@@ -245,16 +242,13 @@ class _Sources:
             what = f"{source.name} {parameter.name}: {value:g} {parameter.unit} is not plausible, expected {size.range}"
             self._fault(location, what, "check the number and its unit")
 
-    def _fault(self, location: Location, what: str, remedy: str, *, at_key: bool = False) -> None:
-        self._faults.append(self._document.problem(location, what, remedy, at_key=at_key))
-
 
 def _is_square(covariance: CovarianceSchema) -> bool:
     count = len(covariance.rows)
     return len(covariance.matrix) == count and all(len(row) == count for row in covariance.matrix)
 
 
-def _check_rows(document: YamlDocument, file: ModelFile, faults: list[Problem]) -> None:
+def _check_rows(document: YamlDocument, file: ModelFile) -> None:
     named = {(source.name, "", parameter) for source in file.sources for parameter in source.parameters}
     named |= {(e.name, e.shared, parameter) for e in file.measurement_effects for parameter in e.parameters}
     seen: set[tuple[str, str, str]] = set()
@@ -262,14 +256,14 @@ def _check_rows(document: YamlDocument, file: ModelFile, faults: list[Problem]) 
         shown = " ".join(part for part in row if part)
         if row in seen:
             what = f"the covariance row `{shown}` stands here a second time"
-            faults.append(document.problem(("covariance", "rows", index), what, "remove one"))
+            document.fault(("covariance", "rows", index), what, "remove one")
         elif row not in named:
             what = f"the covariance row `{shown}` names no parameter of this model"
-            faults.append(document.problem(("covariance", "rows", index), what, "restore the file"))
+            document.fault(("covariance", "rows", index), what, "restore the file")
         seen.add(row)
 
 
-def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem]) -> None:
+def _check_lengths(document: YamlDocument, file: ModelFile) -> None:
     lists: list[tuple[Location, tuple[float, ...] | None]] = [
         (("covariance", "formula_variance"), file.covariance.formula_variance),
         *((("null_space", k), row) for k, row in enumerate(file.null_space or ())),
@@ -277,7 +271,7 @@ def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem
     for location, numbers in lists:
         if numbers is not None and len(numbers) != len(file.covariance.rows):
             what = f"{dotted(location)}: {len(numbers)} numbers, {len(file.covariance.rows)} were expected, one per row name"
-            faults.append(document.problem(location, what, "restore the file as it was written"))
+            document.fault(location, what, "restore the file as it was written")
 
 
 def covariance_fault(covariance: Floats) -> str | None:

@@ -216,17 +216,17 @@ def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
     if document is None:
         return None
     before = len(faults)
-    plan = validate(document, PlanFile, faults)
+    plan = validate(document, PlanFile)
     named = document.data.get("jig")
     jig_file = parse_jig(path.parent / named, faults) if isinstance(named, str) else None
-    holders, balls = _merged(document, jig_file, faults)
-    check_balls(document, jig_file.model_dump()["jig"] if jig_file else named, holders, faults)
+    holders, balls = _merged(document, jig_file)
+    check_balls(document, jig_file.model_dump()["jig"] if jig_file else named, holders)
     if named is None and any(ball.get("placed", BY_CMM) == BY_CMM for _, ball in document.entries("balls")):
         remedy = "add it; only a plan that puts all its balls up under the spindle needs none"
-        faults.append(document.problem((), "the key `jig` is missing", remedy))
+        document.fault((), "the key `jig` is missing", remedy)
     if jig_file is not None or not isinstance(named, str):
-        _check_tests(document, balls, faults)
-        _check_under_spindle(document, jig_file, faults)
+        _check_tests(document, balls)
+        _check_under_spindle(document, jig_file)
     if plan is None or len(faults) > before:
         return None
     if jig_file is None:
@@ -235,7 +235,7 @@ def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
     return InlinePlan(plan.model_copy(update=whole), jig_file.jig)
 
 
-def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> tuple[set[str], set[str]]:
+def _merged(document: YamlDocument, jig: JigFile | None) -> tuple[set[str], set[str]]:
     merged = []
     for kind in ("holders", "balls"):
         there = document.data.get(kind)
@@ -243,35 +243,33 @@ def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) 
         shared = set() if jig is None else set(getattr(jig, kind))
         for name in sorted(own & shared):
             what = f"{kind}: `{name}` stands in the jig file as well"
-            faults.append(document.problem((kind, name), what, "remove one", at_key=True))
+            document.fault((kind, name), what, "remove one", at_key=True)
         merged.append(own | shared)
     return merged[0], merged[1]
 
 
-def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem]) -> None:
+def _check_tests(document: YamlDocument, balls: set[str]) -> None:
     """Check tests and their balls in the raw data, independently of other faults."""
     tests = document.entries("tests")
     names = [test.get("name") for _, test in tests]
     for index in twice(names):
         location = (*tests[index][0], "name")
-        faults.append(document.problem(location, f"the test name `{names[index]}` stands here a second time", "rename"))
-    _check_file_names(document, names, faults)
+        document.fault(location, f"the test name `{names[index]}` stands here a second time", "rename")
+    _check_file_names(document, names)
     for location, test in tests:
         ball = test.get("ball")
         if isinstance(ball, str) and ball not in balls:
             what = f"{dotted(location)}: the ball `{ball}` is not in `balls`"
-            faults.append(
-                document.problem((*location, "ball"), what, f"known: {', '.join(sorted(map(str, balls))) or 'none'}")
-            )
+            document.fault((*location, "ball"), what, f"known: {', '.join(sorted(map(str, balls))) or 'none'}")
     repeats = document.data.get("repeat_at_end")
     for index, name in enumerate(repeats if isinstance(repeats, tuple) else ()):
         if name not in names:
             what = f"repeat_at_end: there is no test `{name}`"
-            faults.append(document.problem(("repeat_at_end", index), what, "name tests of this plan"))
-    _check_tilt_unit(document, faults)
+            document.fault(("repeat_at_end", index), what, "name tests of this plan")
+    _check_tilt_unit(document)
 
 
-def _check_file_names(document: YamlDocument, names: list[Any], faults: list[Problem]) -> None:
+def _check_file_names(document: YamlDocument, names: list[Any]) -> None:
     """Refuse test names that are no distinct file names on Windows, since runs and programs use them."""
     seen: dict[str, str] = {}
     for (location, _), name in zip(document.entries("tests"), names, strict=True):
@@ -280,13 +278,13 @@ def _check_file_names(document: YamlDocument, names: list[Any], faults: list[Pro
         other = seen.setdefault(name.lower(), name)
         if other != name:
             what = f"the test names `{other}` and `{name}` differ in case alone: Windows takes their files for one"
-            faults.append(document.problem((*location, "name"), what, "rename one"))
+            document.fault((*location, "name"), what, "rename one")
         if is_device(name):
             what = f"the test name `{name}` is a device on Windows, no file can be called so"
-            faults.append(document.problem((*location, "name"), what, "rename"))
+            document.fault((*location, "name"), what, "rename")
 
 
-def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> None:
+def _check_under_spindle(document: YamlDocument, jig: JigFile | None) -> None:
     """Refuse a ball that is set up under the spindle at one tilt and measured at another.
 
     A micrometer reading at the spindle is valid for one tilt.
@@ -304,10 +302,10 @@ def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: li
             what = (
                 f"{dotted(location)}: the ball `{ball}` is put up under the spindle at the tilt of test `{name_then}`"
             )
-            faults.append(document.problem((*location, "ball"), what, "give each tilt a ball of its own"))
+            document.fault((*location, "ball"), what, "give each tilt a ball of its own")
 
 
-def _check_tilt_unit(document: YamlDocument, faults: list[Problem]) -> None:
+def _check_tilt_unit(document: YamlDocument) -> None:
     tilts = [
         ((*location, key), test[key])
         for location, test in document.entries("tests")
@@ -317,4 +315,4 @@ def _check_tilt_unit(document: YamlDocument, faults: list[Problem]) -> None:
     if tilts and max(abs(tilt) for _, tilt in tilts) < _RADIANS_BELOW_DEG:
         location, tilt = tilts[0]
         what = f"{dotted(location)}: {tilt:g} deg, and no tilt of the plan is greater than {_RADIANS_BELOW_DEG:g} deg"
-        faults.append(document.problem(location, f"{what} (it looks like rad)", "give tilts in degrees"))
+        document.fault(location, f"{what} (it looks like rad)", "give tilts in degrees")

@@ -159,7 +159,7 @@ def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:
     if found.python is not None:
         _look_through(path, document, found, found.python, faults)
     elif found.fmu is not None and not (path.parent / found.fmu).is_file():
-        faults.append(document.problem(("fmu",), f"`{found.fmu}` is not there", "name an FMU beside this file"))
+        document.fault(("fmu",), f"`{found.fmu}` is not there", "name an FMU beside this file")
     return found if len(faults) == before else None
 
 
@@ -179,7 +179,7 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, pyth
     text = None if data is None else decode(data, str(source), own)
     if text is None:
         what = f"`{python}` cannot be read: {own[0].what if own else 'it is no text'}"
-        faults.append(document.problem(("python",), what, "name a Python file beside this one"))
+        document.fault(("python",), what, "name a Python file beside this one")
         return
     try:
         tree = ast.parse(text)
@@ -200,7 +200,7 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, pyth
             at: Location = ("ports", name)
             what = f"port `{name}` is never called in {python}"
             remedy = f"call `{ports}.{name}(t, signals)` where it acts"
-            faults.append(document.problem(at, what, remedy, at_key=True))
+            document.fault(at, what, remedy, at_key=True)
 
 
 def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:

@@ -139,9 +139,9 @@ def make_session_folder(
 def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
     faults: list[Problem] = []
     document = parse_yaml(text, str(folder / SESSION_FILE), faults)
-    session = None if document is None else validate(document, SessionFile, faults, folder)
-    if document is not None and session is not None and session.bar is not None:
-        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, plan.to_domain(), faults)
+    session = None if document is None else validate(document, SessionFile, folder)
+    if document is not None and session is not None:
+        check_bar(document, session.bar, plan.to_domain())
     if faults:
         raise InputError([replace(fault, file=str(folder), line=0, column=0) for fault in faults])
 

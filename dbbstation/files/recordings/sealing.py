@@ -149,7 +149,7 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
 def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog | None]:
     faults: list[Problem] = []
     document = parse_yaml(text, str(path), faults)
-    session = None if document is None else validate(document, SessionFile, faults, path.parent)
+    session = None if document is None else validate(document, SessionFile, path.parent)
     if session is None:
         raise InputError(faults)
     folder, names = path.parent, (session.machine, session.plan)

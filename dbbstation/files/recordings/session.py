@@ -286,17 +286,17 @@ def parse_session(
     document, log = document_in_force(file, faults)
     if document is None:
         return None
-    session = validate(document, SessionFile, faults, folder)
+    session = validate(document, SessionFile, folder)
     data = document.data
     named = {key: data.get(key) for key in ("machine", "plan")}
     paths = {key: folder / name for key, name in named.items() if isinstance(name, str)} | dict(instead or {})
     machine = parse_machine(paths["machine"], faults) if "machine" in paths else None
     plan = parse_plan(paths["plan"], faults) if "plan" in paths else None
     planned = None if plan is None else plan.to_domain()
-    check_runs(document, planned, folder, faults)
-    check_set_up_errors(document, planned, faults)
-    if session is not None and planned is not None and session.bar is not None:
-        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, planned, faults)
+    check_runs(document, planned, folder)
+    check_set_up_errors(document, planned)
+    if session is not None and planned is not None:
+        check_bar(document, session.bar, planned)
     if session is None:
         return None
     entries, seal = session.runs, session.seal

@@ -21,12 +21,13 @@ if TYPE_CHECKING:
     from dbbstation.errors import Problem
     from dbbstation.files.formats.session import SetUpReadings
     from dbbstation.files.yaml.text import Location, YamlDocument
+    from dbbstation.plan.bar import Bar
     from dbbstation.plan.plan import Plan
 
 _RECORDING = "recording"
 
 
-def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
+def check_runs(document: YamlDocument, plan: Plan | None, folder: Path) -> None:
     """Check runs in the raw data, with plan and disk, independently of other faults."""
     runs = document.entries("runs")
     for key, what in ((("test", "direction", "repeat"), "this run"), (("file",), "this file")):
@@ -34,37 +35,29 @@ def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: 
         for index in twice(values):
             shown = " ".join(values[index])
             text = f"{what} ({shown}) stands here a second time"
-            faults.append(document.problem(runs[index][0], text, "give each run its own repeat and file"))
+            document.fault(runs[index][0], text, "give each run its own repeat and file")
     for location, run in runs:
         test, direction = run.get("test"), run.get("direction")
         if plan is not None and isinstance(test, str):
             if test not in plan.tests:
                 what = f"the plan has no test `{test}`: this is a run of another plan"
-                faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
+                document.fault((*location, "test"), what, f"its tests: {', '.join(plan.tests)}")
             elif direction in ("ccw", "cw") and direction not in plan.tests[test].directions:
                 what = f"the plan does not run test {test} {direction}: this is a run of another plan"
-                faults.append(document.problem((*location, "direction"), what, "check plan and run"))
-        _check_file(document, location, run, folder, faults)
+                document.fault((*location, "direction"), what, "check plan and run")
+        _check_file(document, location, run, folder)
         if isinstance(run.get("program"), dict):
-            _check_file(document, (*location, "program"), run["program"], folder, faults)
+            _check_file(document, (*location, "program"), run["program"], folder)
 
 
-def check_bar(
-    document: YamlDocument, length_mm: float, stroke_mm: float | None, plan: Plan, faults: list[Problem]
-) -> None:
+def check_bar(document: YamlDocument, bar: Bar | None, plan: Plan) -> None:
     """Check that the bar can run the circles of the plan."""
-    fault = unlike_bar(length_mm, stroke_mm, plan)
+    fault = None if bar is None else unlike_bar(bar.calibrated_length_mm, bar.stroke_mm, plan)
     if fault is not None:
-        faults.append(document.problem(("bar", "calibrated_length_mm"), *fault))
+        document.fault(("bar", "calibrated_length_mm"), *fault)
 
 
-def _check_file(
-    document: YamlDocument,
-    location: Location,
-    entry: dict[str, object],
-    folder: Path,
-    faults: list[Problem],
-) -> None:
+def _check_file(document: YamlDocument, location: Location, entry: dict[str, object], folder: Path) -> None:
     file, expected = entry.get("file"), entry.get("sha256")
     if not isinstance(file, str):
         return
@@ -73,11 +66,11 @@ def _check_file(
         return  # a run that died: nothing is worked out of it, `check` names it
     if not path.is_file():
         what = f"there is no file `{file}` in the session folder"
-        faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))
+        document.fault((*location, "file"), what, "restore it, or take the entry out")
     elif isinstance(expected, str):
-        data = read_bytes(path, faults, is_input=False)
+        data = read_bytes(path, document.faults, is_input=False)
         if data is not None and hashlib.sha256(data).hexdigest() != expected:
-            faults.append(changed(str(path)))
+            document.faults.append(changed(str(path)))
 
 
 def unlike_bar(length_mm: float, stroke_mm: float | None, plan: Plan) -> tuple[str, str] | None:
@@ -113,9 +106,9 @@ def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
     """
     faults: list[Problem] = []
     document = read_document(file, SessionFile, faults)
-    session = None if document is None else validate(document, SessionFile, faults)
+    session = None if document is None else validate(document, SessionFile)
     if document is not None:
-        check_set_up_errors(document, plan, faults)
+        check_set_up_errors(document, plan)
     if session is None or faults:
         raise InputError(faults)
     return session.set_up_errors
@@ -126,7 +119,7 @@ def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
     return f"{plan.tests[test].ball.name}, {f'test {test}' if mounting is None else f'mounting {mounting}'}"
 
 
-def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[Problem]) -> None:
+def check_set_up_errors(document: YamlDocument, plan: Plan | None) -> None:
     """Check readings in the raw data, with runs and plan, independently of other faults."""
     mountings: dict[str, list[Any]] = {}
     for _, run in document.entries("runs"):
@@ -140,30 +133,29 @@ def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[
             continue
         if test not in plan.tests:
             what = f"{dotted(location)}: the plan has no test `{test}`"
-            faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
+            document.fault((*location, "test"), what, f"its tests: {', '.join(plan.tests)}")
             continue
         ball = plan.tests[test].ball
         if ball.place_known:
             what = f"{dotted(location)}: the ball `{ball.name}` of test {test} was measured by the CMM"
             remedy = "set-up errors are read of balls that the plan puts up under the spindle"
-            faults.append(document.problem((*location, "test"), what, remedy))
+            document.fault((*location, "test"), what, remedy)
         if mounting not in mountings.get(test, []):
-            faults.append(_no_such_mounting(document, location, test, mounting, mountings.get(test, [])))
+            _tell_mounting(document, location, test, mounting, mountings.get(test, []))
         other = first.setdefault(mounted_name(plan, test, mounting), location)
         if other is not location:
             what = f"{dotted(location)}: this is the mounting of {dotted(other)} a second time"
-            faults.append(document.problem(location, what, "keep one of the two"))
+            document.fault(location, what, "keep one of the two")
 
 
-def _no_such_mounting(
-    document: YamlDocument, location: Location, test: str, mounting: object, there: list[Any]
-) -> Problem:
+def _tell_mounting(document: YamlDocument, location: Location, test: str, mounting: object, there: list[Any]) -> None:
     numbers = ", ".join(dict.fromkeys(str(number) for number in there if number is not None))
     if not there:
-        return document.problem((*location, "test"), f"{dotted(location)}: test {test} has no run", "check the test")
-    if mounting is None:
+        document.fault((*location, "test"), f"{dotted(location)}: test {test} has no run", "check the test")
+    elif mounting is None:
         what = f"{dotted(location)}: the runs of test {test} have mounting numbers, the entry has none"
-        return document.problem(location, what, f"give `mounting`: {numbers}")
-    what = f"{dotted(location)}: no run of test {test} has the mounting {mounting}"
-    remedy = f"its mountings: {numbers}" if numbers else "its runs have no numbers: leave `mounting` out"
-    return document.problem((*location, "mounting"), what, remedy)
+        document.fault(location, what, f"give `mounting`: {numbers}")
+    else:
+        what = f"{dotted(location)}: no run of test {test} has the mounting {mounting}"
+        remedy = f"its mountings: {numbers}" if numbers else "its runs have no numbers: leave `mounting` out"
+        document.fault((*location, "mounting"), what, remedy)

@@ -83,7 +83,10 @@ def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument |
     faults += found
     if log is None and found:
         return None, None
-    if document is None or found or validate(document, SessionFile, []) is None:
+    if document is None:
+        return None, log
+    document = replace(document, faults=faults)
+    if found or validate(replace(document, faults=[]), SessionFile) is None:
         return document, log
     if log is not None and standing(document.data, log).stands is Stands.BEHIND:
         text = text_of(marked(with_readings(log.state(), document.data), log))
@@ -248,7 +251,7 @@ class SessionStore:
         if document is None:
             return found, None
         if not isinstance(document.data, dict) or "format" not in document.data:
-            faults.append(document.problem((), "this is no session file", "restore it"))
+            document.fault((), "this is no session file", "restore it")
             return found, None
         return found, document.data
 
@@ -274,7 +277,7 @@ class SessionStore:
 
 def _valid(data: Mapping[str, Any]) -> bool:
     document = parse_yaml(text_of(data), SESSION_FILE, [])
-    return document is not None and validate(document, SessionFile, []) is not None
+    return document is not None and validate(document, SessionFile) is not None
 
 
 def _bare(state: Mapping[str, Any]) -> dict[str, object]:

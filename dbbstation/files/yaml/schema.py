@@ -68,13 +68,13 @@ def read_document(path: Path, schema: type[Schema | Record], faults: list[Proble
         return None
     if not isinstance(document.data, dict):
         what = "the file holds no `key: value` lines"
-        faults.append(document.problem((), what, "compare it with the example of its format"))
+        document.fault((), what, "compare it with the example of its format")
         return None
-    return document if _has_format(document, format_of(schema), faults) else None
+    return document if _has_format(document, format_of(schema)) else None
 
 
-def validate(document: YamlDocument, schema: type[S], faults: list[Problem], folder: Path | None = None) -> S | None:
-    """Return a document validated by its schema; None with faults added to `faults`.
+def validate(document: YamlDocument, schema: type[S], folder: Path | None = None) -> S | None:
+    """Return a document validated by its schema; None with faults added to those of the document.
 
     Args:
         folder: to which the document's paths are relative.
@@ -88,14 +88,15 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem], fol
         # A list is too short where its items have faults, which are told.
         details = [one for one in every if one["type"] != "too_short" or one["loc"] not in inside]
         details.sort(key=lambda detail: _place(document, detail))
-        faults += few([_problem(document, schema, detail) for detail in details[: MOST_FAULTS + 1]], len(details))
+        first = [_problem(document, schema, detail) for detail in details[: MOST_FAULTS + 1]]
+        document.faults.extend(few(first, len(details)))
         return None
 
 
 def read_valid(path: Path, schema: type[S], faults: list[Problem]) -> tuple[YamlDocument, S] | None:
     """Read a YAML file by `schema` and validate it; None with faults added."""
     document = read_document(path, schema, faults)  # type: ignore[arg-type]  # a class of the union
-    found = None if document is None else validate(document, schema, faults)
+    found = None if document is None else validate(document, schema)
     return None if document is None or found is None else (document, found)
 
 
@@ -104,12 +105,12 @@ def format_of(schema: type[Schema | Record]) -> str:
     return str(get_type_hints(schema)["format"].__args__[0])
 
 
-def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) -> bool:
+def _has_format(document: YamlDocument, expected: str) -> bool:
     name = expected.partition("/")[0]
     wanted = FORMATS[name]
     if "format" not in document.data:
         what = f"the file does not say what format it has, {wanted} was expected"
-        faults.append(document.problem((), what, f"begin it with `format: {expected}`"))
+        document.fault((), what, f"begin it with `format: {expected}`")
         return False
     given = document.data["format"]
     if given == expected:
@@ -123,7 +124,7 @@ def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) ->
         remedy = "check which file is given where"
     else:
         what, remedy = f"`{shortened(str(given))}` is no format that this program knows", f"write `format: {expected}`"
-    faults.append(document.problem(("format",), what, remedy))
+    document.fault(("format",), what, remedy)
     return False
 
 

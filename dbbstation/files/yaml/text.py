@@ -47,6 +47,7 @@ class YamlDocument:
     data: Any
     value_places: dict[Location, tuple[int, int]] = field(repr=False)
     key_places: dict[Location, tuple[int, int]] = field(repr=False)
+    faults: list[Problem] = field(default_factory=list, repr=False, compare=False)
 
     def problem(self, location: Location, what: str, remedy: str = "", *, at_key: bool = False) -> Problem:
         """Return a problem at a value or its key, or at the nearest existing parent."""
@@ -56,6 +57,10 @@ class YamlDocument:
         while around and around not in self.value_places:
             around = around[:-1]
         return Problem(self.file, *self.value_places.get(around, (1, 1)), what, remedy)
+
+    def fault(self, location: Location, what: str, remedy: str = "", *, at_key: bool = False) -> None:
+        """Add the problem of a key or value to the faults."""
+        self.faults.append(self.problem(location, what, remedy, at_key=at_key))
 
     def entries(self, *location: str | int) -> list[tuple[Location, dict[Any, Any]]]:
         """Return the mappings in a sequence or mapping; empty for other types.
@@ -104,12 +109,12 @@ def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | No
     """Parse YAML text; None with reasons added to `faults`."""
     document, found = (_of_many if len(text) <= SHORT else _of_the_last)(text)
     faults += [replace(fault, file=file) for fault in found]
-    return None if document is None else replace(document, file=file)
+    return None if document is None else replace(document, file=file, faults=faults)
 
 
 def _parsed(text: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
     faults: list[Problem] = []
-    return _composed(text, "", faults), tuple(faults)
+    return _composed(text, faults), tuple(faults)
 
 
 # A file is read twice at once: for its format and for its content. Every run and program reads its plan, machine and instrument.
@@ -117,30 +122,30 @@ _of_the_last = functools.lru_cache(maxsize=1)(_parsed)
 _of_many = functools.lru_cache(maxsize=64)(_parsed)
 
 
-def _composed(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
+def _composed(text: str, faults: list[Problem]) -> YamlDocument | None:
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _Counting
     yaml.Scanner = _BoundedScanner
     try:
         root = yaml.compose(text)
     except YAMLError as error:
-        faults.append(_syntax_problem(error, text, file))
+        faults.append(_syntax_problem(error, text))
         return None
     except ValueError as error:  # a version of YAML with a thousand digits
-        faults.append(Problem(file, 1, 1, f"not YAML: {error}", "compare it with the example of its format"))
+        faults.append(Problem("", 1, 1, f"not YAML: {error}", "compare it with the example of its format"))
         return None
     except _OverBudgetError as error:
-        faults.append(Problem(file, *error.place, error.what, "check that it is the right file"))
+        faults.append(Problem("", *error.place, error.what, "check that it is the right file"))
         return None
     if root is None:
-        faults.append(Problem(file, 1, 1, "the file is empty", "start it with `format: ` and the format's name"))
+        faults.append(Problem("", 1, 1, "the file is empty", "start it with `format: ` and the format's name"))
         return None
-    walk = _Walk(file)
+    walk = _Walk()
     data = walk.value(root, ())
     if walk.faults:
         faults.extend(few(walk.faults))
         return None
-    return YamlDocument(file, data, walk.value_places, walk.key_places)
+    return YamlDocument("", data, walk.value_places, walk.key_places)
 
 
 class _OverBudgetError(Exception):
@@ -185,28 +190,27 @@ class _Counting(Composer):
         return node
 
 
-def _syntax_problem(error: YAMLError, text: str, file: str) -> Problem:
+def _syntax_problem(error: YAMLError, text: str) -> Problem:
     if isinstance(error, ReaderError):
         before = text[: error.position]
         line, column = before.count("\n") + 1, error.position - (before.rfind("\n") + 1) + 1
-        return Problem(file, line, column, f"character {error.character:#04x} is not allowed", "remove it")
+        return Problem("", line, column, f"character {error.character:#04x} is not allowed", "remove it")
     mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
     if not isinstance(error, MarkedYAMLError) or mark is None:
-        return Problem.of(file, f"not YAML: {error}", "compare it with the example of its format")
+        return Problem.of("", f"not YAML: {error}", "compare it with the example of its format")
     place = (mark.line + 1, mark.column + 1)
     said = error.problem or ""
     if "'\\t'" in said:
-        return Problem(file, *place, "a tab is used for indentation", "indent with spaces")
+        return Problem("", *place, "a tab is used for indentation", "indent with spaces")
     if "another document" in said:
-        return Problem(file, *place, "a second document starts here", "keep one document per file, remove `---`")
-    return Problem(file, *place, f"not YAML: {said}", "check brackets, quotes and indentation here and just above")
+        return Problem("", *place, "a second document starts here", "keep one document per file, remove `---`")
+    return Problem("", *place, f"not YAML: {said}", "check brackets, quotes and indentation here and just above")
 
 
 class _Walk:
     """Turns nodes into data and notes their places."""
 
-    def __init__(self, file: str) -> None:
-        self.file = file
+    def __init__(self) -> None:
         self.faults: list[Problem] = []
         self.value_places: dict[Location, tuple[int, int]] = {}
         self.key_places: dict[Location, tuple[int, int]] = {}
@@ -299,7 +303,7 @@ class _Walk:
             )
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
-        self.faults.append(Problem(self.file, *_place(node), what, remedy))
+        self.faults.append(Problem("", *_place(node), what, remedy))
 
 
 def _place(node: Node) -> tuple[int, int]:

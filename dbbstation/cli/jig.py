@@ -141,7 +141,7 @@ def sheet(
             name,
             *(f"{value:.4f}" for value in new.balls[name].centre_mm),
             f"{new.balls[name].uncertainty_um:.2f}",
-            *_texts(change),
+            *(["new", "", ""] if change is None else [f"{value:+.1f}" for value in change]),
         ]
         for name, change in balls.items()
     ]
@@ -270,10 +270,6 @@ def _change_um(old: JigFile, name: str, centre_mm: Sequence[float]) -> list[floa
     if name not in old.balls:
         return None
     return [1e3 * (new - before) for new, before in zip(centre_mm, old.balls[name].centre_mm, strict=True)]
-
-
-def _texts(change_um: Sequence[float] | None) -> list[str]:
-    return ["new", "", ""] if change_um is None else [f"{value:+.1f}" for value in change_um]
 
 
 def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str, list[Any]]:

@@ -172,7 +172,7 @@ def open_link(
         return Link(port, name=str(getattr(port, "name", None) or "open port"), owned=False, log=log)
     speed = baud or line.baud
     # A pseudo-terminal has no bits: asked a second time for parity, the system finds nothing to change and refuses.
-    has_bits = not _is_pseudo_terminal(port)
+    has_bits = not ("://" not in port and os.path.realpath(port).startswith(("/dev/pts/", "/dev/ttys")))
     bits = (line.data_bits, line.parity, line.stop_bits) if has_bits else (8, "none", 1)
     opened = None
     try:
@@ -202,10 +202,6 @@ def open_link(
 def connected_ports() -> list[tuple[str, str, str]]:
     """Return name, description and hardware id of every serial port, sorted by name."""
     return sorted((port.device, port.description or "", port.hwid or "") for port in list_ports.comports())
-
-
-def _is_pseudo_terminal(port: str) -> bool:
-    return "://" not in port and os.path.realpath(port).startswith(("/dev/pts/", "/dev/ttys"))
 
 
 def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:

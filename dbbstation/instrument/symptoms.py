@@ -111,7 +111,7 @@ def shown(raw: bytes) -> str:
 
 def _cause(protocol: Protocol, raw: bytes, baud: int, *, marked: bool) -> str:
     seven_bits = bytes(byte & 0x7F for byte in raw)
-    if seven_bits != raw and _holds_reading(protocol, seven_bits):
+    if seven_bits != raw and any(isinstance(one, Piece) for one in Decoder(protocol, joining=False).feed(seven_bits)):
         damaged = damaged_in(raw, protocol.line)
         if damaged and (marked or not parity_in(raw)):
             # A device without parity sends a zero in its place: what has an odd number of bits then is wrong.
@@ -153,7 +153,3 @@ def parity_in(raw: bytes) -> str:
 
 def _as_options(protocol: Protocol) -> str:
     return f"--instrument {protocol.name}" + (f" --profile {protocol.profile}" if protocol.profile else "")
-
-
-def _holds_reading(protocol: Protocol, raw: bytes) -> bool:
-    return any(isinstance(one, Piece) for one in Decoder(protocol, joining=False).feed(raw))

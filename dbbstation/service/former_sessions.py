@@ -66,7 +66,7 @@ def before_and_now(folder: Path) -> BeforeAndNow:
     """
     now = read_session(folder)
     under = folder.absolute().parent
-    by_sha256 = {_sha256(path): path for path in candidates(CandidateFormat.MODEL, under)}
+    by_sha256 = {digest_of(path): path for path in candidates(CandidateFormat.MODEL, under)}
     formers = (Former(one.folder, at, in_force(one, by_sha256)) for at, one in former_sessions(now, under))
     return BeforeAndNow(in_force(now, by_sha256), tuple(formers))
 
@@ -100,7 +100,3 @@ def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
             write_bytes(copy, data)
         copies.append(copy)
     return tuple(copies)
-
-
-def _sha256(path: Path) -> str:
-    return digest_of(path)

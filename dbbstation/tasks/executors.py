@@ -95,16 +95,12 @@ class WorkPool(Generic[Item, Result]):
                         "the scheduler went away", where=self.scheduler, remedy="start it, and repeat the command"
                     ) from error
                 except Exception as error:
-                    if not _is_killed(error):
+                    if not (type(error).__name__ == "KilledWorker"):
                         raise
                     result = Ended("its worker was ended, several times: by the system, where memory ran out")
                 left.remove(place)
                 yield place, result
         return False
-
-
-def _is_killed(error: Exception) -> bool:
-    return type(error).__name__ == "KilledWorker"
 
 
 @contextmanager

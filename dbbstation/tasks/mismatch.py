@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.table.applied import AppliedCorrection
-    from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.diagnosis.table.units import Meaning
     from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.mismatch import MismatchResult
@@ -239,7 +238,7 @@ def mismatch(
         tabulated.table, sources, hold_out=held_out, lacking=lacking, matters=matters, progress=telling.stage
     )
     if others is None:
-        table = _corrected(tabulated, found)
+        table = _with_correction(tabulated, found.correction, None)
     else:
         correction = applied(found, others.table, sources)
         telling.note(*others.notes, *_limits_of(correction))
@@ -252,10 +251,6 @@ def _limits_of(correction: AppliedCorrection) -> Iterator[str]:
         yield f"other rows are not corrected for {', '.join(correction.left_out)}"
     for name, count in correction.beyond.items():
         yield f"`{name}` is beyond the fitted rows in {count} of {len(correction.values)} rows: the correction is no more than a guess there"
-
-
-def _corrected(tabulated: Tabulated, found: Mismatch) -> dict[str, tuple[str | float, ...]]:
-    return _with_correction(tabulated, found.correction, None)
 
 
 def _with_correction(

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
-    from dbbstation.plan.circle import Direction
     from dbbstation.station.events import RunCompleted
     from dbbstation.tui.board_screen import Desk, Shown
 
@@ -104,7 +103,7 @@ class OverviewScreen(BoardScreen):
         self.draw()
 
     def action_go_to(self) -> None:
-        self.desk.send(GoTo(self.choice.test, self._direction()))
+        self.desk.send(GoTo(self.choice.test, self.choice.direction(self._show)))
         self.action_back()
 
     def action_take_back(self) -> None:
@@ -138,9 +137,6 @@ class OverviewScreen(BoardScreen):
     def _judge(self, completed: RunCompleted, *, accepted: bool, reason: str) -> None:
         run = completed.run
         self.desk.send(Judge(run.test, run.direction, run.repeat, accepted, reason))
-
-    def _direction(self) -> Direction:
-        return self.choice.direction(self._show)
 
     def _runs(self) -> tuple[RunCompleted, ...]:
         return self.choice.runs(self.desk.board, self._show)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.inference.blocks import Block
-    from dbbstation.model.observation import Observation
 
 
 @dataclass(frozen=True)
@@ -76,9 +75,9 @@ def gaps(calibration: Calibration) -> tuple[str, ...]:
     if any(not run.setup.place_known for run in runs):
         return ("balls put up under the spindle say nothing of the machine's place and tilt on the table",)
     found = []
-    if lost > 1 and _spread([run.raw.circle.ball_mm[2] for run in runs]) < APART_MM:
+    if lost > 1 and float(np.ptp([run.raw.circle.ball_mm[2] for run in runs])) < APART_MM:
         found.append("the balls of all tests stand at one height: add tests on a longer holder, at two more levels")
-    if lost > 1 and _tilts(runs) < TILTED_DEG:
+    if lost > 1 and float(np.ptp([run.raw.circle.tilt_deg for run in runs], axis=0).max()) < TILTED_DEG:
         found.append("all tests have one orientation: add tests with the platform tilted by 10 degrees or more")
     if lost > 1 and not found:
         tests = len({(run.setup.session, run.test) for run in runs})
@@ -89,11 +88,3 @@ def gaps(calibration: Calibration) -> tuple[str, ...]:
     if all(run.raw.circle.elevation_deg == 0.0 for run in runs):
         found.append("no test has a raised bar: five with elevation_deg: 5 show the height of the machine too")
     return tuple(found)
-
-
-def _spread(values: Sequence[float]) -> float:
-    return float(np.ptp(values))
-
-
-def _tilts(runs: Sequence[Observation]) -> float:
-    return float(np.ptp([run.raw.circle.tilt_deg for run in runs], axis=0).max())

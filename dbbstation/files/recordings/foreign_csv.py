@@ -227,7 +227,7 @@ def _language(lines: list[str], file: str) -> NumberLanguage:
 
 
 def _cells(line: str, language: NumberLanguage, file: str, number: int) -> list[str]:
-    if not line.strip() or (_is_comment(line) and language.separator not in line):
+    if not line.strip() or (line.lstrip("\ufeff ").startswith("#") and language.separator not in line):
         return []
     row = next(csv_rows([line], language.separator, file, first_line=number), (number, list[str]()))[1]
     return [cell.strip() for cell in row]
@@ -250,10 +250,6 @@ def _goes_on(rows: list[list[str]], k: int, language: NumberLanguage) -> bool:
     """Return whether the next line is also a row, because a single line of numbers may be a date."""
     following = next((row for row in rows[k + 1 :] if row), None)
     return following is not None and len(following) == len(rows[k]) and _is_row(following, language)
-
-
-def _is_comment(line: str) -> bool:
-    return line.lstrip("\ufeff ").startswith("#")
 
 
 def _comments(lines: list[str]) -> dict[str, tuple[int, str]]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.computing.arrays import Flags, Floats
+    from dbbstation.computing.arrays import Floats
     from dbbstation.files.recordings.run_lines import Lines
 
 
@@ -251,7 +251,14 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
     status = texts.pop(columns.STATUS, [])
     usable = np.array([text in {"", columns.STATUS_GOOD} for text in status], dtype=np.bool_) if status else None
     return RunFile(
-        recording=_recording(file, found, usable),
+        recording=Recording(
+            name=file,
+            t_s=found[columns.TIME],
+            length_mm=found[columns.LENGTH],
+            theta_deg=found.get(columns.THETA),
+            logged={name: values for name, values in found.items() if name not in _BY_THEMSELVES},
+            usable=usable,
+        ),
         header=header,
         unknown_columns={name: tuple(cells) for name, cells in texts.items()},
         warnings=tuple(few(warnings)),
@@ -261,17 +268,6 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
 
 _BY_THEMSELVES = (columns.TIME, columns.LENGTH, columns.THETA)
 """Columns that are separate attributes of a recording."""
-
-
-def _recording(file: str, numbers: Mapping[str, Floats], usable: Flags | None) -> Recording:
-    return Recording(
-        name=file,
-        t_s=numbers[columns.TIME],
-        length_mm=numbers[columns.LENGTH],
-        theta_deg=numbers.get(columns.THETA),
-        logged={name: values for name, values in numbers.items() if name not in _BY_THEMSELVES},
-        usable=usable,
-    )
 
 
 def counts_in(header: Mapping[str, str]) -> Counts | None:

@@ -132,7 +132,7 @@ def one(screen: str, result: str) -> None:
         yield OpenStation(station, schedule, "memory")
 
     runner = Runner(opened)
-    measured = on_screen(screen, runner, Shown(plan.name, inline.jig.bores, tests=plan.tests))
+    measured = on_screen(screen, runner, Shown(plan.name, inline.plate.bores, tests=plan.tests))
     with open(result, "w", encoding="utf-8") as file:  # noqa: PTH123
         json.dump(measured.result, file)
 

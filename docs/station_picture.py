@@ -85,7 +85,7 @@ def happened() -> tuple[Shown, list[Event | SequenceOpened]]:
         now_s += float(times[-1]) + 1.0
         if share == 1.0:
             events += sequencer.command(Accept())
-    return Shown(plan.name, inline.jig.bores, tests=plan.tests), events
+    return Shown(plan.name, inline.plate.bores, tests=plan.tests), events
 
 
 SCREENS = {"station": (), "station-overview": ("o",), "station-large": ("f",)}

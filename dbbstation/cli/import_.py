@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from dbbstation.cli.asking import Asker
     from dbbstation.files.formats.mapping import MappingFile
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import SessionDetails
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.machine.geometry import Machine
@@ -137,7 +137,7 @@ class _Told:
 @dataclass(frozen=True)
 class _Import:
     mapping: MappingFile
-    plan: InlinePlan
+    plan: PlanFile
     machine: Machine
     runs: Sequence[ImportedRun]
     details: SessionDetails

@@ -134,7 +134,7 @@ def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
     from dbbstation.tui.board_screen import Shown
 
     runner = Runner(open_station, line)
-    shown = Shown(job.plan.plan.name, job.plan.jig.bores, tests=job.plan.to_domain().tests)
+    shown = Shown(job.plan.name, job.plan.plate.bores, tests=job.plan.to_domain().tests)
     return _shown(StationApp(shown, runner))
 
 

@@ -16,7 +16,7 @@ from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import SessionDetails
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
@@ -158,7 +158,7 @@ class RecordingOptions(SessionOptions):
         ),
     ] = None
 
-    def in_force(self, plan: InlinePlan) -> InlinePlan:
+    def in_force(self, plan: PlanFile) -> PlanFile:
         """Return the plan with the chosen order and limit of lost samples.
 
         The command line overrides the plan, which overrides the shop's settings.

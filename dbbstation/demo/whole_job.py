@@ -6,7 +6,7 @@ import json
 import re
 import subprocess
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
     from pathlib import Path
 
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.tasks.telling import Progress
 
 INSTRUMENT = "streaming-encoder"
@@ -120,10 +120,10 @@ def write_truth(path: Path, machine_file: Path, seed: int) -> None:
     write_model(path, IdentifiedModel(MachineModel(machine, fitted), rows, exact))
 
 
-def write_plan(path: Path, whole: InlinePlan, names: Collection[str]) -> Path:
+def write_plan(path: Path, whole: PlanFile, names: Collection[str]) -> Path:
     """Write a plan with these tests only; return its path."""
-    tests = tuple(test for test in whole.plan.tests if test.name in names)
-    write_text(path, plan_text(replace(whole, plan=whole.plan.model_copy(update={"tests": tests}))))
+    tests = tuple(test for test in whole.tests if test.name in names)
+    write_text(path, plan_text(whole.model_copy(update={"tests": tests})))
     return path
 
 

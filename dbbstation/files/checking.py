@@ -184,7 +184,7 @@ def _simulator(found: SimulatorFile) -> str:
 
 _READERS: dict[str, tuple[Callable[..., Any], Callable[[Any], str]]] = {
     "dbb-machine": (parse_machine, lambda machine: f"machine {machine.name}"),
-    "dbb-plan": (parse_plan, lambda one: f"plan {one.plan.name}: {_count(len(one.plan.tests), 'test')}"),
+    "dbb-plan": (parse_plan, lambda one: f"plan {one.name}: {_count(len(one.tests), 'test')}"),
     "dbb-jig": (
         parse_jig,
         lambda one: f"jig with {_count(len(one.jig.bores), 'bore')}, {_count(len(one.balls), 'ball')}",

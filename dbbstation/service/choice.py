@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ from dbbstation.station.schedule import Schedule
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
@@ -56,26 +56,25 @@ class Gate(StrEnum):
     """The first test of each holder."""
 
 
-def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePlan:
+def ordered(plan: PlanFile, order: Order, gate: Gate = Gate.PLAN) -> PlanFile:
     """Return the plan with ordered tests."""
     domain = plan.to_domain()
     choose = {Order.PLAN: lambda one: tuple(one.tests), Order.HOLDER: by_holder, Order.DRIFT: against_drift}
     names = choose[order](domain)
-    tests = {test.name: test for test in plan.plan.tests}
+    tests = {test.name: test for test in plan.tests}
     first_of: dict[str, str] = {}
     for name in names:
         first_of.setdefault(domain.tests[name].ball.holder, name)
     gates = {Gate.PLAN: (), Gate.FIRST: names[:1], Gate.HOLDERS: tuple(first_of.values())}
-    again = plan.plan.repeat_at_end or gates[gate]
-    changed = {"tests": tuple(tests[name] for name in names), "repeat_at_end": again}
-    return replace(plan, plan=plan.plan.model_copy(update=changed))
+    again = plan.repeat_at_end or gates[gate]
+    return plan.model_copy(update={"tests": tuple(tests[name] for name in names), "repeat_at_end": again})
 
 
-def with_loss(plan: InlinePlan, percent: float | None, *, over_plan: bool) -> InlinePlan:
+def with_loss(plan: PlanFile, percent: float | None, *, over_plan: bool) -> PlanFile:
     """Return the plan with a limit of lost samples, if it states none or `over_plan`."""
-    if percent is None or (plan.plan.largest_loss_percent is not None and not over_plan):
+    if percent is None or (plan.largest_loss_percent is not None and not over_plan):
         return plan
-    return replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": percent}))
+    return plan.model_copy(update={"largest_loss_percent": percent})
 
 
 PROGRAMS = "programs"
@@ -239,7 +238,7 @@ def _recorded(folder: Path, instrument: ReadBy | None) -> tuple[RunEntry, ...]:
     return session.runs
 
 
-def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, dict[tuple[str, Direction], RunProgram]]:
+def _read(choice: Choice, limits: Limits) -> tuple[Machine, PlanFile, Path, dict[tuple[str, Direction], RunProgram]]:
     folder = choice.folder
     if folder is not None and choice.goes_on:
         session = read_session(folder)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
@@ -134,7 +134,7 @@ class Job:
     """
 
     machine: Machine
-    plan: InlinePlan
+    plan: PlanFile
     folder: Path
     details: SessionDetails = field(default_factory=SessionDetails)
     programs: Mapping[tuple[str, Direction], RunProgram] = field(default_factory=dict)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import ReadBy, SessionDetails
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def check_session(
     folder: Path,
     machine: Machine,
-    plan: InlinePlan,
+    plan: PlanFile,
     details: SessionDetails,
     *,
     with_programs: bool,
@@ -79,7 +79,7 @@ def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | N
 
 
 def open_session(
-    folder: Path, machine: Machine, plan: InlinePlan, details: SessionDetails, *, with_programs: bool
+    folder: Path, machine: Machine, plan: PlanFile, details: SessionDetails, *, with_programs: bool
 ) -> SessionWriter:
     """Make a session folder, or continue it with the same machine and plan.
 

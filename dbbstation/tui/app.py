@@ -270,7 +270,7 @@ class StationApp(App[None]):
         self._opening = False
         plan = opened.prepared.job.plan
         trouble = "" if self._operated is None else self._operated.job.trouble
-        self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests, trouble=trouble)
+        self._show = Shown(plan.name, plan.plate.bores, tests=plan.to_domain().tests, trouble=trouble)
         self.board, self._runner, self._leaving = Board(), opened.runner, False
         self._answering = False
         self._back_to_start()

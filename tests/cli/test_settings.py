@@ -212,16 +212,16 @@ def test_programs_take_limit_and_steps(run, shop):
 
 def test_a_loss_limit_goes_into_the_plan_that_has_none(monkeypatch):
     silent = read_inline_plan(PLAN)
-    assert silent.plan.largest_loss_percent is None
+    assert silent.largest_loss_percent is None
     stating = read_inline_plan(shipped_folder("fixtures") / "plans" / "every-key.yaml")
-    own = stating.plan.largest_loss_percent
+    own = stating.largest_loss_percent
     assert own not in {None, 2.0}
     for of_settings, of_stating in ((True, own), (False, 2.0)):
         monkeypatch.setattr(session_options, "from_settings", lambda _, answer=of_settings: answer)
         two, none = RecordingOptions(largest_loss_percent=2.0), RecordingOptions()
         assert two.in_force(silent).to_domain().largest_loss_percent == 2.0
-        assert two.in_force(stating).plan.largest_loss_percent == of_stating
-        assert none.in_force(stating).plan.largest_loss_percent == own
+        assert two.in_force(stating).largest_loss_percent == of_stating
+        assert none.in_force(stating).largest_loss_percent == own
 
 
 @pytest.mark.parametrize("separator", [";", "\t"])

@@ -123,9 +123,9 @@ def make_conventional_session(folder: Path) -> None:
     """Two tests about balls put up under the spindle, set up by hand and read with a micrometer to 1 µm."""
     machine = read_machine(FIXTURES / "machines" / "reference.yaml")
     whole = read_inline_plan(FIXTURES.parent / "protocols" / "plans" / "conventional.yaml")
-    tests = tuple(test for test in whole.plan.tests if test.name in "dg")
-    balls = {test.ball: whole.plan.balls[test.ball] for test in tests}
-    inline = replace(whole, plan=whole.plan.model_copy(update={"tests": tests, "balls": balls}))
+    tests = tuple(test for test in whole.tests if test.name in "dg")
+    balls = {test.ball: whole.balls[test.ball] for test in tests}
+    inline = whole.model_copy(update={"tests": tests, "balls": balls})
     virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, 7)), inline.to_domain(), seed=7)
     runs = []
     for test in tests:

@@ -111,9 +111,9 @@ def test_a_drift_no_longer_looks_like_an_effect_of_height():
 
 def test_what_is_repeated_at_the_end():
     plan = read_inline_plan(TABLE2)
-    assert ordered(plan, Order.PLAN, Gate.FIRST).plan.repeat_at_end == ("a",)
-    assert ordered(plan, Order.PLAN, Gate.HOLDERS).plan.repeat_at_end == ("a", "f", "k")
+    assert ordered(plan, Order.PLAN, Gate.FIRST).repeat_at_end == ("a",)
+    assert ordered(plan, Order.PLAN, Gate.HOLDERS).repeat_at_end == ("a", "f", "k")
     found = ordered(plan, Order.DRIFT, Gate.FIRST)
-    assert found.plan.repeat_at_end == (found.plan.tests[0].name,)
+    assert found.repeat_at_end == (found.tests[0].name,)
     own = ordered(found, Order.PLAN, Gate.HOLDERS)
-    assert own.plan.repeat_at_end == found.plan.repeat_at_end
+    assert own.repeat_at_end == found.repeat_at_end

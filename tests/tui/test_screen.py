@@ -14,7 +14,7 @@ from textual.widgets import Input
 
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.formats.plan import InlinePlan, read_inline_plan
+from dbbstation.files.formats.plan import PlanFile, read_inline_plan
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
@@ -49,17 +49,17 @@ ENCODER = _SHIPPED.model_copy(update={"timing": _SHIPPED.timing.model_copy(updat
 
 
 @pytest.fixture
-def short_plan(tmp_path: Path) -> InlinePlan:
+def short_plan(tmp_path: Path) -> PlanFile:
     return one_circle(tmp_path, feed_mm_min=6000)
 
 
 @pytest.fixture
-def slow_plan(tmp_path: Path) -> InlinePlan:
+def slow_plan(tmp_path: Path) -> PlanFile:
     """The same, slow enough for what is pressed in the middle of it, however busy the computer."""
     return one_circle(tmp_path, feed_mm_min=500)
 
 
-def one_circle(folder: Path, *, feed_mm_min: int) -> InlinePlan:
+def one_circle(folder: Path, *, feed_mm_min: int) -> PlanFile:
     text = (shipped_folder("protocols") / "plans" / "ten-minute-check.yaml").read_text("utf-8")
     text = text.replace("feed_mm_min: 1000", f"feed_mm_min: {feed_mm_min}").replace(
         "overshoot_deg: 20", "overshoot_deg: 5"
@@ -91,7 +91,7 @@ class Bench:
         line = HeldLine(ENCODER, self.place.port, clock=self.place.clock)
         runner = Runner(opener(self.job, line, observers=[helper or self.place.helper]), line)
         app = StationApp(
-            Shown(self.job.plan.plan.name, self.job.plan.jig.bores, tests=self.job.plan.to_domain().tests), runner
+            Shown(self.job.plan.name, self.job.plan.plate.bores, tests=self.job.plan.to_domain().tests), runner
         )
 
         async def run() -> None:
@@ -109,7 +109,7 @@ class Bench:
 
 
 @contextmanager
-def switched_on(plan: InlinePlan, folder: Path) -> Iterator[Bench]:
+def switched_on(plan: PlanFile, folder: Path) -> Iterator[Bench]:
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     with (
         mock.patch("dbbstation.service.virtual_place.VirtualInstrument", FaultyInstrument),
@@ -168,7 +168,7 @@ async def circle(pilot: Pilot[None], app: StationApp, key: str = "enter") -> Non
         await circle(pilot, app)
 
 
-def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_a_whole_plan_with_every_verdict(short_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await until(pilot, lambda: "short holder with the ball 9-short into bore 9" in said(app))
@@ -207,7 +207,7 @@ def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path)
     assert (ccw[0].mounting, ccw[-1].mounting, cw[-1].mounting) == (1, 2, 2)
 
 
-def test_quitting_a_running_circle_asks_first_and_loses_nothing(slow_plan: InlinePlan, tmp_path: Path) -> None:
+def test_quitting_a_running_circle_asks_first_and_loses_nothing(slow_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await until(pilot, lambda: board.state is State.ANNOUNCED)
@@ -240,7 +240,7 @@ def test_quitting_a_running_circle_asks_first_and_loses_nothing(slow_plan: Inlin
         bench.press_all(go_on)
 
 
-def test_a_fault_of_the_line_is_shown_and_the_line_connected_again(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_a_fault_of_the_line_is_shown_and_the_line_connected_again(short_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await until(pilot, lambda: board.state is State.ANNOUNCED)
@@ -277,7 +277,7 @@ def test_a_fault_of_the_line_is_shown_and_the_line_connected_again(short_plan: I
         assert states[-1][1] is RunState.ACCEPTED
 
 
-def test_a_closed_line_and_a_port_that_is_not_there(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_a_closed_line_and_a_port_that_is_not_there(short_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await until(pilot, lambda: board.state is State.ANNOUNCED)
@@ -294,7 +294,7 @@ def test_a_closed_line_and_a_port_that_is_not_there(short_plan: InlinePlan, tmp_
         bench.press_all(play)
 
 
-def test_closing_while_the_line_is_being_opened_ends_in_order(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_closing_while_the_line_is_being_opened_ends_in_order(short_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         await press(app, "q")
         await until(pilot, lambda: app._exit)
@@ -303,7 +303,7 @@ def test_closing_while_the_line_is_being_opened_ends_in_order(short_plan: Inline
         bench.press_all(play)
 
 
-def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: PlanFile, tmp_path: Path) -> None:
     async def leave(pilot: Pilot[None], app: StationApp) -> None:
         await circle(pilot, app)
         await press(app, "q")
@@ -327,9 +327,7 @@ def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: InlinePlan,
         assert bench.states()[-1][1] is RunState.ACCEPTED
 
 
-def test_repeat_and_reject_in_mid_circle_ask_first_one_question_at_a_time(
-    slow_plan: InlinePlan, tmp_path: Path
-) -> None:
+def test_repeat_and_reject_in_mid_circle_ask_first_one_question_at_a_time(slow_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await until(pilot, lambda: board.state is State.ANNOUNCED)
@@ -356,7 +354,7 @@ def test_repeat_and_reject_in_mid_circle_ask_first_one_question_at_a_time(
         assert bench.states() == [("low-ccw-1", RunState.REJECTED)]
 
 
-def test_nothing_is_waited_for_in_a_pause(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_nothing_is_waited_for_in_a_pause(short_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         await until(pilot, lambda: app.board.state is State.ANNOUNCED)
         await press(app, "p")
@@ -368,7 +366,7 @@ def test_nothing_is_waited_for_in_a_pause(short_plan: InlinePlan, tmp_path: Path
         bench.press_all(play)
 
 
-def test_the_overview_leads_to_another_test_and_takes_verdicts_back(short_plan: InlinePlan, tmp_path: Path) -> None:
+def test_the_overview_leads_to_another_test_and_takes_verdicts_back(short_plan: PlanFile, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await circle(pilot, app)

@@ -1,7 +1,6 @@
 """`dbb-plan/1`: the circles to measure, and their balls."""
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -119,31 +118,23 @@ class PlanFile(Schema):
     largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
     """Largest share of lost samples; a run that lost more is repeated [%]. Absent: 0.5."""
 
-
-@dataclass(frozen=True)
-class InlinePlan:
-    """A plan with its jig inline.
-
-    Attributes:
-        plan: as the file, without the jig's path.
-        jig: without bores if the plan has no plate.
-    """
-
-    plan: PlanFile
-    jig: JigSchema
+    @property
+    def plate(self) -> JigSchema:
+        """Return the jig of a plan that has it inline; without bores if the plan has no plate."""
+        return self.jig if isinstance(self.jig, JigSchema) else NO_PLATE
 
     def to_domain(self) -> Plan:
-        """Return the plan for calculations: balls in the machine frame, every circle complete."""
-        balls = {name: self._ball(name, ball) for name, ball in self.plan.balls.items()}
-        tests = {test.name: _planned(test, balls[test.ball], self.plan.path) for test in self.plan.tests}
-        limit = self.plan.largest_loss_percent
+        """Return a plan with its jig inline for calculations: balls in the machine frame, every circle complete."""
+        balls = {name: self._ball(name, ball) for name, ball in self.balls.items()}
+        tests = {test.name: _planned(test, balls[test.ball], self.path) for test in self.tests}
+        limit = self.largest_loss_percent
         largest = LARGEST_LOSS_PERCENT if limit is None else limit
-        return Plan(self.plan.name, tests, self.plan.repeat_at_end, largest)
+        return Plan(self.name, tests, self.repeat_at_end, largest)
 
     def _ball(self, name: str, ball: BallSchema) -> Ball:
         x, y, z = ball.centre_mm
-        origin = self.jig.origin_in_machine_mm
-        turn = math.radians(self.jig.rotation_about_z_deg)
+        origin = self.plate.origin_in_machine_mm
+        turn = math.radians(self.plate.rotation_about_z_deg)
         centre = (
             origin[0] + x * math.cos(turn) - y * math.sin(turn),
             origin[1] + x * math.sin(turn) + y * math.cos(turn),
@@ -152,20 +143,20 @@ class InlinePlan:
         if ball.holder is None or ball.uncertainty_um is None:
             # Only a ball under the spindle comes without them. How well it stands is for a micrometer to say.
             return Ball(name, None, "", centre, 0.0, 0.0, place_known=False, form_um=ball.form_um)
-        repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
-        plate = None if ball.bore is None else Plate(origin, self.jig.plate_expansion_um_m_k)
+        repeatability = self.holders[ball.holder].repeatability_um / 1e3
+        plate = None if ball.bore is None else Plate(origin, self.plate.plate_expansion_um_m_k)
         u_mm = ball.uncertainty_um / 1e3
         return Ball(name, ball.bore, ball.holder, centre, u_mm, repeatability, plate=plate, form_um=ball.form_um)
 
 
-def plan_text(plan: InlinePlan) -> str:
+def plan_text(plan: PlanFile) -> str:
     """Return the text of a plan's file, with the jig inline."""
     return yaml_text(plan_data(plan))
 
 
-def plan_data(plan: InlinePlan) -> dict[str, object]:
+def plan_data(plan: PlanFile) -> dict[str, object]:
     """Return the content of a plan's file, with the jig inline."""
-    data = plan.plan.model_dump(exclude_none=True)
+    data = plan.model_dump(exclude_none=True)
     for ball in data["balls"].values():
         if ball["placed"] != UNDER_SPINDLE:
             del ball["placed"]  # the usual case goes without saying
@@ -201,7 +192,7 @@ def read_plan(path: Path) -> Plan:
     return read_inline_plan(path).to_domain()
 
 
-def read_inline_plan(path: Path) -> InlinePlan:
+def read_inline_plan(path: Path) -> PlanFile:
     """Read a test plan and put its jig file into it.
 
     Raises:
@@ -210,7 +201,7 @@ def read_inline_plan(path: Path) -> InlinePlan:
     return without_faults(lambda faults: parse_plan(path, faults))
 
 
-def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
+def parse_plan(path: Path, faults: list[Problem]) -> PlanFile | None:
     """Read a test plan; None with faults added to `faults`."""
     document = read_document(path, PlanFile, faults)
     if document is None:
@@ -230,9 +221,9 @@ def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
     if plan is None or len(faults) > before:
         return None
     if jig_file is None:
-        return None if isinstance(plan.jig, str) else InlinePlan(plan, plan.jig or NO_PLATE)
+        return None if isinstance(plan.jig, str) else plan
     whole = {"jig": jig_file.jig, "holders": jig_file.holders | plan.holders, "balls": jig_file.balls | plan.balls}
-    return InlinePlan(plan.model_copy(update=whole), jig_file.jig)
+    return plan.model_copy(update=whole)
 
 
 def _merged(document: YamlDocument, jig: JigFile | None) -> tuple[set[str], set[str]]:

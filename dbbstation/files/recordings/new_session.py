@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 
@@ -63,7 +63,7 @@ class FinishedRun:
 def write_session(
     folder: Path,
     machine: Machine,
-    plan: InlinePlan,
+    plan: PlanFile,
     runs: Sequence[FinishedRun],
     details: SessionDetails | None = None,
     more: Mapping[str, str | bytes] | None = None,
@@ -103,7 +103,7 @@ def write_session(
 def make_session_folder(
     folder: Path,
     machine: Machine,
-    plan: InlinePlan,
+    plan: PlanFile,
     details: SessionDetails,
     entries: Sequence[RunEntry],
     files: Mapping[str, str | bytes],
@@ -136,7 +136,7 @@ def make_session_folder(
     write_folder(folder, whole, read_only=lambda name: is_copy(name) or name.startswith(f"{RUNS}/"))
 
 
-def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
+def _check_details(text: str, folder: Path, plan: PlanFile) -> None:
     faults: list[Problem] = []
     document = parse_yaml(text, str(folder / SESSION_FILE), faults)
     session = None if document is None else validate(document, SessionFile, folder)

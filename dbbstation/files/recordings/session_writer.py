@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from pathlib import Path
 
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import Counts, ReadBy
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
@@ -60,7 +60,7 @@ class SessionWriter(Closing):
         cls,
         folder: Path,
         machine: Machine,
-        plan: InlinePlan,
+        plan: PlanFile,
         details: SessionDetails | None = None,
         clock: Callable[[], datetime] = now,
     ) -> Self:

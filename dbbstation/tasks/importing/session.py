@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from dbbstation.files.formats.mapping import MappingFile
-    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.formats.plan import PlanFile
     from dbbstation.files.formats.session import SessionDetails
     from dbbstation.files.provenance import Provenance
     from dbbstation.machine.geometry import Machine
@@ -53,7 +53,7 @@ def originals(
 def staged(
     folder: Path,
     machine: Machine,
-    plan: InlinePlan,
+    plan: PlanFile,
     runs: Sequence[ImportedRun],
     details: SessionDetails,
     more: Mapping[str, str | bytes],

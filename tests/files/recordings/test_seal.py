@@ -37,7 +37,7 @@ def made(tmp_path_factory) -> Path:
     machine, plan = read_machine(MACHINE), read_inline_plan(PLAN)
     virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, 7)), plan.to_domain(), seed=7)
     runs = []
-    for test in plan.plan.tests[:3]:
+    for test in plan.tests[:3]:
         for direction in Direction:
             run = virtual.run(test.name, direction, begin_s=180.0 * len(runs))
             times = [0.2 * index for index in range(int(run.path.duration_s / 0.2))]

@@ -175,15 +175,11 @@ class Keyboard:
             return Repeat(back=self._back) if self._wrong else Accept(back=self._back)
         return _ON_ENTER.get(self._state)
 
-    @property
-    def _doubtful(self) -> bool:
-        return self._state is State.COMPLETE and self._wrong
-
     def _listen(self) -> None:
         for line in self._lines:
             word = line.strip()
             command = _command_of(word) if word else self._on_enter()
-            if isinstance(command, Accept) and not command.reason and self._doubtful:
+            if isinstance(command, Accept) and not command.reason and self._state is State.COMPLETE and self._wrong:
                 echo("  something is wrong with it: `a WHY` accepts it for a reason, Enter repeats it", err=True)
             elif command is not None:
                 self._send(command)
@@ -212,14 +208,14 @@ def _temperature(text: str) -> AddNote | None:
     return None if degc is None else AddNote(ambient_temp_c=degc)
 
 
-def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a line per event, nothing nested
+def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: C901, PLR0911 - a line per event, nothing nested
     match event:
         case events.RunAnnounced():
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
             head += f" (repeat {event.run.repeat})" if event.run.repeat > 1 else ""
             return [head, *(f"  - {step}" for step in event.instructions)]
         case events.RunDoubted():
-            return [f"  {event.run.label}: doubted: {event.finding.text}"]
+            return _of(event.run, f"doubted: {event.finding.text}")
         case events.Noted():
             degc = "" if event.ambient_temp_c is None else f"{event.ambient_temp_c:g} °C"
             return [f"  noted: {event.text or degc}"]
@@ -230,21 +226,24 @@ def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a 
             return [] if run is None else [f"  {run.label}: interrupted, kept as far as it came"]
         case events.CommandRefused():
             return [f"  {event.why}"]
-        case (
-            events.RunStarted()
-            | events.RunCompleted()
-            | events.RunAccepted()
-            | events.RunRejected()
-            | events.RunLate()
-            | events.FeedInMissed()
-            | events.RunRestored()
-        ):
-            wrong = event.wrong if isinstance(event, events.RunCompleted) else ()
-            texts = [_of_run(event, centre), *(f"{finding.name} wrong: {finding.text}" for finding in wrong)]
-            if isinstance(event, events.RunCompleted):
-                texts.insert(0, _word_of(event))
-            return [f"  {event.run.label}: {text}" for text in texts]
+        case events.RunStarted(run=run):
+            return _of(run, "recording")
+        case events.RunRestored(run=run):
+            return _of(run, "recorded before, it waits for its verdict")
+        case events.RunAccepted(run=run, beside=beside):
+            return _of(run, "accepted" if beside is None else f"accepted; {beside.label} counts too")
+        case events.RunRejected(run=run, reason=reason):
+            return _of(run, f"does not count, kept ({reason})")
+        case events.RunLate(run=run, problem=problem) | events.FeedInMissed(run=run, problem=problem):
+            return _of(run, problem)
+        case events.RunCompleted(run=run):
+            wrong = (f"{finding.name} wrong: {finding.text}" for finding in event.wrong)
+            return _of(run, _word_of(event), _measured(event, centre), *wrong)
     return []
+
+
+def _of(run: events.RunId, *texts: str) -> list[str]:
+    return [f"  {run.label}: {text}" for text in texts]
 
 
 def _word_of(completed: events.RunCompleted) -> str:
@@ -254,30 +253,13 @@ def _word_of(completed: events.RunCompleted) -> str:
     return f"{found.word}: {found.causes[0]}" if found.causes and completed.figures is not None else str(found.word)
 
 
-def _of_run(
-    event: events.RunStarted
-    | events.RunCompleted
-    | events.RunAccepted
-    | events.RunRejected
-    | events.RunLate
-    | events.FeedInMissed
-    | events.RunRestored,
-    centre: str,
-) -> str:
-    match event:
-        case events.RunStarted():
-            return "recording"
-        case events.RunRestored():
-            return "recorded before, it waits for its verdict"
-        case events.RunAccepted():
-            return "accepted" if event.beside is None else f"accepted; {event.beside.label} counts too"
-        case events.RunRejected():
-            return f"does not count, kept ({event.reason})"
-        case events.RunCompleted(figures=figures) if figures is not None:
-            lost = f", {event.lost} samples lost" if event.lost else ""
-            lost += f", {event.doubtful} doubtful" if event.doubtful else ""
-            return (
-                f"{event.samples} samples{lost}; {centre} off {figures.centre_deviation_um:.1f} µm, "
-                f"mean {figures.mean_radial_error_um:+.1f} µm, circularity {figures.circularity_um:.1f} µm"
-            )
-    return event.problem
+def _measured(completed: events.RunCompleted, centre: str) -> str:
+    figures = completed.figures
+    if figures is None:
+        return completed.problem
+    lost = f", {completed.lost} samples lost" if completed.lost else ""
+    lost += f", {completed.doubtful} doubtful" if completed.doubtful else ""
+    return (
+        f"{completed.samples} samples{lost}; {centre} off {figures.centre_deviation_um:.1f} µm, "
+        f"mean {figures.mean_radial_error_um:+.1f} µm, circularity {figures.circularity_um:.1f} µm"
+    )

@@ -26,16 +26,12 @@ if TYPE_CHECKING:
     from dbbstation.cli.session_options import RecordingOptions
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.choice import Choice, Limits
-    from dbbstation.service.held_line import HeldLine
-    from dbbstation.service.runner import Opener
-    from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
     from dbbstation.system.signals import Signals
     from dbbstation.tui.app import StationApp
 
 _DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
 _DEMO_INSTRUMENT = "streaming-encoder"
-_DEMO_SEED = 3
 
 
 def on_screen(asked: Asked, *, virtual: bool) -> int:
@@ -94,11 +90,13 @@ def _measured(asked: Asked, *, virtual: bool) -> int:
     from dbbstation.cli.measure_talk import Log
     from dbbstation.files.recordings.session import read_session
     from dbbstation.service.held_line import HeldLine
-    from dbbstation.service.runner import opener
+    from dbbstation.service.runner import Runner, opener
     from dbbstation.station.opening import check_not_mixed
+    from dbbstation.tui.app import StationApp
+    from dbbstation.tui.board_screen import Shown
 
     job, protocol = asked.job()
-    port, circles = asked.line.port, job.plan.to_domain()
+    port = asked.line.port
     job.check(str(asked.plan))
     if (job.folder / SESSION_FILE).is_file():
         check_not_mixed(job.folder, read_session(job.folder), job.instrument)
@@ -110,32 +108,15 @@ def _measured(asked: Asked, *, virtual: bool) -> int:
             from dbbstation.service.virtual_place import virtual_place
 
             echo("switching on the virtual machine …", err=True)
-            made = virtual_place(
-                job.machine,
-                circles,
-                protocol,
-                time_scale=asked.time_scale,
-                seed=_DEMO_SEED,
-                programs=job.programs,
-            )
-            place = stack.enter_context(made)
-            job, port = replace(job, clock=place.clock, time_scale=asked.time_scale), place.port
+            place = stack.enter_context(virtual_place(job, protocol, asked.time_scale))
+            job, port = place.job, place.port
             observers.append(place.helper)
-        say_sampling(circles, protocol, asked.line.baud)
+        say_sampling(job.plan.to_domain(), protocol, asked.line.baud)
         log = stack.enter_context(spying(asked.noted.spy, protocol, port))
         held = HeldLine(protocol, port, asked.line.baud, clock=job.clock, time_scale=asked.time_scale, log=log)
         stack.callback(held.close)
-        return _run(job, opener(job, held, observers=observers), held)
-
-
-def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
-    from dbbstation.service.runner import Runner
-    from dbbstation.tui.app import StationApp
-    from dbbstation.tui.board_screen import Shown
-
-    runner = Runner(open_station, line)
-    shown = Shown(job.plan.name, job.plan.plate.bores, tests=job.plan.to_domain().tests)
-    return _shown(StationApp(shown, runner))
+        shown = Shown(job.plan.name, job.plan.plate.bores, tests=job.plan.to_domain().tests)
+        return _shown(StationApp(shown, Runner(opener(job, held, observers=observers), held)))
 
 
 def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:

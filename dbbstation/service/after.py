@@ -54,15 +54,6 @@ class _File(BaseModel):
     steps: dict[str, DoneStep]
 
 
-@dataclass(frozen=True)
-class StepsBefore:
-    """Finished steps of an unchanged session."""
-
-    folder: Path
-    counted: str
-    steps: dict[str, DoneStep]
-
-
 def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
     """Write finished steps beside their results, if possible; keep steps of another screen on this session."""
     with suppress(OSError, OutputError):
@@ -73,8 +64,8 @@ def keep_steps(folder: Path, key: str, steps: dict[str, DoneStep]) -> None:
         write_text(folder / FILE, file.model_dump_json(indent=1) + "\n", force=True, rewrites=True)
 
 
-def steps_before(session: Path) -> StepsBefore | None:
-    """Return the last steps of an unchanged session, or None."""
+def steps_before(session: Path) -> tuple[Path, str, dict[str, DoneStep]] | None:
+    """Return folder, key and steps of the last results of an unchanged session, or None."""
     session = session.absolute()
     kept = sorted(
         session.parent.glob(f"{glob.escape(session.name)}-results*/{FILE}"), key=lambda file: -file.stat().st_mtime
@@ -88,7 +79,7 @@ def steps_before(session: Path) -> StepsBefore | None:
         if found is not None and found.key == now:
             folder = file.parent
             steps = {name: step for name, step in found.steps.items() if _is_result(folder, name, step)}
-            return StepsBefore(folder, now, steps)
+            return folder, now, steps
     return None
 
 
@@ -118,20 +109,21 @@ def counted(session: Path) -> str:
 USUAL = (SessionTask.CALIBRATE, SessionTask.DIAGNOSE, SessionTask.PROGRAMS, SessionTask.REPORT)
 """Steps that need this session only; an acceptance also needs an earlier session."""
 
-_WRITTEN = {
-    SessionTask.CALIBRATE: "out",
-    SessionTask.DIAGNOSE: "out",
-    SessionTask.FIGURES: "figure",
-    SessionTask.HISTORY: "page",
-}
-"""Outputs that are no parameters of their tasks."""
-
 _OF_OTHERS = {SessionTask.ACCEPTANCE, SessionTask.HISTORY}
 """Steps whose result depends on other sessions."""
 
-KINEMATIC, JOINT, PROGRAMS, REPORT = "model.yaml", "joint-model.yaml", "programs", "report.html"
-ACCEPTANCE, FIGURES, HISTORY = "acceptance.html", "circles.pdf", "history.html"
-"""Names in the folder of results."""
+KINEMATIC, JOINT = "model.yaml", "joint-model.yaml"
+
+_OUT = {
+    SessionTask.CALIBRATE: ("out", KINEMATIC),
+    SessionTask.DIAGNOSE: ("out", JOINT),
+    SessionTask.PROGRAMS: ("", "programs"),
+    SessionTask.REPORT: ("", "report.html"),
+    SessionTask.ACCEPTANCE: ("", "acceptance.html"),
+    SessionTask.FIGURES: ("figure", "circles.pdf"),
+    SessionTask.HISTORY: ("page", "history.html"),
+}
+"""Output of a step that is no parameter of its task, and the name of its result in the folder of results."""
 
 
 @dataclass
@@ -186,8 +178,8 @@ class After:
         self._counted = ""
         before = steps_before(self.session)
         if before is not None:
-            self._folder, self._counted = before.folder, before.counted
-            for name, one in before.steps.items():
+            self._folder, self._counted, steps = before
+            for name, one in steps.items():
                 path = self._folder / one.path
                 self.results[SessionTask(name)] = Result(WorkProgress.DONE, "", one.passed_s, one.answer, "", path)
 
@@ -259,7 +251,7 @@ class After:
         if progress is WorkProgress.RUNNING:
             return
         if progress is WorkProgress.DONE:
-            result.answer, result.path = work.answer(), self.folder / self._out(step)
+            result.answer, result.path = work.answer(), self.folder / _OUT[step][1]
             with suppress(InputError, OSError):
                 now = counted(self.session)
                 keep_steps(self.folder, now, self._done())
@@ -295,9 +287,9 @@ class After:
                 task, given = step.value, sessions
             case SessionTask.PROGRAMS:
                 plan, machine = self._files()
-                task, given = "program", {"plan": str(plan), "machine": str(machine), "out": PROGRAMS}
+                task, given = "program", {"plan": str(plan), "machine": str(machine), "out": _OUT[step][1]}
             case SessionTask.REPORT | SessionTask.ACCEPTANCE:
-                task, given = "report", sessions | {"page": self._out(step)}
+                task, given = "report", sessions | {"page": _OUT[step][1]}
             case SessionTask.FIGURES:
                 task, given = "circles", sessions | {"filter": str(TOLERATED.value)}
             case SessionTask.HISTORY:
@@ -310,11 +302,11 @@ class After:
             given |= {"model": str(self.model)}
         if step is SessionTask.REPORT and self._place:
             given |= {"place": self._place}
-        output = _WRITTEN.get(step)
+        output, file = _OUT[step]
         return Call(
             task=task,
             given=given,
-            outputs={} if output is None else {output: self._out(step)},
+            outputs={output: file} if output else {},
             beside=self.session.parent,
             settings=None if self._settings is None else self._settings.absolute(),
             tolerances=self._tolerances if step is SessionTask.REPORT else None,
@@ -330,15 +322,3 @@ class After:
             for step, one in self.results.items()
             if one.progress is WorkProgress.DONE and one.path is not None and step not in _OF_OTHERS
         }
-
-    @staticmethod
-    def _out(step: SessionTask) -> str:
-        return {
-            SessionTask.CALIBRATE: KINEMATIC,
-            SessionTask.DIAGNOSE: JOINT,
-            SessionTask.PROGRAMS: PROGRAMS,
-            SessionTask.REPORT: REPORT,
-            SessionTask.ACCEPTANCE: ACCEPTANCE,
-            SessionTask.FIGURES: FIGURES,
-            SessionTask.HISTORY: HISTORY,
-        }[step]

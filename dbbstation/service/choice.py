@@ -90,12 +90,12 @@ class SetUpPart(StrEnum):
     PORT = "port"
     FOLDER = "folder"
     BAR = "bar"
-    PROGRAMS = "programs"
+    PROGRAMS = "NC programs"
     OPERATOR = "operator"
     SERIAL_NUMBER = "serial number"
     JOB = "job"
     TEMPERATURE = "temperature"
-    ORDER = "order"
+    ORDER = "order of tests"
     GATE = "drift gate"
 
 

@@ -51,9 +51,6 @@ def line_to_go_on(folder: Path, remembered: Line, given: Line) -> Line:
     return given
 
 
-SEED = 3
-"""Seed of the virtual machine's errors: always the same machine, so that a session can be continued."""
-
 USUAL_VIRTUAL = "streaming-encoder"
 """Instrument of a virtual machine if none was chosen."""
 
@@ -256,19 +253,10 @@ class Front:
         observers = [*self.observers]
         held = self.hold(prepared.protocol, line)
         if held is None:
-            place = self._open.enter_context(
-                virtual_place(
-                    job.machine,
-                    job.plan.to_domain(),
-                    prepared.protocol,
-                    time_scale=line.time_scale,
-                    seed=SEED,
-                    programs=job.programs,
-                )
-            )
-            job = replace(job, clock=place.clock, time_scale=line.time_scale)
+            place = self._open.enter_context(virtual_place(job, prepared.protocol, line.time_scale))
+            job = place.job
             observers.append(place.helper)
-            held = HeldLine(prepared.protocol, place.port, clock=place.clock, time_scale=line.time_scale)
+            held = HeldLine(prepared.protocol, place.port, clock=job.clock, time_scale=line.time_scale)
             self._open.callback(held.close)
         self._remember(choice)
         runner = Runner(opener(job, held, observers=observers), held)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,22 +22,25 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from dbbstation.instrument.protocol import Protocol
-    from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
-    from dbbstation.plan.plan import Plan
+    from dbbstation.station.assembly import Job
     from dbbstation.station.programs import RunProgram
+
+
+SEED = 3
+"""Seed of the virtual machine's errors: always the same machine, so that a session can be continued."""
 
 
 class Helper:
     """Mounts balls and starts circles for the station; an observer.
 
     Args:
-        programs: NC programs by test and direction; else plain circles.
+        programs: NC programs by test and direction; plain circles without.
     """
 
-    def __init__(self, cell: VirtualCell, programs: Mapping[tuple[str, Direction], RunProgram] | None = None) -> None:
+    def __init__(self, cell: VirtualCell, programs: Mapping[tuple[str, Direction], RunProgram]) -> None:
         self._cell = cell
-        self._programs = programs or {}
+        self._programs = programs
         self._announced: events.RunAnnounced | None = None
 
     def __call__(self, event: events.Event) -> None:
@@ -64,31 +67,26 @@ class Helper:
 class VirtualPlace:
     """The virtual parts."""
 
+    job: Job
     port: str
-    clock: ScaledClock
     helper: Helper
     wire: VirtualInstrument
 
 
 @contextmanager
-def virtual_place(
-    machine: Machine,
-    plan: Plan,
-    protocol: Protocol,
-    *,
-    time_scale: float,
-    seed: int = 0,
-    programs: Mapping[tuple[str, Direction], RunProgram] | None = None,
-) -> Iterator[VirtualPlace]:
-    """Start a machine with random errors and an instrument on it.
+def virtual_place(job: Job, protocol: Protocol, time_scale: float, seed: int = SEED) -> Iterator[VirtualPlace]:
+    """Start a job's machine with random errors, and an instrument on it; the place has the job on its clock.
 
     Raises:
         TravelError: a circle leaves the travel.
     """
-    virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, seed)), plan, seed=seed)
+    virtual = VirtualMachine(
+        MachineModel(job.machine, random_kinematics(job.machine, seed)), job.plan.to_domain(), seed=seed
+    )
     # Also compiles what is computed, so that the first circle does not wait for that.
     virtual.check()
     clock = ScaledClock(time_scale)
     cell = VirtualCell(virtual, clock)
     with VirtualInstrument(protocol, cell.length_mm_at, clock=clock) as wire:
-        yield VirtualPlace(wire.port, clock, Helper(cell, programs), wire)
+        timed = replace(job, clock=clock, time_scale=time_scale)
+        yield VirtualPlace(timed, wire.port, Helper(cell, job.programs), wire)

@@ -37,7 +37,6 @@ _ROW = f"{{test:{_WIDE}}}  " + "{figure:18} {before:>6} {now:>6} {limit:>6} {exp
 
 HEADING = _ROW.format(**texts.ACCEPTANCE_HEADING) + texts.ACCEPTANCE_HEADING["verdict"]
 
-_STYLES = {"within": "$text-success", "exceeded": "$text-error", "cannot tell": "$text-warning"}
 _DIGEST = 8
 """Number of shown digits of a SHA-256, which people only compare."""
 
@@ -53,7 +52,7 @@ def test_line(one: ToleranceOfTest) -> Content:
         expanded=_expanded(one.worst),
     )
     conformity = one.conformity or str(Conformity.UNDECIDED)
-    return Content.assemble(row, (texts.CONFORMITY_WORDS[conformity], f"bold {_STYLES[conformity]}"))
+    return Content.assemble(row, (texts.CONFORMITY_WORDS[conformity], texts.CONFORMITY_STYLES[Conformity(conformity)]))
 
 
 def worst_lines(answer: Any) -> Iterator[str]:  # noqa: ANN401 - a result as objects

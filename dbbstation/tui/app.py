@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.app import App, SystemCommand
 from textual.binding import Binding
@@ -44,14 +44,13 @@ if TYPE_CHECKING:
     from textual.screen import Screen
 
     from dbbstation.plan.circle import Direction
-    from dbbstation.service.board import SequenceOpened
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front, Opened
     from dbbstation.service.live_trace import LiveTrace
     from dbbstation.service.operated import Operated
-    from dbbstation.station.events import Event
+    from dbbstation.service.runner import Runner
 
-__all__ = ["DARK", "LIGHT", "LOOK_S", "Sequence", "Shown", "StationApp"]
+__all__ = ["DARK", "LIGHT", "LOOK_S", "Shown", "StationApp"]
 
 LOOK_S = 0.1
 """Interval of the polls of the mailbox [s]: ten pictures per second look fluent."""
@@ -63,33 +62,6 @@ DARK, LIGHT = "textual-dark", "textual-light"
 
 _NOT_OPERATED = {"large": "f", "results": "e", "temperature": "t", "command_palette": "ctrl+p"}
 """Actions that are closed to an operator of a job, and their keys."""
-
-
-class Sequence(Protocol):
-    """Interface that runs the sequence, such as `Runner`."""
-
-    @property
-    def alive(self) -> bool:
-        """Return whether a sequence is running."""
-
-    @property
-    def crash(self) -> Exception | None:
-        """Return the programming error that ended the sequence."""
-
-    def start(self) -> None:
-        """Open instrument and session and run."""
-
-    def send(self, command: Command) -> bool:
-        """Send a command; return whether it was taken."""
-
-    def mail(self) -> list[Event | SequenceOpened]:
-        """Return events since the last call."""
-
-    def wait(self) -> None:
-        """Wait until an ended sequence has released the session."""
-
-    def close(self) -> None:
-        """End the sequence and wait for its end."""
 
 
 class StationApp(App[None]):
@@ -124,7 +96,7 @@ class StationApp(App[None]):
     def __init__(
         self,
         shown: Shown | None,
-        runner: Sequence | None,
+        runner: Runner | None,
         *,
         clock: Callable[[], float] = time.monotonic,
         front: Front | None = None,
@@ -183,7 +155,7 @@ class StationApp(App[None]):
         if self._runner is not None:
             self._take_mail(self._runner)
 
-    def _take_mail(self, runner: Sequence) -> None:
+    def _take_mail(self, runner: Runner) -> None:
         before = self.board.state
         alive = runner.alive  # asked before its mail is taken: what it sends last is then shown
         for event in runner.mail():

@@ -16,9 +16,8 @@ from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.messages_screen import MessageLines
 from dbbstation.tui.now_line import NowLine, ProgressLine, TitleLine
 from dbbstation.tui.panel import Panel, lines
-from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.run_list import FindingsPanel, RunList
-from dbbstation.tui.set_up_panel import JigMap, SetUpPanel, StepsPanel
+from dbbstation.tui.set_up_panel import set_up
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
@@ -95,11 +94,7 @@ class MeasureScreen(RunScreen):
         with Horizontal(id="middle"):
             yield TraceView(cell_aspect=self._show.cell_aspect, id="trace")
             with Vertical(id="side"):
-                yield ReadingPanel(clock=self._clock, id="reading")
-                with Horizontal(id="table"):
-                    yield SetUpPanel(id="set-up")
-                    yield JigMap(self._show.bores, id="map")
-                yield StepsPanel(id="steps")
+                yield from set_up(self._show.bores, self._clock)
                 yield FiguresPanel(id="figures")
                 yield FindingsPanel(id="findings")
                 yield RunList(id="runs")

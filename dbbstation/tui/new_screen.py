@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from textual.content import Content
 
-from dbbstation.service.choice import Gate, Order, SetUpPart
+from dbbstation.service.choice import Choice, Gate, Order, SetUpPart
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.bar_screen import BarScreen
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
     from textual.widgets import OptionList
 
-    from dbbstation.service.choice import Choice, Prepared
+    from dbbstation.service.choice import Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.held_line import ProbeOutcome
     from dbbstation.tui.row_screen import StationDesk
@@ -83,8 +83,8 @@ class NewScreen(RowScreen):
             self._line(port="", baud=None)
         elif part is SetUpPart.BAR:
             self._take(bar=None, bar_waiver="")
-        elif part in _EMPTY and part not in self._kept():
-            self._take(**{_FIELDS[part]: _EMPTY[part]})
+        elif part in _FIELDS and part not in self._kept():
+            self._take(**{_FIELDS[part]: getattr(Choice(), _FIELDS[part])})
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         part = ROWS[self.at]
@@ -176,7 +176,7 @@ class NewScreen(RowScreen):
                 list(others.values())[at - len(found)]()
 
         at = found.index(now) if now in found else 0
-        title = texts.CHOOSE_TITLE.format(part=texts.PARTS[part])
+        title = texts.CHOOSE_TITLE.format(part=part)
         self.app.push_screen(ChooseQuestion(title, [*values, *others], at), answered)
 
     def _type(self, part: SetUpPart, text: str, then: Callable[[str], None]) -> None:
@@ -184,7 +184,7 @@ class NewScreen(RowScreen):
             if typed:
                 then(typed)
 
-        self.app.push_screen(TypeQuestion(texts.PARTS[part], text), answered)
+        self.app.push_screen(TypeQuestion(part, text), answered)
 
     def _typed(self, part: SetUpPart, text: str) -> None:
         if part is SetUpPart.TEMPERATURE:
@@ -218,7 +218,7 @@ class NewScreen(RowScreen):
         sign = "!" if missing else "·"
         value = texts.NEW_KEPT if part in self._kept() and part is not SetUpPart.FOLDER else self._value(part)
         style = "$text-warning" if missing else ""
-        return Content.assemble((f"{sign} {texts.PARTS[part]:{_NAME}} ", style), (value, "bold"))
+        return Content.assemble((f"{sign} {part:{_NAME}} ", style), (value, "bold"))
 
     def _value(self, part: SetUpPart) -> str:
         choice, line = self.choice, self.choice.line
@@ -269,17 +269,6 @@ _FIELDS = {
     SetUpPart.TEMPERATURE: "ambient_temp_c",
 }
 """Field of the choice for each row."""
-
-_EMPTY: dict[SetUpPart, object] = {
-    SetUpPart.MACHINE: None,
-    SetUpPart.PLAN: None,
-    SetUpPart.FOLDER: None,
-    SetUpPart.PROGRAMS: None,
-    SetUpPart.OPERATOR: "",
-    SetUpPart.SERIAL_NUMBER: "",
-    SetUpPart.JOB: "",
-    SetUpPart.TEMPERATURE: None,
-}
 
 
 def _next(one: _Kind) -> _Kind:

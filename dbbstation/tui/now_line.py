@@ -47,8 +47,8 @@ class NowLine(Panel):
 class OperatorNowLine(NowLine):
     """`NowLine` for an operator."""
 
-    def __init__(self, trouble: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, trouble: str) -> None:
+        super().__init__(id="now")
         self._say = partial(now_for_operator, trouble=trouble)
 
 

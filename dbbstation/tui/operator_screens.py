@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
-from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import Footer, Static
 
-from dbbstation.quality.conformity import Conformity
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.station.states import State
 from dbbstation.tui import texts
@@ -18,9 +17,8 @@ from dbbstation.tui.large_screen import LargeFigures, block_rows, largest
 from dbbstation.tui.now_line import OperatorNowLine, ProgressLine, TitleLine, banner
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import TypeQuestion, YesQuestion
-from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.row_screen import ExplainedScreen, RowScreen
-from dbbstation.tui.set_up_panel import JigMap, SetUpPanel, StepsPanel
+from dbbstation.tui.set_up_panel import set_up
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -180,13 +178,9 @@ class OperateScreen(RunScreen):
 
     def compose(self) -> ComposeResult:
         yield TitleLine(self._show.plan, id="title")
-        yield OperatorNowLine(self._show.trouble, id="now")
+        yield OperatorNowLine(self._show.trouble)
         with Vertical(id="set-up-view"):
-            yield ReadingPanel(clock=self._clock, id="reading")
-            with Horizontal(id="table"):
-                yield SetUpPanel(id="set-up")
-                yield JigMap(self._show.bores, id="map")
-            yield StepsPanel(id="steps")
+            yield from set_up(self._show.bores, self._clock)
         yield LargeFigures(clock=self._clock, id="circle-view")
         yield ProgressLine(id="progress")
         yield Footer(show_command_palette=False)
@@ -249,7 +243,7 @@ class AnswerScreen(ExplainedScreen):
             return
         word = str(answered.word).upper()
         wide, high = largest(tuple(texts.ANSWERS), max(self.size.width - 4, 1), max(self.size.height // 3, 5))
-        style = _STYLES[answered.word]
+        style = texts.CONFORMITY_STYLES[answered.word]
         self.query_one("#answer-word", Static).update(
             lines(
                 *(Content.styled(f"  {row}", style) for row in block_rows(word, wide, high)),
@@ -259,10 +253,3 @@ class AnswerScreen(ExplainedScreen):
         told = [*answered.reasons, "", *(f"{place}. {text}" for place, text in enumerate(answered.to_do, start=1))]
         told += ["", texts.ANSWER_REPORT.format(path=answered.report)] if answered.report is not None else []
         self.query_one("#answer-text", Static).update(Content("\n".join(told)))
-
-
-_STYLES = {
-    Conformity.WITHIN: "bold $text-success",
-    Conformity.EXCEEDED: "bold $text-error",
-    Conformity.UNDECIDED: "bold $text-warning",
-}

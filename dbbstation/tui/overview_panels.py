@@ -71,8 +71,8 @@ class ChosenTest:
 class LeftLine(Panel):
     """The remaining runs with their duration, and a hint while keys wait."""
 
-    def __init__(self, shown: Shown, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, shown: Shown) -> None:
+        super().__init__(id="left")
         self._show = shown
 
     def text(self, board: Board) -> Content:
@@ -90,8 +90,8 @@ class LeftLine(Panel):
 class PlateMap(Panel):
     """Map of the bores with their tests: a row per direction with sign, verdict and circularity."""
 
-    def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, shown: Shown, choice: ChosenTest) -> None:
+        super().__init__(id="plate")
         self._show = shown
         self._choice = choice
         self._name_room = min(max(map(len, shown.tests), default=0), _CELL - 7)
@@ -174,8 +174,8 @@ class TestList(Panel):
     __test__ = False
     """Keeps pytest from collecting this class."""
 
-    def __init__(self, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, choice: ChosenTest) -> None:
+        super().__init__(id="tests")
         self._choice = choice
 
     def text(self, board: Board) -> Content:
@@ -205,8 +205,8 @@ class TestList(Panel):
 class ChosenRun(Panel):
     """The chosen run: figures, verdict, reason, findings."""
 
-    def __init__(self, shown: Shown, choice: ChosenTest, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, shown: Shown, choice: ChosenTest) -> None:
+        super().__init__(id="chosen")
         self._show = shown
         self._choice = choice
 

@@ -59,11 +59,11 @@ class OverviewScreen(BoardScreen):
 
     def compose(self) -> ComposeResult:
         yield TitleLine(self._show.plan, id="overview-title")
-        yield LeftLine(self._show, id="left")
+        yield LeftLine(self._show)
         with Horizontal(id="plate-and-tests"):
-            yield PlateMap(self._show, self.choice, id="plate")
-            yield TestList(self.choice, id="tests")
-        yield ChosenRun(self._show, self.choice, id="chosen")
+            yield PlateMap(self._show, self.choice)
+            yield TestList(self.choice)
+        yield ChosenRun(self._show, self.choice)
         yield Footer(show_command_palette=False)
 
     def keys(self) -> object:

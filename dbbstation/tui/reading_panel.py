@@ -53,8 +53,8 @@ class Age:
 class ReadingPanel(Panel):
     """Two rows."""
 
-    def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, *, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(id="reading")
         self._age = Age(clock)
 
     def text(self, board: Board) -> Content:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from textual.containers import Horizontal
 from textual.content import Content, Span
 
 from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
+from dbbstation.tui.reading_panel import ReadingPanel
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    from textual.app import ComposeResult
 
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Ball
@@ -26,8 +30,8 @@ _LETTERS = 3
 class JigMap(Panel):
     """Bores by number, X to the right and Y up; the run's bore is in inverted brackets."""
 
-    def __init__(self, bores: Mapping[int, tuple[float, float]], *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
-        super().__init__(id=id)
+    def __init__(self, bores: Mapping[int, tuple[float, float]]) -> None:
+        super().__init__(id="map")
         self._bores = bores
         self.styles.width, self.styles.height = COLUMNS, ROWS
 
@@ -97,6 +101,15 @@ class StepsPanel(Panel):
                 for number, step in enumerate(steps)
             )
         )
+
+
+def set_up(bores: Mapping[int, tuple[float, float]], clock: Callable[[], float]) -> ComposeResult:
+    """Yield the reading and all panels of a run's set-up."""
+    yield ReadingPanel(clock=clock)
+    with Horizontal(id="table"):
+        yield SetUpPanel(id="set-up")
+        yield JigMap(bores)
+    yield StepsPanel(id="steps")
 
 
 def _place(ball: Ball) -> tuple[str, str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.quality.conformity import Conformity
 from dbbstation.service.choice import Gate, Order, SetUpPart
 from dbbstation.service.work import SessionTask, WorkProgress
 from dbbstation.station.states import State
@@ -111,23 +112,6 @@ START_UNJUDGED = ", {count} to judge"
 START_WHAT = "{folder}\nplan {plan}, machine {machine}"
 START_BY = "by {instrument} at {port}"
 START_NO_LINE = "no instrument yet: I chooses one"
-
-PARTS: Mapping[SetUpPart, str] = {
-    SetUpPart.MACHINE: "machine",
-    SetUpPart.PLAN: "plan",
-    SetUpPart.INSTRUMENT: "instrument",
-    SetUpPart.PORT: "port",
-    SetUpPart.BAR: "bar",
-    SetUpPart.FOLDER: "folder",
-    SetUpPart.PROGRAMS: "NC programs",
-    SetUpPart.OPERATOR: "operator",
-    SetUpPart.SERIAL_NUMBER: "serial number",
-    SetUpPart.JOB: "job",
-    SetUpPart.TEMPERATURE: "temperature",
-    SetUpPart.ORDER: "order of tests",
-    SetUpPart.GATE: "drift gate",
-}
-"""Names of the rows of a new session."""
 
 MISSING_PARTS: Mapping[SetUpPart, str] = {
     SetUpPart.MACHINE: "the machine's file",
@@ -312,6 +296,11 @@ ACCEPTANCE_HEADING: Mapping[str, str] = {
     "limit": "limit",
     "expanded": "U k=2",
     "verdict": "verdict",
+}
+CONFORMITY_STYLES = {
+    Conformity.WITHIN: "bold $text-success",
+    Conformity.EXCEEDED: "bold $text-error",
+    Conformity.UNDECIDED: "bold $text-warning",
 }
 CONFORMITY_WORDS: Mapping[str, str] = {"within": "PASS", "exceeded": "FAIL", "cannot tell": "CANNOT TELL"}
 FIGURE_NAMES: Mapping[str, str] = {

@@ -88,7 +88,7 @@ class Bench:
         size: tuple[int, int] = (80, 24),
         helper: Observer | None = None,
     ) -> None:
-        line = HeldLine(ENCODER, self.place.port, clock=self.place.clock)
+        line = HeldLine(ENCODER, self.place.port, clock=self.job.clock)
         runner = Runner(opener(self.job, line, observers=[helper or self.place.helper]), line)
         app = StationApp(
             Shown(self.job.plan.name, self.job.plan.plate.bores, tests=self.job.plan.to_domain().tests), runner
@@ -113,9 +113,9 @@ def switched_on(plan: PlanFile, folder: Path) -> Iterator[Bench]:
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     with (
         mock.patch("dbbstation.service.virtual_place.VirtualInstrument", FaultyInstrument),
-        virtual_place(machine, plan.to_domain(), ENCODER, time_scale=TIME_SCALE) as place,
+        virtual_place(Job(machine, plan, folder), ENCODER, TIME_SCALE, seed=0) as place,
     ):
-        yield Bench(place, Job(machine, plan, folder, clock=place.clock, time_scale=TIME_SCALE))
+        yield Bench(place, place.job)
 
 
 async def until(pilot: Pilot[None], condition: Callable[[], bool]) -> None:

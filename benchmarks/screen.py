@@ -35,8 +35,8 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.service.board import Board
-from dbbstation.service.runner import OpenStation, Runner
+from dbbstation.service.board import Board, SequenceOpened
+from dbbstation.service.runner import Runner
 from dbbstation.station.commands import Start
 from dbbstation.station.engine import Station
 from dbbstation.station.run_record import recording_of
@@ -125,11 +125,11 @@ def one(screen: str, result: str) -> None:
     lengths_mm = [run.length_mm_at(float(t_s)) + virtual.noise_mm() for t_s in times_s]
 
     @contextmanager
-    def opened() -> Iterator[OpenStation]:
+    def opened() -> Iterator[tuple[Station, SequenceOpened]]:
         schedule = Schedule(plan, lambda _test, _direction: 1)
         station = Station(Sequencer(plan, schedule, recording_of), Memory(lengths_mm))
         station.send(Start())
-        yield OpenStation(station, schedule, "memory")
+        yield station, SequenceOpened(schedule.tasks, schedule.open, "memory")
 
     runner = Runner(opened)
     measured = on_screen(screen, runner, Shown(plan.name, inline.plate.bores, tests=plan.tests))

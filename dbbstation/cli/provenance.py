@@ -10,7 +10,6 @@ import click
 from click.core import ParameterSource
 
 from dbbstation import __version__
-from dbbstation.files.inputs import inputs_so_far, virtual_so_far
 from dbbstation.files.places import name_of
 
 if TYPE_CHECKING:
@@ -48,9 +47,9 @@ _GIVEN = frozenset({ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP, Pa
 
 def provenance() -> Provenance:
     """Return the provenance with the inputs read so far."""
-    from dbbstation.files.provenance import Provenance
+    from dbbstation.files.provenance import made_by
 
-    return Provenance(PROGRAM, command_of(click.get_current_context()), inputs_so_far(), virtual_so_far())
+    return made_by(command_of(click.get_current_context()))
 
 
 def command_of(context: click.Context) -> str:

@@ -95,6 +95,11 @@ def write_table(path: Path, text: str, provenance: Provenance, *, force: bool = 
     write_folder(path.parent, {path.name: text, beside.name: told}, force=force)
 
 
+def made_by(command: str) -> Provenance:
+    """Return the provenance of a command's output, with the inputs read so far."""
+    return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
+
+
 def from_python() -> Provenance:
     """Return the provenance of a Python script's output, without command."""
-    return Provenance(f"dbbstation {__version__}", "from Python", inputs_so_far(), virtual_so_far())
+    return made_by("from Python")

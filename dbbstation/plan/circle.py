@@ -69,6 +69,11 @@ class Circle:
         return float(np.degrees(self.feed_mm_min / 60.0 / self.radius_mm))
 
     @property
+    def feeding_s(self) -> float:
+        """Return the time of feed-in or feed-out at the planned feed [s]."""
+        return self.feed_in_mm / (self.feed_mm_min / 60.0)
+
+    @property
     def swept_deg(self) -> float:
         """Return the arc between feed-in and feed-out [deg]."""
         return FULL_TURN_DEG + 2.0 * self.overshoot_deg

@@ -259,7 +259,7 @@ def _ways(run: Run) -> tuple[FeedingWay, FeedingWay] | None:
 
 def due_s(circle: Circle) -> float:
     """Return the programmed time between the midpoints of feed-in and feed-out [s]."""
-    return circle.swept_deg / circle.turning_deg_s + circle.feed_in_mm / (circle.feed_mm_min / 60.0)
+    return circle.swept_deg / circle.turning_deg_s + circle.feeding_s
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,20 +17,28 @@ from dbbstation.results.frame import Framed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CalibrationResult(Framed, CalibrationFigures):
+class WithModel(Framed):
+    """A result with a model for prediction or compensation, which `save` writes, and the sessions it was fitted to."""
+
+    model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
+    recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)
+
+    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
+        write_model(path, self.model, provenance=provenance, force=force)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CalibrationResult(WithModel, CalibrationFigures):
     """Result of a calibration.
 
     Attributes:
         centre_u_um: greatest u of the tool's X, Y and Z at the circles' centres; None if unknown.
         method: knowledge of ball positions: `jig`, `conv-a` or `conv-b`.
-        model: for prediction or compensation; `save` writes it.
     """
 
     method: str
     centre_u_um: tuple[float | None, float | None, float | None]
     covariance: Covariance
-    model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
-    recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)
 
     @property
     def parameters(self) -> dict[str, Value]:
@@ -41,9 +49,6 @@ class CalibrationResult(Framed, CalibrationFigures):
         """Return the number of parameters and the residual."""
         left = f"leaves {self.residual_rms_um:.2f} of {self.nominal_rms_um:.2f} µm rms"
         return f"{self.parameters_identified} parameters, {left}"
-
-    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
-        write_model(path, self.model, provenance=provenance, force=force)
 
     def rows(self) -> list[dict[str, object]]:
         """Return the machine's parameters as rows; `u` is the standard uncertainty."""

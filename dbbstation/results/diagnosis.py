@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from pydantic import computed_field
 
@@ -14,15 +13,13 @@ from dbbstation.diagnosis.effects import CauseEffect
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError
 from dbbstation.facts.run import OfRun
-from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
-from dbbstation.files.formats.model import write_model
-from dbbstation.files.provenance import Provenance
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.limit_reached import LimitReached
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.model.identified import IdentifiedModel
+from dbbstation.results.calibration import WithModel
 from dbbstation.results.frame import ByName, Framed, of_facts
 from dbbstation.results.levels_text import bars, level_sentences, short_sentences
 from dbbstation.trace.analysis import figures
@@ -125,15 +122,10 @@ class DiagnosisFigures(Framed):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DiagnosisResult(DiagnosisFigures):
+class DiagnosisResult(DiagnosisFigures, WithModel):
     """The result of a diagnosis."""
 
     effects: tuple[CauseEffect, ...]
-    model: Annotated[IdentifiedModel, AsItIs, Kept] = field(repr=False)
-    recorded: Annotated[Any, AsItIs, Kept] = field(default=None, repr=False)
-
-    def _save(self, path: Path, provenance: Provenance, *, force: bool) -> None:
-        write_model(path, self.model, provenance=provenance, force=force)
 
 
 def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> DiagnosisFigures:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import queue
 import threading
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dbbstation.errors import StationError
@@ -23,25 +22,12 @@ if TYPE_CHECKING:
     from dbbstation.station.commands import Command
     from dbbstation.station.engine import Station
     from dbbstation.station.events import Observer
-    from dbbstation.station.judging import JudgedRun
-    from dbbstation.station.schedule import Schedule
 
 _JOIN_S = 10.0
 """Longest wait for a hanging serial line when the screen closes [s]."""
 
 
-@dataclass(frozen=True)
-class OpenStation:
-    """A station ready to run, with storage."""
-
-    station: Station
-    schedule: Schedule
-    session: str
-    known: tuple[JudgedRun, ...] = ()
-    virtual: bool = False
-
-
-Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
+Opener: TypeAlias = "Callable[[], AbstractContextManager[tuple[Station, SequenceOpened]]]"
 """Function that borrows the instrument and opens the session. It is called again when a failed line is connected
 again."""
 
@@ -112,17 +98,13 @@ class Runner:
 
     def _run(self) -> None:
         try:
-            with self._opener() as opened:
-                self._mail.put(
-                    SequenceOpened(
-                        opened.schedule.tasks, opened.schedule.open, opened.session, opened.known, opened.virtual
-                    )
-                )
-                opened.station.subscribe(self._observe)
-                self._station = opened.station
+            with self._opener() as (station, opened):
+                self._mail.put(opened)
+                station.subscribe(self._observe)
+                self._station = station
                 if self._closing.is_set():
-                    opened.station.send(Quit())
-                opened.station.run()
+                    station.send(Quit())
+                station.run()
         except StationError as error:
             # What the engine ran into it has told already; what kept it from beginning it could not.
             if not self._told:
@@ -141,15 +123,15 @@ def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> O
     """Return a function that borrows the instrument and opens the session again."""
 
     @contextmanager
-    def opened() -> Iterator[OpenStation]:
+    def opened() -> Iterator[tuple[Station, SequenceOpened]]:
         with line.lent() as source:
             workplace = assemble(job, source, source.unreadable, asked=line.protocol.ask.asked)
             for observer in observers:
                 workplace.station.subscribe(observer)
             try:
                 virtual = workplace.writer.session.virtual is True
-                known = workplace.judge.known()
-                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), known, virtual)
+                known, schedule = workplace.judge.known(), workplace.schedule
+                yield workplace.station, SequenceOpened(schedule.tasks, schedule.open, str(job.folder), known, virtual)
             finally:
                 workplace.close()
 

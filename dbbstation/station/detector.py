@@ -25,8 +25,7 @@ DWELL_BEHIND_S = 0.5
 
 def feed_out_due_s(circle: Circle) -> float:
     """Return the time between the edges of feed-in and feed-out at the plan's feed, plus the tolerance of cutting [s]."""
-    feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
-    return (1.0 + FEED_TOLERANCE) * circle.swept_deg / circle.turning_deg_s + feeding_s + 2.0 * CORNER_DWELL_S
+    return (1.0 + FEED_TOLERANCE) * circle.swept_deg / circle.turning_deg_s + circle.feeding_s + 2.0 * CORNER_DWELL_S
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class EdgeDetector:
 
 def live_phi_deg(circle: Circle, since_feed_in_s: float) -> float:
     """Return the progress after the feed-in edge, within a degree or two [deg]."""
-    feed_in_rest_s = circle.feed_in_mm / 2.0 / (circle.feed_mm_min / 60.0)
+    feed_in_rest_s = circle.feeding_s / 2.0
     on_arc_s = max(since_feed_in_s - feed_in_rest_s - CORNER_DWELL_S, 0.0)
     return min(on_arc_s * circle.turning_deg_s, circle.swept_deg) - circle.overshoot_deg
 

@@ -134,8 +134,7 @@ class RunRecord:
 
     def left(self, t_s: float) -> bool:
         """Return whether enough time has passed since the feed-out."""
-        rest_s = self.circle.feed_in_mm / 2.0 / (self.circle.feed_mm_min / 60.0)
-        return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S
+        return self.fed_out_s is not None and t_s >= self.fed_out_s + self.circle.feeding_s / 2.0 + DWELL_BEHIND_S
 
     def circle_figures(self, recording: Recording, largest_loss_percent: float) -> tuple[CircleFigures | None, str]:
         """Return the circle's figures, or None and the reason."""

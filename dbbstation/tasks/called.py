@@ -7,11 +7,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dbbstation import __version__
 from dbbstation.files.atomic import write_bytes
-from dbbstation.files.inputs import inputs_so_far, virtual_so_far
 from dbbstation.files.places import name_of
-from dbbstation.files.provenance import Provenance
+from dbbstation.files.provenance import Provenance, made_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -62,8 +60,7 @@ def called(
     values = of_shop | dict(given)
 
     def provenance() -> Provenance:
-        command = shlex.join(["dbbstation", name, *_words(task, values)])
-        return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
+        return made_by(shlex.join(["dbbstation", name, *_words(task, values)]))
 
     more = {
         "settings": settings,

@@ -9,15 +9,15 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import SetUpKnowledge
-from dbbstation.errors import InputError, TraceError
+from dbbstation.errors import TraceError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.judged import judge_session
-from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.results.circles import Circled, MeasuredCircle, MeasuredPair
-from dbbstation.tasks.load import check_named
+from dbbstation.tasks.load import no_run_left, with_tests
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
+    from dbbstation.files.recordings.session import SessionFolder
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
@@ -51,10 +51,7 @@ def load_circles(
     Raises:
         InputError: every fault of every file; no accepted run; an unknown test.
     """
-    sessions = [opened(path) for path in paths]
-    every = {test for session in sessions for test in session.plan.tests}
-    check_named(sessions, every, exclude, " to exclude")
-    check_named(sessions, every, tests)
+    sessions = with_tests(paths, tests, exclude)
     circles: list[MeasuredCircle] = []
     pairs: list[MeasuredPair] = []
     warnings: list[str] = []
@@ -76,8 +73,7 @@ def load_circles(
         pairs += _pairs(session, of_session)
         warnings += _many(session, used)
     if not circles:
-        places = ", ".join(str(session.folder) for session in sessions)
-        raise InputError.of(places, "no accepted run is left", "accept a run, or exclude fewer tests")
+        raise no_run_left(sessions)
     return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
 
 

@@ -11,16 +11,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from dbbstation import __version__
 from dbbstation.errors import InputError, StationError
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import model_text
 from dbbstation.files.formats.settings import Settings
 from dbbstation.files.gateway import content_of, digest_of
-from dbbstation.files.inputs import input_book, inputs_so_far, virtual_so_far
+from dbbstation.files.inputs import input_book
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.places import name_of
-from dbbstation.files.provenance import Provenance
+from dbbstation.files.provenance import Provenance, made_by
 from dbbstation.files.recordings.former import reason_of
 from dbbstation.results.fleet import FleetCause, FleetFound, FleetValue
 from dbbstation.tasks.calibrate import calibrate
@@ -201,8 +200,7 @@ TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, 
 
 
 def _provenance(piece: FleetPiece) -> Provenance:
-    command = shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()])
-    return Provenance(f"dbbstation {__version__}", command, inputs_so_far(), virtual_so_far())
+    return made_by(shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()]))
 
 
 def _size(name: str, value_um: float) -> FleetValue:

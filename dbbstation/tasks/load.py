@@ -116,12 +116,9 @@ def load_sessions(
     Raises:
         InputError: faults of files and traces; a repeated session; different machines; no accepted run; unknown tests.
     """
-    sessions = _unique_names([opened(path) for path in paths])
+    sessions = _unique_names(with_tests(paths, only, exclude))
     warnings = _check_one_machine(sessions)
-    every = {test for session in sessions for test in session.plan.tests}
-    check_named(sessions, every, exclude, " to exclude")
-    check_named(sessions, every, only)
-    exclude = [*exclude, *(test for test in every if only and test not in only)]
+    exclude = [*exclude, *(test for one in sessions for test in one.plan.tests if only and test not in only)]
     observations: list[Observation] = []
     problems: list[Problem] = []
     logs: dict[str, list[tuple[float, Recording]]] = {}
@@ -160,8 +157,7 @@ def load_sessions(
     ]
     refuse(problems)
     if not observations:
-        places = ", ".join(str(session.folder) for session in sessions)
-        raise InputError.of(places, "no accepted run is left", "accept a run, or exclude fewer tests")
+        raise no_run_left(sessions)
     under_correction = {session.name: session.machine for session in sessions if session.machine.control is not None}
     observations = [_under(under_correction.get(one.setup.session), one) for one in observations]
     warnings += [
@@ -295,10 +291,20 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
     return told
 
 
-def check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
-    """Refuse unknown names of tests."""
-    unknown = [name for name in named if name not in every]
-    if unknown:
-        what = f"no session has a test {', '.join(unknown)}{why}"
-        known = f"tests are {', '.join(sorted(every))}"
-        raise InputError.of(sessions[0].folder, what, known)
+def with_tests(
+    paths: Sequence[Path | SessionFolder], tests: Sequence[str], exclude: Sequence[str]
+) -> list[SessionFolder]:
+    """Read session files; refuse unknown names of tests."""
+    sessions = [opened(path) for path in paths]
+    every = {test for session in sessions for test in session.plan.tests}
+    for named, why in ((exclude, " to exclude"), (tests, "")):
+        if unknown := [name for name in named if name not in every]:
+            what = f"no session has a test {', '.join(unknown)}{why}"
+            raise InputError.of(sessions[0].folder, what, f"tests are {', '.join(sorted(every))}")
+    return sessions
+
+
+def no_run_left(sessions: Sequence[SessionFolder]) -> InputError:
+    """Return the error of sessions without a run to work on."""
+    places = ", ".join(str(session.folder) for session in sessions)
+    return InputError.of(places, "no accepted run is left", "accept a run, or exclude fewer tests")

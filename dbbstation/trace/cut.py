@@ -152,8 +152,7 @@ def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
     # An edge between two samples has the uncertainty spacing / sqrt(12); the mean of two edges has 1 / sqrt(2) of it.
     # Several samples on the feed-in divide it by their number. Negligible values are set to zero.
     spacing_s = float(np.median(np.diff(recording.good.t_s)))
-    feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
-    share = min(1.0, spacing_s / feeding_s)
+    share = min(1.0, spacing_s / circle.feeding_s)
     found = spacing_s / np.sqrt(24.0) * share * circle.turning_deg_s
     return float(found) if found > NEGLIGIBLE_DEG else 0.0
 
@@ -219,7 +218,7 @@ def _first_below(t: Floats, length: Floats, circle: Circle) -> int | None:
 
 def _edge(t: Floats, length: Floats, circle: Circle, first: int) -> float:
     """Return the time at which the length is halfway between outside and inside [s]."""
-    feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
+    feeding_s = circle.feeding_s
     after_s = np.abs(t - t[first]) * np.where(np.arange(len(t)) < first, -1.0, 1.0)
     outside = (after_s > -OUTSIDE_FEEDINGS * feeding_s) & (after_s < -feeding_s)
     inside = (after_s > feeding_s) & (after_s < INSIDE_FEEDINGS * feeding_s)

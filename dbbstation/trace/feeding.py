@@ -55,8 +55,7 @@ def feeding_ways(
 
 
 def _way(recording: Recording, circle: Circle, behind_s: Floats, along_deg: Floats) -> tuple[float, float] | None:
-    feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
-    outside = recording.length_mm[(behind_s > -OUTSIDE_FEEDINGS * feeding_s) & (behind_s < -feeding_s)]
+    outside = recording.length_mm[(behind_s > -OUTSIDE_FEEDINGS * circle.feeding_s) & (behind_s < -circle.feeding_s)]
     chosen = (along_deg > LEFT_OUT_DEG) & (along_deg < LEFT_OUT_DEG + READ_DEG)
     if not len(outside) or np.count_nonzero(chosen) < FEWEST:
         return None

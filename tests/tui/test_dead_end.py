@@ -18,9 +18,11 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
-from dbbstation.service.runner import OpenStation, Runner
+from dbbstation.service.board import SequenceOpened
+from dbbstation.service.runner import Runner
 from dbbstation.station import events
 from dbbstation.station.assembly import Job, assemble
+from dbbstation.station.engine import Station
 from dbbstation.station.states import VERDICT, State
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.board_screen import Shown
@@ -51,11 +53,12 @@ class Machine:
         self._announced: events.RunAnnounced | None = None
 
     @contextmanager
-    def open(self) -> Iterator[OpenStation]:
+    def open(self) -> Iterator[tuple[Station, SequenceOpened]]:
         workplace = assemble(self.job, self)
         workplace.station.subscribe(self)
         try:
-            yield OpenStation(workplace.station, workplace.schedule, str(self.job.folder), workplace.judge.known())
+            known, schedule = workplace.judge.known(), workplace.schedule
+            yield workplace.station, SequenceOpened(schedule.tasks, schedule.open, str(self.job.folder), known)
         finally:
             workplace.close()
 

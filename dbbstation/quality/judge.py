@@ -23,7 +23,7 @@ from dbbstation.quality.swapped import of_its_test
 from dbbstation.quality.together import expected_beside, together
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.circles.analysis import CircleAnalysis
 
@@ -48,13 +48,9 @@ class Judgement:
 
 
 @with_one_thread
-def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _done, _of: None) -> tuple[Judgement, ...]:
+def judge(runs: Sequence[Run]) -> tuple[Judgement, ...]:
     """Judge each run of a session, using all others."""
-    known = []
-    for done, run in enumerate(runs):
-        progress(done, len(runs))
-        known.append(seen(run))
-    progress(len(runs), len(runs))
+    known = list(map(seen, runs))
     session = SessionRuns(known)
     return tuple(session.judge(one) for one in known)
 

@@ -18,15 +18,8 @@ if TYPE_CHECKING:
     from dbbstation.tasks.declare import Declared
     from dbbstation.tasks.telling import Progress
 
-_MODULES = {
-    "calibrate": "calibrate",
-    "circles": "circles",
-    "diagnose": "diagnose",
-    "history": "history",
-    "program": "circle_programs",
-    "report": "report",
-}
-"""Module of each task that a station asks for."""
+_MODULES = {"program": "circle_programs"}
+"""Module of a task, if it has another name."""
 
 _PATHS = (Path, tuple[Path, ...])
 
@@ -50,7 +43,7 @@ def called(
     Raises:
         StationError: an error of the task, or a file exists without `force`.
     """
-    function = getattr(import_module(f"dbbstation.tasks.{_MODULES[name]}"), name)
+    function = getattr(import_module(f"dbbstation.tasks.{_MODULES.get(name, name)}"), name)
     task: Declared = function.declared
     of_shop = {
         each.name: settings.values[each.option.setting].value

@@ -17,12 +17,12 @@ from dbbstation.tasks.load import no_run_left, with_tests
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
-    from dbbstation.files.recordings.session import SessionFolder
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.session import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
     from dbbstation.plan.plan import Ball

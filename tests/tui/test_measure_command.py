@@ -106,7 +106,8 @@ def test_order_job_and_programs_reach_the_session_and_the_start_screen(
 ) -> None:
     module = importlib.import_module("dbbstation.cli.on_screen")
     seen: list[Any] = []
-    monkeypatch.setattr(module, "_run", lambda job, _open, _line: seen.append(job) or 0)
+    monkeypatch.setattr("dbbstation.service.runner.opener", lambda job, _line, **_: seen.append(job))
+    monkeypatch.setattr(module, "_shown", lambda _app: 0)
     monkeypatch.setattr(module, "_begin", lambda given, _limits, _model: seen.append(given) or 0)
     shipped = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
     machine = shipped_folder("fixtures") / "machines" / "reference.yaml"

@@ -21,7 +21,7 @@ from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
@@ -37,15 +37,13 @@ def judge_session(
     session: SessionFolder,
     wanted: Sequence[tuple[RunEntry, Recording]],
     model: IdentifiedModel | None = None,
-    progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[Judgement, ...]:
     """Judge runs of a session.
 
     Args:
         model: None: only usual sizes of machine errors are known.
     """
-    runs = runs_of(session, wanted, model)
-    return judge(runs, progress)
+    return judge(runs_of(session, wanted, model))
 
 
 def runs_of(

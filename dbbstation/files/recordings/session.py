@@ -38,7 +38,7 @@ from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
 from dbbstation.trace.recording import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
@@ -157,9 +157,7 @@ class SessionFolder(SessionDetails):
     def _read(self) -> dict[Path, RunFile]:
         return {}
 
-    def load_all(
-        self, runs: Sequence[RunEntry], progress: Callable[[int, int], None] = lambda _done, _of: None
-    ) -> list[RunFile]:
+    def load_all(self, runs: Sequence[RunEntry]) -> list[RunFile]:
         """Read several runs.
 
         Raises:
@@ -167,13 +165,11 @@ class SessionFolder(SessionDetails):
         """
         read: list[RunFile] = []
         faults: list[Problem] = []
-        for done, run in enumerate(runs):
-            progress(done, len(runs))
+        for run in runs:
             try:
                 read.append(self.load(run))
             except InputError as error:
                 faults += error.problems
-        progress(len(runs), len(runs))
         refuse(faults)
         return read
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
+import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
+from functools import cache
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -18,13 +23,12 @@ from pydantic import (
     PlainSerializer,
     WrapValidator,
 )
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, PydanticKnownError, core_schema
 
-from dbbstation.facts.serialise import adapter
-
-STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
-"""Options of every part of a file: strict types, no unknown keys, finite numbers; the text under a field states unit and sign."""
+STRICT = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+"""Options of every part of a file: strict types, no unknown keys, finite numbers."""
 
 
 class Record:
@@ -45,11 +49,34 @@ class Record:
         found = handler(schema)
         part = handler.resolve_ref_schema(found)
         part["description"] = inspect.cleandoc(cls.__doc__ or "")
-        for base in cls.__bases__:  # pydantic reads the texts under a class's own fields only
-            inherited = adapter(base).json_schema()["properties"] if base is not Record else {}
-            for name, said in inherited.items():
-                part["properties"][name] |= {"description": said["description"]}
+        describe(part["properties"], [base for base in cls.__mro__ if issubclass(base, Record)])
         return found
+
+
+def describe(properties: dict[str, Any], classes: Iterable[type]) -> None:
+    """Add to the properties of a JSON schema the texts under the fields of its classes, which state unit and sign."""
+    # pydantic itself reads the texts when a class is made, which each start of the program would wait for.
+    for one in classes:
+        for name, text in _texts_under_fields(one.__module__).get(one.__name__, {}).items():
+            extras = getattr(inspect.get_annotations(one, eval_str=True)[name], "__metadata__", ())
+            alias = next((extra.alias for extra in extras if isinstance(extra, FieldInfo) and extra.alias), name)
+            properties.get(alias, {}).setdefault("description", text)
+
+
+@cache
+def _texts_under_fields(module: str) -> dict[str, dict[str, str]]:
+    """Return the texts under the fields of a module's classes, by class and field."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {
+        one.name: {
+            field.target.id: inspect.cleandoc(text.value.value)
+            for field, text in pairwise(one.body)
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+            if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)
+        }
+        for one in tree.body
+        if isinstance(one, ast.ClassDef)
+    }
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from inspect import get_annotations
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
-from pydantic import BaseModel, Field, GetCoreSchemaHandler, ValidationError, create_model
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, create_model
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails
 
 from dbbstation.errors import MOST_FAULTS, Problem, few
-from dbbstation.facts.record import STRICT, Record
+from dbbstation.facts.record import STRICT, Record, describe
 from dbbstation.facts.serialise import adapter
 from dbbstation.files.source_text import shortened
 from dbbstation.files.yaml.text import Location, YamlDocument, load_yaml
@@ -39,6 +40,17 @@ class Schema(BaseModel):
     """Base of every part of a file format; the docstring under each field states its unit and sign."""
 
     model_config = STRICT
+    replaced: ClassVar["type[Schema] | None"] = None
+    """Part of a format whose keys these replace."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        found = handler(schema)
+        classes = (cls.replaced or cls).__mro__
+        describe(
+            handler.resolve_ref_schema(found).get("properties", {}), [one for one in classes if issubclass(one, Schema)]
+        )
+        return found
 
 
 @dataclass(frozen=True)
@@ -51,10 +63,10 @@ class Partly:
         bases = [one for one in reversed(self.part.__mro__) if issubclass(one, Schema)]
         # Not `get_type_hints`, which needs the names of what pydantic declares for type checkers only.
         kinds = {name: kind for one in bases for name, kind in get_annotations(one, eval_str=True).items()}
-        fields = self.part.model_fields
-        keys: Any = {key: (kinds[key] | None, Field(None, description=one.description)) for key, one in fields.items()}
+        keys: Any = {key: (kinds[key] | None, None) for key in self.part.model_fields}
         said = f"Keys that replace those of: {self.part.__doc__}"
         made: Any = create_model(f"{self.part.__name__}Instead", __base__=Schema, __doc__=said, **keys)
+        made.replaced = self.part
         return handler.generate_schema(made | None)
 
 

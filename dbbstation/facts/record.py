@@ -53,7 +53,7 @@ class Record:
         return found
 
 
-def describe(properties: dict[str, Any], classes: Iterable[type]) -> None:
+def describe(properties: JsonSchemaValue, classes: Iterable[type]) -> None:
     """Add to the properties of a JSON schema the texts under the fields of its classes, which state unit and sign."""
     # pydantic itself reads the texts when a class is made, which each start of the program would wait for.
     for one in classes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from itertools import product
+from itertools import chain, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -120,10 +120,9 @@ class CircleChannel:
         """Return the source of a form."""
         return self.sources[name, variant.law]
 
-    def forms(self) -> Iterator[tuple[Variant, float]]:
-        """Return initial forms of named causes with their relative inaccuracy."""
-        for (name, law), variants in self._laid.items():
-            yield from ((variant, self.sources[name, law].form_uncertainty) for variant in variants)
+    def forms(self) -> Iterator[Variant]:
+        """Return initial forms of named causes."""
+        return chain.from_iterable(self._laid.values())
 
     def happens_once(self, name: str) -> bool:
         """Return whether a cause is a single event in a session."""
@@ -330,7 +329,8 @@ class CircleChannel:
         columns = self.columns.add(samples)
         plausible = np.tile([p.plausible for p in own_amplitudes], len(sets))
         positive = tuple(p.positive for p in own_amplitudes) * len(sets)
-        whole = Variant(columns, plausible, nonlinear, law=source.law, positive=positive)
+        rough = source.form_uncertainty
+        whole = Variant(columns, plausible, nonlinear, law=source.law, positive=positive, form_uncertainty=rough)
         found = []
         for part in parts_of(own_amplitudes, len(sets)):
             form = replace(whole, label=part.label, log_weight=part.log_weight)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
@@ -23,7 +22,7 @@ from dbbstation.diagnosis.shifts import shifts_between
 from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import form_uncertainty, judge
+from dbbstation.diagnosis.verdicts import judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN, Alternatives
@@ -139,8 +138,7 @@ def doubtful(explained: Explained) -> set[str]:
     # The median probability model predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. Ambiguous
     # causes remain.
     settled, found = explained.settled, set()
-    of = partial(form_uncertainty, explained.channel.sources)
-    every = Alternatives(settled, of, settled.members)
+    every = Alternatives(settled, settled.members)
     for name, equal in every.classes.items():
         if len(equal) == 1 and settled.posterior.probability(equal) < EVEN and not every.ambiguity(name):
             found.add(name)

@@ -101,7 +101,7 @@ def _law(explained: Explained, cause: Cause) -> Law:
         variant.plausible,
         (),
         (),
-        form_uncertainty=0.0 if source is None else source.form_uncertainty,
+        form_uncertainty=variant.form_uncertainty,
         log_odds=cause.log_prior_odds,
         followed=(variable,),
         way="direction" if signed else "",

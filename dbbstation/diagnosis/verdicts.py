@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ from dbbstation.inference.triangle import root
 from dbbstation.inference.verdict import OUT, SURE, Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.explained import Explained
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.settled import Settled
-    from dbbstation.sources.contract import ErrorSource
 
 TESTABLE_SHARE = 0.5
 """Least detectable share of a cause's amplitude combinations before it can be ruled out."""
@@ -49,8 +47,7 @@ class _CircleJudge(CauseJudge):
     def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> None:
         self._circles, self._joint, self._found = explained.channel, explained.settled, levels
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
-        # A bound method would keep the object and all columns alive by a reference cycle.
-        super().__init__(outcome, Trial(anew), levels, partial(form_uncertainty, explained.channel.sources))
+        super().__init__(outcome, Trial(anew), levels)
 
     def findings(self) -> tuple[SourceFinding, ...]:
         """Return all findings."""
@@ -194,9 +191,3 @@ class _CircleJudge(CauseJudge):
         values, covariance = self._values[name]
         variances = np.diag(spread @ covariance[:width, :width] @ spread.T)
         return amplitudes, spread @ (values[:width] - alone), variances
-
-
-def form_uncertainty(sources: Mapping[tuple[str, str], ErrorSource], member: Member) -> float:
-    """Return the relative inaccuracy of a cause's formula; zero for unmodelled causes."""
-    source = sources.get((member.name, member.variant.law))
-    return 0.0 if source is None else source.form_uncertainty

@@ -12,7 +12,7 @@ from dbbstation.inference.triangle import RANK, root
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Iterable, Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
@@ -29,22 +29,14 @@ is outside the other, which decides for very large effects alone."""
 class Alternatives:
     """Sets of equivalent causes, and of ambiguous causes, in a comparison.
 
-    Args:
-        form_uncertainty: relative inaccuracy of a member's formula.
-
     Attributes:
         classes: equivalent causes of each member, the member first.
         ambiguities: results of `ambiguity` by uncertain member.
     """
 
-    def __init__(
-        self,
-        settled: Outcome,
-        form_uncertainty: Callable[[Member], float],
-        of: Iterable[Member],
-    ) -> None:
-        self._settled, self._comparison, self._best = settled, settled.comparison, settled.best
-        self._form_uncertainty, self._posterior = form_uncertainty, settled.posterior
+    def __init__(self, settled: Outcome, of: Iterable[Member]) -> None:
+        self._settled, self._comparison = settled, settled.comparison
+        self._best, self._posterior = settled.best, settled.posterior
         probability = self._posterior.probability
         self.classes = {member.name: self._class(member) for member in of}
         self.ambiguities = {
@@ -80,7 +72,7 @@ class Alternatives:
 
     def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...], cosine: float) -> bool:
         in_place = self._comparison.scan(others, [rival])
-        formulas = np.hypot(self._form_uncertainty(member), self._form_uncertainty(in_place.best[0]))
+        formulas = np.hypot(member.variant.form_uncertainty, in_place.best[0].variant.form_uncertainty)
         if np.sqrt(1.0 - cosine**2) <= formulas:
             return False
         return self._best.log_factor(member.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
@@ -94,25 +86,19 @@ class Alternatives:
         return float(min(cosines.min(), 1.0)) if len(cosines) else 0.0
 
 
-def named_already(
-    comparison: ModelComparison, nameless: Sequence[Variant], named: Iterable[tuple[Variant, float]]
-) -> list[bool]:
-    """Return, for each form of an unmodelled effect, whether a named cause contains it within the inaccuracy of its formula.
-
-    Args:
-        named: forms of named causes, with their relative inaccuracy.
-    """
+def named_already(comparison: ModelComparison, nameless: Sequence[Variant], named: Iterable[Variant]) -> list[bool]:
+    """Return, for each form of an unmodelled effect, whether a named cause contains it within the inaccuracy of its formula."""
     found = np.zeros(len(nameless), dtype=bool)
-    by_size: dict[int, list[tuple[Integers, float]]] = {}
-    for variant, share in named:
-        if share > 0.0 and len(variant.columns) <= MOST_ALIKE:
-            by_size.setdefault(len(variant.columns), []).append((variant.columns, share))
+    by_size: dict[int, list[Variant]] = {}
+    for variant in named:
+        if variant.form_uncertainty > 0.0 and len(variant.columns) <= MOST_ALIKE:
+            by_size.setdefault(len(variant.columns), []).append(variant)
     for size, forms in by_size.items():
         alike = np.array([k for k, form in enumerate(nameless) if len(form.columns) == size], dtype=np.int64)
         if not len(alike):
             continue
         own = np.array([nameless[k].columns for k in alike])
-        other = np.array([columns for columns, _ in forms])
+        other = np.array([form.columns for form in forms])
         products = comparison.beside((), np.concatenate([own.ravel(), other.ravel()]))
         count = len(own)
         place = np.arange(len(products)).reshape(-1, size)
@@ -124,7 +110,7 @@ def named_already(
         shown = np.square(np.matmul(across.transpose(1, 0, 2), roots)).sum(axis=2)
         shown = shown.reshape(len(other), count, size).sum(axis=2).T
         apart = np.sqrt(np.maximum(1.0 - shown / np.maximum(whole, 1e-300)[:, None], 0.0))
-        found[alike] = (apart <= [share for _, share in forms]).any(axis=1)
+        found[alike] = (apart <= [form.form_uncertainty for form in forms]).any(axis=1)
     return found.tolist()
 
 

@@ -456,7 +456,7 @@ def _forms(
 ) -> tuple[Variant, ...]:
     every = columns if law.choices else columns[:0]
     whole = Variant(columns, plausible, point, whole=every, log_weight=log_weight, positive=law.positive)
-    return _parts(whole, law.choices)
+    return _parts(replace(whole, form_uncertainty=law.form_uncertainty), law.choices)
 
 
 def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: Sequence[float]) -> list[Floats]:

@@ -34,7 +34,6 @@ class VerdictsByLevel:
     settled: Settled
     levels: Levels
     pushes: Mapping[str, Sequence[Value]]
-    worse: bool
 
     def of_member(self, name: str, probability: float, sigmas: float, acts: Acts) -> Said:
         """Return the verdict on a member, given its size in standard deviations.
@@ -56,7 +55,7 @@ class VerdictsByLevel:
                 (),
                 f"It was found in these {self.settled.channel.rows_are}, and held-out parts gain nothing by it.",
             )
-        if FollowsAnswer.NOT_TESTED in answers and self.worse:
+        if FollowsAnswer.NOT_TESTED in answers and self.levels.correction is False:
             return (
                 Verdict.DOES_NOT_PREDICT,
                 (),

@@ -64,7 +64,7 @@ class KnownGains:
     Attributes:
         rows: of each part, shape (n,).
         gains: gain of each class by its variables; the empty set is for all effects.
-        errors: rms error with all effects, per part or overall.
+        errors: rms error of each part with all effects.
         anew: gains by the selections without each part; None if unknown.
     """
 
@@ -123,7 +123,7 @@ def gains_of_tests(
     parts = [*(tuple(part[key] for part in anew.of_classes) for key in classes), anew.whole]
     every = zip([*classes, frozenset[str]()], parts, others, strict=True)
     gains = {key: ClassGain(DensityGains(part, counts), before, error) for key, part, before in every}
-    return KnownGains(rows, gains, [error], anew)
+    return KnownGains(rows, gains, [error] * len(rows), anew)
 
 
 SHARE = 0.7

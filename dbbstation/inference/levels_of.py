@@ -11,7 +11,6 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.coloured import FEWEST_INDEPENDENT
 from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import detectable
-from dbbstation.inference.folds import HeldOutError
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
@@ -29,6 +28,7 @@ from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
     from dbbstation.inference.chosen_anew import ChosenAnew, KnownGains
+    from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.followed import ChosenWithoutParts, ClassGain, VariableClass
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Detectable
@@ -48,12 +48,14 @@ def levels_of(
     held_out: HeldOutError | ChosenAnew | None,
     matters: float | None = None,
     *,
+    reference: float | None = None,
     worse: bool = False,
     sizes: tuple[Detectable, ...] | None = None,
 ) -> Levels:
     """Return the three answers.
 
     Args:
+        reference: rms error on held-out parts without correction; None if not tested.
         worse: without held-out parts, whether the fitted sum leaves larger residuals than the reference.
         sizes: smallest detectable sizes for a known kind of noise; None to compute them over variables.
     """
@@ -70,10 +72,11 @@ def levels_of(
     sizes = detectable(settled) if sizes is None else sizes
     size = settled.channel.size if matters is None else matters
     samples = settled.noise.independent_samples(settled.channel.stretches)
-    correction = False if worse and held_out is None and settled.best.members else None
-    if isinstance(held_out, HeldOutError) and parts is not None and settled.best.members:
-        corrected = held_out.corrected(parts.errors_with(corrects_of(classes)))
-        correction = corrected.after < corrected.as_simulated
+    correction = False if worse and parts is None and settled.best.members else None
+    if reference is not None and parts is not None and settled.best.members:
+        rows = np.array([one.sum() for one in parts.rows])
+        errors = np.square(parts.errors_with(corrects_of(classes)))
+        correction = root(float(rows @ errors / rows.sum())) < reference
     differs = difference_of(
         probability_of_any(settled),
         classes,

@@ -63,6 +63,7 @@ class Variant:
         slack_at: rms amplitude in plausible sizes.
         tangents: number of first slack columns that are derivatives by nonlinear parameters.
         positive: amplitudes that cannot be negative, shape (p,); may be empty.
+        form_uncertainty: relative inaccuracy of the formula.
     """
 
     columns: Integers
@@ -77,6 +78,7 @@ class Variant:
     slack_at: float = 1.0
     tangents: int = 0
     positive: tuple[bool, ...] = ()
+    form_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

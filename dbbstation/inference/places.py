@@ -21,11 +21,10 @@ if TYPE_CHECKING:
 
 def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) -> Levels:
     """Return the three answers, with the strut, or all struts, on which each class surely acts."""
-    anew = None if gains is None else gains.anew
-    found = levels_of(settled, left, gains, anew, sizes=detectable_causes(settled))
+    anew, reference = (None, None) if gains is None else (gains.anew, gains.of(None).before)
+    found = levels_of(settled, left, gains, anew, reference=reference, sizes=detectable_causes(settled))
     follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
-    correction = None if gains is None else gains.of(None).after < gains.of(None).before
-    return replace(found, follows=follows, correction=correction)
+    return replace(found, follows=follows)
 
 
 def _place(settled: Settled, names: tuple[str, ...]) -> str | None:

@@ -25,7 +25,7 @@ from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import ABSENT, OUT, Acts, Gains, Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.inference.chosen_anew import ChosenAnew
@@ -100,18 +100,11 @@ class Trial:
     Attributes:
         refits: from `refits_without`; empty to use only model uncertainties.
         chosen: values by member of selections without one part each; may be empty.
-        is_worse_here: without held-out parts, whether the findings leave larger residuals than the reference.
     """
 
     held_out: HeldOutError | ChosenAnew | None = None
     refits: Sequence[Solution] = ()
     chosen: Sequence[Mapping[str, Mapping[str, Value]]] = ()
-    is_worse_here: bool = False
-
-    @property
-    def is_worse(self) -> bool:
-        """Return whether the findings predict worse than the reference."""
-        return self.is_worse_here if self.held_out is None else self.held_out.is_worse
 
 
 def read_off(settled: Settled, trial: Trial | None, levels: Levels) -> tuple[CauseFinding, ...]:
@@ -133,27 +126,17 @@ class CauseJudge:
 
     is_catalogue = False
 
-    def __init__(
-        self,
-        settled: Settled,
-        trial: Trial | None,
-        levels: Levels,
-        form_uncertainty: Callable[[Member], float] | None = None,
-    ) -> None:
+    def __init__(self, settled: Settled, trial: Trial | None, levels: Levels) -> None:
         self._trial, self._rows = trial, settled.channel.rows_are
-        self._settled, self._best, laws = settled, settled.best, settled.bank.laws
+        self._settled, self._best = settled, settled.best
         self._members = {member.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
-        self._alternatives = Alternatives(
-            settled,
-            form_uncertainty or (lambda member: laws[member.name].form_uncertainty if member.name in laws else 0.0),
-            [m for m in self._best.members if m.name not in settled.bank.nameless],
-        )
+        named = [member for member in self._best.members if member.name not in settled.bank.nameless]
+        self._alternatives = Alternatives(settled, named)
         self._classes = self._alternatives.classes
         self._values = {m.name: (v, c) for m, v, c in settled.comparison.estimated(self._best.members)}
         self._own = dict(zip(self._members, slices_of(self._best.members), strict=True))
-        worse = trial is not None and trial.is_worse
-        self._levels = VerdictsByLevel(settled, levels, self._pushes(), worse=worse)
+        self._levels = VerdictsByLevel(settled, levels, self._pushes())
         absent = [cause for cause in settled.causes if cause.name not in self._members]
         scan = settled.comparison.scan(self._best.members, absent)
         self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}

@@ -113,7 +113,7 @@ def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
         (undecided,),
         None,
     )
-    judge._levels = VerdictsByLevel(settled, levels, {}, worse=False)
+    judge._levels = VerdictsByLevel(settled, levels, {})
     judge._classes, judge._rows, judge._acts = {"play": ("play",)}, "tests", lambda _: Acts.ALWAYS
     judge._joint = SimpleNamespace(unmodelled=SimpleNamespace(follows={}))
     judge._alternatives = SimpleNamespace(probability=lambda _: 0.7, ambiguity=lambda _: group)

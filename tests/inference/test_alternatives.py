@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -9,11 +10,16 @@ import pytest
 
 from dbbstation.inference.alternatives import EVEN, Alternatives, named_already, standing_out
 from dbbstation.inference.hypotheses import Hypothesis, Posterior
+from dbbstation.inference.model_comparison import Variant
 from dbbstation.inference.settled import Outcome
 from dbbstation.inference.verdict import SURE
 from tests.inference.dense import Dense, variant
 
 NAMES = "abcdef"
+
+
+def rough(share: float, *columns: int) -> Variant:
+    return replace(variant(*columns), form_uncertainty=share)
 
 
 def posterior_of(probabilities: dict[str, float]) -> Posterior:
@@ -22,7 +28,7 @@ def posterior_of(probabilities: dict[str, float]) -> Posterior:
 
 
 def alternatives(posterior: Posterior) -> Alternatives:
-    return Alternatives(Outcome(causes=(), comparison=None, posterior=posterior), lambda _member: 0.0, ())  # type: ignore[arg-type]
+    return Alternatives(Outcome(causes=(), comparison=None, posterior=posterior), ())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -82,9 +88,7 @@ def test_an_effect_that_a_named_cause_has_among_its_forms_is_that_cause(rng) -> 
     assert 0.05 < apart < 0.3
     nameless = [variant(1), variant(1, 2)]
     for share, expected in ((1.01 * apart, [True, False]), (0.99 * apart, [False, False]), (0.0, [False, False])):
-        found = named_already(
-            dense.comparison(), nameless, [(variant(0), share), (variant(3), share), (variant(0, 3), share)]
-        )
+        found = named_already(dense.comparison(), nameless, [rough(share, 0), rough(share, 3), rough(share, 0, 3)])
         assert found == expected
     assert named_already(dense.comparison(), nameless, []) == [False, False]
 
@@ -99,4 +103,4 @@ def test_a_shift_in_space_that_a_named_cause_has_among_its_forms_is_that_cause(r
     assert 0.02 < apart < 0.5
     nameless = [variant(3, 4, 5), variant(6, 7, 8)]
     for share, expected in ((1.01 * apart, [True, False]), (0.99 * apart, [False, False])):
-        assert named_already(dense.comparison(), nameless, [(variant(0, 1, 2), share)]) == expected
+        assert named_already(dense.comparison(), nameless, [rough(share, 0, 1, 2)]) == expected

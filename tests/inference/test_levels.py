@@ -333,7 +333,7 @@ def test_a_verdict_is_read_off_the_level_of_the_class(both, answer, form, verdic
 def said_of_hysteresis(settled, form, answer, probability):
     follows = Followed((("q",),), (), answer, 1.0, {}, 1.0, ("curve over q", "hysteresis of q"), form=form)
     levels = replace(levels_of(settled, left_over(settled), None, None), follows=(follows,))
-    return VerdictsByLevel(settled, levels, {}, worse=False).of_member("hysteresis of q", probability, 9.0, Acts.ALWAYS)
+    return VerdictsByLevel(settled, levels, {}).of_member("hysteresis of q", probability, 9.0, Acts.ALWAYS)
 
 
 @pytest.mark.parametrize(("probability", "verdict"), [(0.96, Verdict.DOES_NOT_PREDICT), (0.9, Verdict.AMBIGUOUS)])
@@ -353,7 +353,7 @@ def test_what_leaves_more_than_as_simulated_is_not_identified(both):
     _, settled, _ = both
     levels = levels_of(settled, left_over(settled), None, None, worse=True)
     assert levels.correction is False
-    found = read_off(settled, Trial(is_worse_here=True), levels)
+    found = read_off(settled, Trial(), levels)
     assert {one.verdict for one in found if one.name in settled.best.names} == {Verdict.DOES_NOT_PREDICT}
 
 

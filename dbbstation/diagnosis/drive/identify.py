@@ -86,8 +86,8 @@ def identify(
     limits = limits_of(explained)
     held, parts = held_out(explained.drive, progress) if hold_out else (None, None)
     settled, left = explained.settled, left_over(explained.settled)
-    levels = levels_of(settled, left, parts, None, sizes=detectable_causes(settled))
-    levels = levels if held is None else replace(levels, correction=held.corrected < held.reference)
+    reference = None if held is None else held.reference
+    levels = levels_of(settled, left, parts, None, reference=reference, sizes=detectable_causes(settled))
     verdicts = Verdicts(explained, levels, several_speeds=limits.several_speeds, held=held)
     values, scale = base_values(explained.drive, explained.settled, after), put_together.scale
     known = {

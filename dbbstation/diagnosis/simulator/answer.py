@@ -187,7 +187,8 @@ def _said(
     except BudgetSpentError:
         not_asked = {}
     open_to = {name: one for one in found.withstood if one.log_odds > 0.0 for name in one.names}
-    levels = levels_of(settled, left, gains, held_out, matters)
+    reference = None if held_out is None else held_out.as_simulated
+    levels = levels_of(settled, left, gains, held_out, matters, reference=reference)
     read = read_off(settled, Trial(held_out, refits), levels)
     findings = tuple(_judged(one, found, nonlinear, open_to) for one in read)
     findings = tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_bayes_factor)))

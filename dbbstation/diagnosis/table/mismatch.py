@@ -210,11 +210,12 @@ def _found(
     is_worse_here = is_worse(rms(settled.left), rms(kept))
     left = left_over(settled)
     parts = ChosenWithoutParts(chosen) if hold_out else None
-    levels = levels_of(settled, left, parts, held_out, matters, worse=is_worse_here)
+    reference = None if held_out is None else held_out.as_simulated
+    levels = levels_of(settled, left, parts, held_out, matters, reference=reference, worse=is_worse_here)
     if held_out is not None and parts is not None and settled.best.members:
         held_out = held_out.corrected(parts.errors_with(levels.corrects))
     values = [values_of_members(one.settled, one.settled.best.members) for one in chosen]
-    findings = read_off(settled, Trial(held_out, refits, values, is_worse_here=is_worse_here), levels)
+    findings = read_off(settled, Trial(held_out, refits, values), levels)
     return Mismatch(
         table=table,
         settled=settled,

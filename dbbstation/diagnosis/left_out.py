@@ -12,13 +12,13 @@ from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import (
-    LEAST_PARTS,
     columns_of,
     gains_of_tests,
+    groups_of_tests,
     rows_of_groups,
     selection_frequency,
 )
-from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn, numbered
+from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn, numbered
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.hypotheses import CLOSE
@@ -76,12 +76,10 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
 
     The reference is the kinematic calibration of the same tests.
     """
-    groups = groups_of(explained.channel.observations)
-    if not outcome.best.members or groups is None:
-        return None
+    channel = explained.channel
     return gains_of_tests(
         outcome,
-        rows_of_groups(groups, explained.channel.runs),
+        rows_of_groups(groups_of_tests([o.test for o in channel.observations]), channel.runs),
         partial(predicted_without, explained),
         lambda cause: cause.named,
         most_members=BOUNDS.members,
@@ -113,8 +111,8 @@ def widened_by_tests(calibration: Calibration) -> Calibration:
     The selection, correlations [`widening`] and stated sizes of random effects do not change. With fewer than
     `LEAST_PARTS` groups the fit does not change.
     """
-    groups = groups_of(calibration.observations)
-    if groups is None:
+    groups = groups_of_tests([o.test for o in calibration.observations])
+    if not groups:
         return calibration
     known, noise = calibration.layout.known, calibration.noise.effective
     held, behind = calibration.solution.held, calibration.blocks[len(groups) :]
@@ -129,12 +127,6 @@ def widened_by_tests(calibration: Calibration) -> Calibration:
     factor = np.where(known.random, 1.0, widening(variances[0], moved, np.array(variances[1:])))
     spreads = calibration.solution.spreads.times(factor)
     return replace(calibration, solution=replace(calibration.solution, spreads=spreads))
-
-
-def groups_of(observations: Sequence[Observation]) -> list[int] | None:
-    """Return each run's group of tests; None for too few tests."""
-    groups = in_turn([o.test for o in observations], FOLDS)
-    return groups if len(np.unique(groups)) >= LEAST_PARTS else None
 
 
 def _single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:

@@ -11,11 +11,11 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.findings import NextTest
 from dbbstation.diagnosis.foreseen import ForeseenTests
 from dbbstation.diagnosis.parts import amplitudes
-from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
+from dbbstation.inference.alternatives import would_show
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
-from dbbstation.inference.verdict import OUT, Verdict
+from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Need
 
@@ -160,7 +160,7 @@ def _sigmas(covariance: Floats, variant: Variant) -> Floats:
 
 
 def _worth_it(now: Floats, then: Floats) -> bool:
-    testable = [bool(np.mean(sigmas <= 1.0 / OUT) >= TESTABLE_SHARE) for sigmas in (now, then)]
+    testable = [would_show(1.0 / sigmas) for sigmas in (now, then)]
     return testable == [False, True] or bool(np.any(then <= HALVED * now))
 
 

@@ -10,7 +10,7 @@ from dbbstation.diagnosis.findings import SourceFinding
 from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.diagnosis.parts import amplitudes
 from dbbstation.facts.value import Value
-from dbbstation.inference.alternatives import standing_out
+from dbbstation.inference.by_level import ambiguous, open_to, with_texts
 from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.levels import JOINED
 from dbbstation.inference.read_off import CauseJudge, Trial, concealed
@@ -25,11 +25,8 @@ if TYPE_CHECKING:
     from dbbstation.inference.by_level import Said
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.levels import Levels
-    from dbbstation.inference.model_comparison import Cause, Member, Variant
+    from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.settled import Settled
-
-TESTABLE_SHARE = 0.5
-"""Least detectable share of a cause's amplitude combinations before it can be ruled out."""
 
 
 def judge(explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> tuple[SourceFinding, ...]:
@@ -58,11 +55,6 @@ class _CircleJudge(CauseJudge):
         one, member = self.finding(cause), self._members.get(cause.name)
         shown = member or self._beside[cause.name][1]
         texts = self._circles.sources[cause.name, shown.variant.law].texts
-        text = one.text
-        if one.verdict in {Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT}:
-            text = " ".join(part for part in (texts.what, text, texts.confirm) if part)
-        elif one.verdict is Verdict.AMBIGUOUS:
-            text = f"{text} {texts.confirm}"
         return SourceFinding(
             name=cause.name,
             verdict=one.verdict,
@@ -72,7 +64,7 @@ class _CircleJudge(CauseJudge):
             signature_rms_um=1e3 * one.whole_rms,
             unconcealed_rms_um=1e3 * one.rms,
             parameters=one.values,
-            text=text,
+            text=with_texts(one.verdict, one.text, texts),
             probability=one.probability,
             equivalent=tuple(name for name in one.equivalent if name in self._named),
             log_evidence=one.log_bayes_factor,
@@ -88,15 +80,13 @@ class _CircleJudge(CauseJudge):
 
     def _verdict(self, cause: Cause, member: Member | None, probability: float, sigmas: float) -> Said:
         verdict, others, text = super()._verdict(cause, member, probability, sigmas)
-        if verdict is Verdict.AMBIGUOUS and member is None and (group := self._group_of(cause.name)):
-            others = tuple(name for name in group if name != cause.name)
-            return verdict, others, f"These tests cannot tell it from {', '.join(self._in_words(others))}."
-        if verdict is not Verdict.AMBIGUOUS or others or (probability >= SURE and sigmas >= OUT):
+        group = self._group_of(cause.name) if member is None else ()
+        if verdict is not Verdict.AMBIGUOUS or (not group and (others or (probability >= SURE and sigmas >= OUT))):
             return verdict, others, text
-        others = self._alternatives.ambiguity(cause.name)
-        if others or len(self._equal(cause.name)) > 1:
-            return verdict, others, f"These tests cannot tell it from {', '.join(self._in_words(others))}."
-        return Verdict.NOT_TESTABLE, (), "These tests leave it open: they neither show nor exclude it."
+        others = tuple(n for n in group if n != cause.name) or self._alternatives.ambiguity(cause.name)
+        if not others and len(self._equal(cause.name)) == 1:
+            return open_to(self._rows)
+        return ambiguous(self._rows, self._in_words(others), text)
 
     def _group_of(self, name: str) -> tuple[str, ...]:
         groups = [(*one.form.names, *one.form.not_worse) for one in self._found.follows if one.form is not None]
@@ -117,17 +107,14 @@ class _CircleJudge(CauseJudge):
 
     def _absent(self, cause: Cause, probability: float) -> Said:
         unseen_at = self._unseen_points(cause)
-        if unseen_at and self._would_be_seen(max(cause.variants, key=lambda v: len(v.columns)), cause.name):
+        others = self._best.without(cause.name)
+        if unseen_at and self._would_show(cause.widest, others):
             source = self._circles.source_of(cause.name, cause.variants[0])
             listed = next(p for p in source.parameters(self._circles.machine) if p.listed)
             at = ", ".join(f"{value:g}" for value in unseen_at)
             where = f"where {listed.name} is {at}: the scatter of balls and the fitted parameters conceal it."
             return Verdict.NOT_TESTABLE, (), f"These tests would not show it {where}"
         return super()._absent(cause, probability)
-
-    def _would_be_seen(self, variant: Variant, name: str) -> bool:
-        products = self._settled.comparison.beside(self._best.without(name), variant.columns)
-        return bool(np.mean(standing_out(products, variant.plausible) >= OUT) >= TESTABLE_SHARE)
 
     def _unseen_points(self, cause: Cause) -> list[float]:
         """Return values of a listed parameter, such as a bump's run, for which these tests do not show a cause."""
@@ -138,7 +125,7 @@ class _CircleJudge(CauseJudge):
                 continue
             source = self._circles.source_of(cause.name, variant)
             listed = [p.listed for p in source.parameters(self._circles.machine) if p.grid]
-            if any(listed) and not self._would_be_seen(variant, cause.name):
+            if any(listed) and not self._would_show(variant, self._best.without(cause.name)):
                 found.add(variant.nonlinear[listed.index(True)])
         return sorted(found)
 

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import NEGLIGIBLE
 from dbbstation.inference.triangle import RANK, root
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.verdict import OUT, SURE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -135,6 +135,11 @@ def standing_out(products: Floats, plausible: Floats) -> Floats:
         plausible: shape (p,).
     """
     return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))
+
+
+def would_show(significances: Floats) -> bool:
+    """Return whether half of a cause's combinations of amplitudes stand out, so that its absence would be seen."""
+    return bool(np.mean(significances >= OUT) >= EVEN)
 
 
 def norm_over_sigma(products: Floats, values: Floats, covariance: Floats) -> float:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.folds import FOLDS, in_turn
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.hypotheses import CLOSE, search
 from dbbstation.inference.verdict import DensityGains
@@ -86,6 +87,12 @@ class KnownGains:
         return list(self.errors)
 
 
+def groups_of_tests(tests: Sequence[str]) -> list[int]:
+    """Return each run's group of tests, by the runs' tests; empty for fewer than `LEAST_PARTS` groups."""
+    groups = in_turn(tests, FOLDS)
+    return groups if len(set(groups)) >= LEAST_PARTS else []
+
+
 def rows_of_groups(groups: Sequence[int], blocks: Sequence[slice]) -> list[Flags]:
     """Return the rows of each group of blocks, shape (n,)."""
     lengths = [block.stop - block.start for block in blocks]
@@ -98,14 +105,16 @@ def gains_of_tests(
     errors: Callable[[Sequence[Collection[str]]], Sequence[float]],
     asked: Callable[[Cause], bool] = lambda _: True,
     **limits: Any,  # noqa: ANN401 - as of `search`
-) -> KnownGains:
-    """Return gains of causes and classes in groups of tests.
+) -> KnownGains | None:
+    """Return gains of causes and classes in groups of tests; None without groups or causes.
 
     Args:
         rows: of each group, shape (n,).
         errors: function from sets of names to rms errors of predicting groups without each set's causes.
         limits: options of the searches without a group.
     """
+    if not rows or not settled.best.members:
+        return None
 
     def choose(comparison: ModelComparison) -> Sequence[Member]:
         return search(comparison, settled.causes, [settled.best.members], **limits).best.members

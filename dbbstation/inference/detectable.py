@@ -13,7 +13,7 @@ from dbbstation.inference.levels import Detectable
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.patterns import CURVES, Family
 from dbbstation.inference.triangle import norms, squares
-from dbbstation.inference.verdict import ABSENT, SURE
+from dbbstation.inference.verdict import SURELY
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -51,7 +51,7 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
     """Return detectable sizes of laws that have a confirming measurement and, at plausible size, an effect here."""
     laws, found = settled.bank.laws, list[Detectable]()
     for cause in (c for c in settled.causes if c.name in laws and laws[c.name].confirm):
-        variant = max(cause.variants, key=lambda one: len(one.columns))
+        variant = cause.widest
         samples, white = settled.bank.samples(variant.columns), settled.bank.fitted(variant.columns)
         whole = squares(white * variant.plausible)
         if whole < (NOTHING * settled.noise.innovation) ** 2 * len(white):
@@ -118,7 +118,7 @@ def least_seen(products: Floats, samples: Floats, plausible: Floats, log_odds: f
     def power(level: float) -> float:
         towards = information * along * level + np.sqrt(information) * noise
         factors = 0.5 * (np.square(towards)[:, None, :] * np.square(SCALES)[:, None] / down - np.log(down)).sum(axis=2)
-        sure = logsumexp(factors + LOG_SCALE_WEIGHTS, axis=1) + log_odds >= np.log(SURE / ABSENT)
+        sure = logsumexp(factors + LOG_SCALE_WEIGHTS, axis=1) + log_odds >= SURELY
         return float(np.mean(sure))
 
     low, high = 0.0, float(np.median(1.0 / np.maximum(np.sqrt(np.square(along) @ information), 1e-300)))

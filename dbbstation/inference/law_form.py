@@ -15,7 +15,7 @@ from dbbstation.inference.impossible import impossible
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.triangle import left_by, squares, triangle_of
-from dbbstation.inference.verdict import ABSENT, SURE
+from dbbstation.inference.verdict import SURELY
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.followed import VariableClass
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settled import Settled
-
-SURELY = float(np.log(SURE / ABSENT))
 
 
 def law_form(

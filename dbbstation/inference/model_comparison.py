@@ -96,6 +96,11 @@ class Cause:
     named: bool = True
     setup: bool = False
 
+    @property
+    def widest(self) -> Variant:
+        """Return the form with most amplitudes."""
+        return max(self.variants, key=lambda one: len(one.columns))
+
 
 @dataclass(frozen=True, eq=False)
 class Member:

@@ -11,9 +11,9 @@ import numpy as np
 
 from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import Value
-from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out, would_show
 from dbbstation.inference.blocks import runs_of
-from dbbstation.inference.by_level import Said, VerdictsByLevel
+from dbbstation.inference.by_level import Said, VerdictsByLevel, ambiguous, open_to
 from dbbstation.inference.impossible import impossible, impossible_beside
 from dbbstation.inference.model_comparison import SCALES, slices_of
 from dbbstation.inference.named_values import label_of, named_values, values_of_law, with_jackknife
@@ -22,7 +22,7 @@ from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.variables import Kind
-from dbbstation.inference.verdict import ABSENT, OUT, Acts, Gains, Verdict
+from dbbstation.inference.verdict import ABSENT, Acts, Gains, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.levels import Levels
-    from dbbstation.inference.model_comparison import Cause, Member
+    from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
 
@@ -172,7 +172,7 @@ class CauseJudge:
         gains = self._gains(cause.name) if member is not None else None
         of = self._settled.bank.of(cause.name)
         variables = of.variables if of else ()
-        there = verdict.rank <= Verdict.AMBIGUOUS.rank and (member is not None or verdict is Verdict.IDENTIFIED)
+        there = verdict.may_be_there and (member is not None or verdict is Verdict.IDENTIFIED)
         runs = runs_of(np.abs(effect) > 0.0) if there and pattern is not None and pattern.family == "pulses" else []
         rows = tuple((run.start, run.stop - 1) for run in runs)
         happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
@@ -258,12 +258,7 @@ class CauseJudge:
         if probability < EVEN:
             return self._absent(cause, probability)
         others = self._alternatives.ambiguity(cause.name)
-        text = (
-            f"These {self._rows} cannot tell it from {', '.join(others)}."
-            if others
-            else f"These {self._rows} do not decide it."
-        )
-        return Verdict.AMBIGUOUS, others, text
+        return ambiguous(self._rows, others, f"These {self._rows} do not decide it.")
 
     def _instead_of(self, name: str) -> frozenset[str]:
         return frozenset() if name in self._members else self._levels.instead_of(name)
@@ -306,27 +301,21 @@ class CauseJudge:
         return {name: value.value for values in told for name, value in values}
 
     def _absent(self, cause: Cause, probability: float) -> Said:
-        seen = self._seen(cause, self._best.members)
-        if seen < OUT:
-            if self._seen(cause, ()) >= OUT:
-                beside = next((n for n in self._members if self._seen(cause, self._best.without(n)) >= OUT), None)
+        variant = cause.widest
+        if not self._would_show(variant, self._best.members):
+            if self._would_show(variant, ()):
+                beside = next((n for n in self._members if self._would_show(variant, self._best.without(n))), None)
                 what = beside or "what was found"
                 return Verdict.NOT_TESTABLE, (), f"Beside {what} these {self._rows} would not show it."
-            if self._seen(cause, (), base=False) >= OUT:
+            samples = self._settled.bank.fitted(variant.columns) / self._settled.noise.innovation
+            if would_show(standing_out(samples.T @ samples, variant.plausible)):
                 return Verdict.NOT_TESTABLE, (), "The fitted parameters would take it up."
             return Verdict.NOT_TESTABLE, (), f"These {self._rows} would not show it at its plausible size."
-        if probability > ABSENT:
-            return Verdict.NOT_TESTABLE, (), f"These {self._rows} leave it open: they neither show nor exclude it."
-        return Verdict.RULED_OUT, (), "It would have been seen at its plausible size and was not needed."
+        return open_to(self._rows) if probability > ABSENT else (Verdict.RULED_OUT, (), NOT_NEEDED)
 
-    def _seen(self, cause: Cause, others: tuple[Member, ...], *, base: bool = True) -> float:
-        variant = max(cause.variants, key=lambda v: len(v.columns))
-        if base:
-            products = self._settled.comparison.beside(others, variant.columns)
-        else:
-            samples = self._settled.bank.fitted(variant.columns) / self._settled.noise.innovation
-            products = samples.T @ samples
-        return float(np.median(standing_out(products, variant.plausible)))
+    def _would_show(self, variant: Variant, others: tuple[Member, ...]) -> bool:
+        products = self._settled.comparison.beside(others, variant.columns)
+        return would_show(standing_out(products, variant.plausible))
 
     def _sigmas(self, member: Member, values: Floats, covariance: Floats) -> float:
         return norm_over_sigma(self._settled.comparison.beside((), member.columns), values, covariance)
@@ -336,6 +325,9 @@ class CauseJudge:
         fitted = self._settled.bank.base_values(-effect) - self._without
         rest = kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept]
         return concealed(kept - kept.mean(), rest)
+
+
+NOT_NEEDED = "It would have been seen at its plausible size and was not needed."
 
 
 def concealed(effect: Floats, rest: Floats) -> tuple[float, float, float]:

@@ -88,8 +88,7 @@ def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) ->
         bank.drop({pattern.name})
         bank.add([better])
         cause = next(cause for cause in bank.causes if cause.name == better.name)
-        variant = max(cause.variants, key=lambda one: len(one.columns))
-        members[number] = replace(member, cause=cause, variant=variant)
+        members[number] = replace(member, cause=cause, variant=cause.widest)
     return tuple(members)
 
 

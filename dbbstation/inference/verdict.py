@@ -22,6 +22,9 @@ ABSENT = 1.0 - SURE
 """Probability below which a detectable cause is ruled out, as sure as a reported presence. It equals the prior
 probability of a named cause, so a cause that the recording supports is never ruled out."""
 
+SURELY = math.log(SURE / ABSENT)
+"""Log odds of `SURE`."""
+
 PARTS_WITH_GAIN = 0.7
 """Share of held-out rows in parts with a gain that an effect needs. A useless effect gains by chance in half of the
 parts, in seven of ten or more once in six times; then it also needs a total gain without its best part."""
@@ -44,6 +47,16 @@ class Verdict(StrEnum):
     def rank(self) -> int:
         """Return the verdict's place in lists."""
         return tuple(Verdict).index(self)
+
+    @property
+    def is_there(self) -> bool:
+        """Return whether the cause is present."""
+        return self in {Verdict.IDENTIFIED, Verdict.HAPPENED}
+
+    @property
+    def may_be_there(self) -> bool:
+        """Return whether evidence supports the cause."""
+        return self.rank <= Verdict.AMBIGUOUS.rank
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +137,7 @@ class DensityGains(Gains):
     @property
     def predicts(self) -> bool:
         """Return whether the held-out parts but the best, together, surely favour the effect."""
-        return self.without_best >= math.log(SURE / ABSENT)
+        return self.without_best >= SURELY
 
 
 def is_worse(corrected: float, reference: float) -> bool:

@@ -8,11 +8,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from dbbstation.inference.alternatives import EVEN, Alternatives, named_already, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, named_already, standing_out, would_show
 from dbbstation.inference.hypotheses import Hypothesis, Posterior
 from dbbstation.inference.model_comparison import Variant
 from dbbstation.inference.settled import Outcome
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.verdict import OUT, SURE
 from tests.inference.dense import Dense, variant
 
 NAMES = "abcdef"
@@ -76,6 +76,18 @@ def test_nothing_is_made_sure_by_what_is_not_there() -> None:
 def test_combinations_stand_out_by_their_eigenvalues() -> None:
     products = np.array([[4.0, 0.0], [0.0, 9.0]])
     assert standing_out(products, np.array([10.0, 1.0])) == pytest.approx([3.0, 20.0])
+
+
+@pytest.mark.parametrize(
+    "significances",
+    [(4.8, 5.1), (3.2, 6.4), (0.0, 0.1, 0.2, 1.4, 7.5, 8.4, 8.7, 8.7), (2.0, 4.0), (4.9,)],
+)
+def test_what_would_show_stands_out_along_most_directions(rng, significances):
+    """Effects of plausible rms along random directions, drawn: at least half of them are five standard deviations long."""
+    along = rng.normal(size=(20_000, len(significances)))
+    along /= np.sqrt(np.mean(along**2, axis=1, keepdims=True))
+    seen = np.mean(np.linalg.norm(along * significances, axis=1) >= OUT)
+    assert would_show(np.array(significances)) is bool(seen >= 0.5)
 
 
 def test_an_effect_that_a_named_cause_has_among_its_forms_is_that_cause(rng) -> None:

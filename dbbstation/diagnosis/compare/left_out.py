@@ -8,8 +8,8 @@ import numpy as np
 
 from dbbstation.inference.blocks import Columns, compress
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.chosen_anew import LEAST_PARTS, KnownGains, gains_of_tests, rows_of_groups
-from dbbstation.inference.folds import FOLDS, FOLDS_OF_AN_ERROR, in_turn
+from dbbstation.inference.chosen_anew import KnownGains, gains_of_tests, groups_of_tests, rows_of_groups
+from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.held_out import held_out
 from dbbstation.inference.jackknife import refits_without
 from dbbstation.inference.read_off import Trial
@@ -17,7 +17,6 @@ from dbbstation.inference.read_off import Trial
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from dbbstation.computing.arrays import Flags
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.model_comparison import Member
@@ -26,19 +25,14 @@ if TYPE_CHECKING:
 
 def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
     """Predict groups of tests; empty without findings or with fewer than `LEAST_PARTS` groups."""
-    groups = in_turn([pair.test for pair in sides.pairs], FOLDS)
-    parts = rows_of_groups(groups, sides.blocks)
-    if len(parts) < LEAST_PARTS or not settled.best.members:
-        return Trial(), None
-    gains = _chosen_anew(sides, settled, parts) if hold_out else None
-    return Trial(None if gains is None else gains.anew, refits_without(settled, parts)), gains
 
-
-def _chosen_anew(sides: Sides, settled: Settled, parts: Sequence[Flags]) -> KnownGains:
     def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
         return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
 
-    return gains_of_tests(settled, parts, errors, most_expanded=BOUNDS.expanded_of_table)
+    parts = rows_of_groups(groups_of_tests([pair.test for pair in sides.pairs]), sides.blocks)
+    refits = refits_without(settled, parts) if settled.best.members else ()
+    gains = gains_of_tests(settled, parts, errors, most_expanded=BOUNDS.expanded_of_table) if hold_out else None
+    return Trial(None if gains is None else gains.anew, refits), gains
 
 
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:

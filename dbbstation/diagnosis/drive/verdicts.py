@@ -11,10 +11,11 @@ import numpy as np
 from dbbstation.diagnosis.drive.channel import COGGING, COULOMB, METHOD_SHARE, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.findings import CausePart, DriveFinding, UnexplainedForce
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
+from dbbstation.inference.by_level import ambiguous, open_to, with_texts
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pushes import MOST_PUSHES
-from dbbstation.inference.read_off import CauseFinding, CauseJudge
+from dbbstation.inference.read_off import NOT_NEEDED, CauseFinding, CauseJudge
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.by_level import Said
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.model_comparison import Cause, Member
-
-CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT, Verdict.AMBIGUOUS})
-PREDICTS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED})
 
 
 class Verdicts(CauseJudge):
@@ -82,7 +80,7 @@ class Verdicts(CauseJudge):
 
         Of equivalent causes only one predicts. Causes that are themselves ambiguous are fitted but do not predict.
         """
-        sure = {f.name for f in self.findings if f.verdict in PREDICTS or f.ambiguous_with}
+        sure = {f.name for f in self.findings if f.verdict.is_there or f.ambiguous_with}
         return [name for name in self.named if self.source_of(name) in sure]
 
     def source_of(self, name: str) -> str:
@@ -153,7 +151,7 @@ class Verdicts(CauseJudge):
 
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
-        there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
+        there = [f for f in own if f.verdict.may_be_there and f.name in self.named]
         none = CauseFinding(name="", verdict=Verdict.RULED_OUT)
         best = max(there or own, key=lambda f: f.log_bayes_factor, default=none)
         verdict, alike, text = self._said(source, own, there)
@@ -196,13 +194,12 @@ class Verdicts(CauseJudge):
             # An equivalent unmodelled force is no evidence for a cause.
             alike = tuple(name for name in alike if name in self._drive.sources)
         if alike:
-            why = f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
-            return Verdict.AMBIGUOUS, alike, why
-        if first is None:
+            verdict, alike, why = ambiguous(self._rows, alike, "")
+        elif first is None:
             verdict, why = self._not_there(source, own)
-            return verdict, (), why
-        what = source.texts.what if first.verdict in PREDICTS else ""
-        return first.verdict, (), " ".join(part for part in (what, first.text, source.texts.confirm) if part)
+        else:
+            verdict, why = first.verdict, first.text
+        return verdict, alike, with_texts(verdict, why, source.texts)
 
     def _at_end(self, there: Sequence[CauseFinding]) -> dict[str, str]:
         laws = [f.name for f in there if f.name in self._drive.of_law]
@@ -251,9 +248,8 @@ class Verdicts(CauseJudge):
         refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
         refused += [why for name, why in self._settled.refused.items() if name.split(" ")[0] == source.name]
         if not refused and own and self._probability(own) > source.prior_probability:
-            return Verdict.NOT_TESTABLE, "This recording leaves it open: it neither shows nor excludes it."
-        not_needed = "It would have been seen at its plausible size and was not needed."
-        return Verdict.RULED_OUT, refused[0] if refused else not_needed
+            return open_to(self._rows)[::2]
+        return Verdict.RULED_OUT, refused[0] if refused else NOT_NEEDED
 
     def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:
         scale = self._drive.scale

@@ -14,7 +14,7 @@ from dbbstation.diagnosis.simulator.nodes import Challenge
 from dbbstation.diagnosis.simulator.noise_left import log_probability_of, noise_left
 from dbbstation.diagnosis.simulator.terms import TermForm
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.verdict import ABSENT, SURE
+from dbbstation.inference.verdict import SURELY
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.candidates import Candidate
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 SHARES = (0.0, 0.3, 1.0)
 """Tried inaccuracies of forms, in units of the stated one, from exact to stated."""
-
-WORTH = math.log(SURE / ABSENT)
-"""Least log odds for keeping a refitted term."""
 
 
 def cost(nodes: Nodes, node: Node, settled: Settled) -> float:
@@ -72,7 +69,7 @@ def challenger(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
         if found is None:
             continue
         odds = cost(nodes, found, settled) - cost(nodes, node, settled)
-        if odds < WORTH:
+        if odds < SURELY:
             nodes.challenges.append(Challenge(one.name, frozenset(member.name for member in named), odds))
             return found
     return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.challenge import WORTH, challenger, cost
+from dbbstation.diagnosis.simulator.challenge import challenger, cost
 from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.laws import form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
@@ -19,7 +19,7 @@ from dbbstation.inference.named_values import values_of_members
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.triangle import rms
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.verdict import SURE, SURELY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -137,7 +137,7 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> tuple[Node | None, Ma
         rivals = (nodes.with_more(node, one, settled) for one in _rivals(node, settled, outside[first]))
         tried = [one for one in (*together, *rivals) if one is not None and not _within_forms_refitted(one, node.names)]
         costs = [cost(nodes, one, settled) for one in tried]
-        if not tried or cost(nodes, node, settled) - min(costs) < WORTH:
+        if not tried or cost(nodes, node, settled) - min(costs) < SURELY:
             return None, dict.fromkeys(more, REFUTED)  # by linear responses only, or the simulation diverges
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")

@@ -10,7 +10,6 @@ import numpy as np
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.variables import TRAVELS, Kind
-from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +91,7 @@ ONE_WAY = 0.02
 
 def _apart(found: Mismatch) -> Iterator[Next]:
     variables = [v for v in found.settled.channel.variables if v.name != found.table.simulated_name]
-    led = {name for finding in found.findings if finding.verdict in LIKELY for name in finding.variables}
+    led = {name for finding in found.findings if finding.verdict.may_be_there for name in finding.variables}
     values = np.array([v.scaled for v in variables])
     if len(values) < 2:  # noqa: PLR2004 - a pair
         return
@@ -109,6 +108,3 @@ def _apart(found: Mismatch) -> Iterator[Next]:
                     f"rows do not show which one the mismatch follows."
                 )
                 yield Next(text, (other.name, one.name))
-
-
-LIKELY = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT, Verdict.AMBIGUOUS})

@@ -121,4 +121,4 @@ def both(one: CirclePath, other: CirclePath) -> CirclePath:
     about_ball = np.concatenate([one.about_ball_mm, other.about_ball_mm])
     theta = np.radians(theta_deg)
     deviation = np.hypot(about_ball * np.cos(theta) - centre[0], about_ball * np.sin(theta) - centre[1]) - radius
-    return CirclePath(one.radius_mm, theta_deg, about_ball, BallPath(theta_deg, centre, radius, deviation))
+    return CirclePath(one.radius_mm, theta_deg, about_ball, BallPath(theta_deg, centre, float(radius), deviation))

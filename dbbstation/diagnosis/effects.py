@@ -18,7 +18,7 @@ from dbbstation.machine.kinematics import position_responses
 from dbbstation.model.identified import known_u
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion, Need, Owner
-from dbbstation.trace.analysis import figures
+from dbbstation.trace.analysis import figures, figures_of
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
@@ -264,9 +264,9 @@ def _changed_g_um(circle: CuredCircle, lengths_mm: list[Floats]) -> Floats:
 
 def _changed_centres_um(circle: CuredCircle, lengths_mm: list[Floats]) -> Floats:
     raw, own = circle.raw, circle.raw.circle.bar_mm + circle.effect_mm
-    own_mm = np.asarray(figures(raw, own).centre_mm)
-    moved = [circle.centre_um + 1e3 * (np.asarray(figures(raw, one).centre_mm) - own_mm) for one in lengths_mm]
-    return np.array([float(np.hypot(*one)) for one in moved]) - float(np.hypot(*circle.centre_um))
+    own_mm, *others_mm = (one.centre_mm for one in figures_of(raw, np.array([own, *lengths_mm])))
+    moved = circle.centre_um + 1e3 * (np.reshape(others_mm, (-1, 2)) - own_mm)
+    return np.hypot(*moved.T) - float(np.hypot(*circle.centre_um))
 
 
 def _over_the_workspace(

@@ -44,31 +44,34 @@ class CircleFigures:
         return 1e3 * float(np.hypot(*self.centre_mm))
 
 
-def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = None) -> tuple[Floats, float, Floats]:
-    """Return centre, shape (2,) [mm], radius [mm] and deviations, shape (n,) [mm], of the least-squares circle [CAL eq 6].
+def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+    """Return centres, shape (..., 2) [mm], radii, (...) [mm], and deviations, (..., n) [mm], of least-squares circles [CAL eq 6].
 
     Args:
-        near_mm: approximate centre, shape (2,), to save iterations.
+        radius_mm: of one circle or of several, shape (..., n).
+        near_mm: approximate centres, shape (..., 2), to save iterations.
 
     Raises:
         TraceError: the points do not determine a circle.
     """
     theta = np.radians(theta_deg)
     x, y = radius_mm * np.cos(theta), radius_mm * np.sin(theta)
-    columns = np.ones((3, len(theta)))
-    centre, radius = np.zeros(2) if near_mm is None else near_mm.copy(), float(radius_mm.mean())
+    *several, count = radius_mm.shape
+    columns = np.ones((*several, 3, count))
+    centre = np.zeros((*several, 2)) if near_mm is None else near_mm.copy()
+    radius = radius_mm.mean(axis=-1, keepdims=True)
     for _ in range(MOST_STEPS):
-        across, along = x - centre[0], y - centre[1]
+        across, along = x - centre[..., :1], y - centre[..., 1:]
         distance = np.sqrt(across * across + along * along)
-        np.divide(across, distance, out=columns[0])
-        np.divide(along, distance, out=columns[1])
+        np.divide(across, distance, out=columns[..., 0, :])
+        np.divide(along, distance, out=columns[..., 1, :])
         step = _step(columns, distance - radius)
         if step is None:
             break
-        centre += step[:2]
-        radius += step[2]
+        centre += step[..., :2]
+        radius += step[..., 2:]
         if np.abs(step).max() < CENTRE_TOLERANCE_MM:
-            return centre, radius, np.hypot(x - centre[0], y - centre[1]) - radius
+            return centre, radius[..., 0], np.hypot(x - centre[..., :1], y - centre[..., 1:]) - radius
     raise TraceError(
         "its points do not determine a circle",
         remedy="record more of the turn",
@@ -76,13 +79,16 @@ def best_circle(theta_deg: Floats, radius_mm: Floats, near_mm: Floats | None = N
 
 
 def _step(columns: Floats, left: Floats) -> Floats | None:
-    """Return the least-squares solution for a few columns, shape (k,), or None."""
+    """Return least-squares solutions for a few columns, shape (..., k), or None."""
     # Normal equations suffice, because Gauss-Newton corrects rounding. Ill-conditioned short arcs are solved by
     # orthogonal decomposition.
-    normal = columns @ columns.T
-    least, *_, most = np.linalg.eigvalsh(normal)
-    if most < WORST_CONDITION * least:
-        return np.asarray(np.linalg.solve(normal, columns @ left))
+    normal = columns @ columns.swapaxes(-1, -2)
+    sizes = np.linalg.eigvalsh(normal)
+    if np.all(sizes[..., -1] < WORST_CONDITION * sizes[..., 0]):
+        return np.asarray(np.linalg.solve(normal, columns @ left[..., None])[..., 0])
+    if left.ndim > 1:
+        steps = [_step(*each) for each in zip(columns, left, strict=True)]
+        return None if any(step is None for step in steps) else np.array(steps)
     step, _, rank, _ = np.linalg.lstsq(columns.T, left, rcond=1e-9)
     return np.asarray(step) if rank == len(columns) else None
 
@@ -113,6 +119,12 @@ def path_about_ball(theta_deg: Floats, radius_mm: Floats) -> BallPath:
     Raises:
         TraceError: the points do not determine a circle.
     """
+    about_ball_deg, centre, radius, deviation = _circles_about_ball(theta_deg, radius_mm)
+    return BallPath(np.mod(about_ball_deg, 360.0), centre, float(radius), deviation)
+
+
+def _circles_about_ball(theta_deg: Floats, radius_mm: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return angles about the fixed ball, shape (..., n) [deg], and `best_circle` at these angles."""
     # Commanded angles refer to the commanded centre. If the ball is off this centre by c, angles about the ball differ
     # by up to c/R. At commanded angles a perfect circle would show the second harmonic c²/(2R): 0.13 µm at 0.2 mm, 13
     # µm at 2 mm.
@@ -120,12 +132,15 @@ def path_about_ball(theta_deg: Floats, radius_mm: Floats) -> BallPath:
     about_ball_deg = theta_deg
     centre, radius, deviation = best_circle(theta_deg, radius_mm)
     for _ in range(MOST_STEPS):
-        about_ball_deg = np.degrees(np.arctan2(centre[1] + radius * np.sin(theta), centre[0] + radius * np.cos(theta)))
+        x, y = (
+            centre[..., k, None] + radius[..., None] * along for k, along in enumerate((np.cos(theta), np.sin(theta)))
+        )
+        about_ball_deg = np.degrees(np.arctan2(y, x))
         last = centre
         centre, radius, deviation = best_circle(about_ball_deg, radius_mm, last)
         if np.abs(centre - last).max() < AGREED_MM:
             break
-    return BallPath(np.mod(about_ball_deg, 360.0), centre, radius, deviation)
+    return about_ball_deg, centre, radius, deviation
 
 
 def horizontal_radius_mm(raw: RawCircle, length_mm: Floats) -> Floats:
@@ -155,26 +170,34 @@ def figures(raw: RawCircle, length_mm: Floats | None = None) -> CircleFigures:
     Raises:
         TraceError: the points do not determine a circle.
     """
-    if length_mm is not None:
-        return _figures(raw, length_mm)
+    if length_mm is not None and length_mm is not raw.length_mm:
+        return figures_of(raw, length_mm[None])[0]
     if raw not in _MEASURED:
-        _MEASURED[raw] = _figures(raw, raw.length_mm)
+        # Figures alone do not cache the path, which needs two numbers per sample.
+        path = _PATHS.get(raw) or path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, raw.length_mm))
+        _MEASURED[raw] = _figures(raw, raw.length_mm, path.centre_mm, path.deviation_mm)
     return _MEASURED[raw]
+
+
+def figures_of(raw: RawCircle, lengths_mm: Floats) -> list[CircleFigures]:
+    """Return figures of several lengths, shape (k, n) [mm], at a circle's angles.
+
+    Raises:
+        TraceError: the points of one do not determine a circle.
+    """
+    _, centres, _, deviations = _circles_about_ball(raw.theta_deg, horizontal_radius_mm(raw, lengths_mm))
+    return [_figures(raw, *each) for each in zip(lengths_mm, centres, deviations, strict=True)]
 
 
 _MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
 """Cached figures of measured raw circles, shared by checks, fits and reports."""
 
 
-def _figures(raw: RawCircle, length_mm: Floats) -> CircleFigures:
-    # Figures alone do not cache the path, which needs two numbers per sample.
-    path = _PATHS.get(raw) if length_mm is raw.length_mm else None
-    if path is None:
-        path = path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
+def _figures(raw: RawCircle, length_mm: Floats, centre_mm: Floats, deviation_mm: Floats) -> CircleFigures:
     return CircleFigures(
-        centre_mm=(float(path.centre_mm[0]), float(path.centre_mm[1])),
+        centre_mm=(float(centre_mm[0]), float(centre_mm[1])),
         mean_radial_error_um=1e3 * float((length_mm - raw.circle.bar_mm).mean()),
-        circularity_um=1e3 * float(np.ptp(path.deviation_mm)),
+        circularity_um=1e3 * float(np.ptp(deviation_mm)),
     )
 
 
@@ -185,7 +208,7 @@ def centred(raw: RawCircle) -> CentredCircle:
         TraceError: the points do not determine a circle.
     """
     _, radius, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, raw.length_mm))
-    return CentredCircle(raw.name, raw.circle, raw.theta_deg, deviation, radius)
+    return CentredCircle(raw.name, raw.circle, raw.theta_deg, deviation, float(radius))
 
 
 MARGIN_DEG = 5.0

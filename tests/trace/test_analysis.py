@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.analysis import best_circle, centred, figures, path_about_ball
+from dbbstation.trace.analysis import _circles_about_ball, best_circle, centred, figures, figures_of
 from dbbstation.trace.circle import RawCircle
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
@@ -61,9 +61,9 @@ def test_figures_as_measured_are_worked_out_once(monkeypatch):
 
     def counted(theta_deg, radius_mm):
         worked_out.append(radius_mm)
-        return path_about_ball(theta_deg, radius_mm)
+        return _circles_about_ball(theta_deg, radius_mm)
 
-    monkeypatch.setattr("dbbstation.trace.analysis.path_about_ball", counted)
+    monkeypatch.setattr("dbbstation.trace.analysis._circles_about_ball", counted)
     one, other = raw(ball_beside(150.1, 0.3, -0.4)), raw(ball_beside(150.1, 0.1, 0.0))
     first = figures(one)
     assert figures(one) == first
@@ -100,3 +100,23 @@ def test_centring_removes_the_centre_and_keeps_the_shape():
 def test_a_point_is_no_circle():
     with pytest.raises(TraceError, match="do not determine a circle"):
         best_circle(np.array([10.0, 10.0, 10.0]), np.array([150.0, 150.0, 150.0]))
+
+
+def test_figures_of_several_lengths_are_those_of_each_alone():
+    """Among them a circle of which the ball is far off, and an arc too short for normal equations."""
+    rng = np.random.default_rng(2)
+    lengths_mm = np.array(
+        [ball_beside(150.1, x, y) + 1e-3 * rng.standard_normal(len(THETA)) for x, y in rng.normal(size=(5, 2))]
+    )
+    for one, found in zip(lengths_mm, figures_of(raw(lengths_mm[0]), lengths_mm), strict=True):
+        alone = figures(raw(one))
+        assert found.centre_mm == pytest.approx(alone.centre_mm, abs=1e-9)
+        assert found.circularity_um == pytest.approx(alone.circularity_um, abs=1e-6)
+        assert found.mean_radial_error_um == pytest.approx(alone.mean_radial_error_um)
+    few_deg = np.linspace(0.0, 10.0, 50)
+    arcs = [150.0 - 0.01 * np.cos(np.radians(few_deg)), 150.0 + 0.02 * np.sin(np.radians(few_deg))]
+    centres, radii, _ = best_circle(few_deg, np.array(arcs))
+    for one, centre, radius in zip(arcs, centres, radii, strict=True):
+        alone = best_circle(few_deg, one)
+        assert centre == pytest.approx(alone[0], abs=1e-6)
+        assert radius == pytest.approx(alone[1], abs=1e-6)

@@ -11,7 +11,7 @@ from dbbstation.calibration.reporting.evaluation import LowPassedCircularity
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth_of
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.trace.analysis import figures
+from dbbstation.trace.analysis import figures_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -53,7 +53,7 @@ def predicted_circles(
 
 def smooth_circularities_um(raw: RawCircle, lengths_mm: Sequence[Floats]) -> list[float]:
     """Return circularities [µm] of lengths, shape (n,) each [mm], at a circle's angles, up to 30 undulations per revolution."""
-    return [figures(raw, smooth_mm).circularity_um for smooth_mm in _smooth_mm(raw, lengths_mm)]
+    return [one.circularity_um for one in figures_of(raw, np.array(_smooth_mm(raw, lengths_mm)))]
 
 
 def smooth_lengths_mm(raw: RawCircle, length_mm: Floats) -> Floats:

@@ -42,7 +42,7 @@ class _CircleJudge(CauseJudge):
     is_catalogue = True
 
     def __init__(self, explained: Explained, outcome: Settled, anew: ChosenAnew | None, levels: Levels) -> None:
-        self._circles, self._joint, self._found = explained.channel, explained.settled, levels
+        self._circles, self._joint = explained.channel, explained.settled
         self._named = {cause.name: cause for cause in outcome.causes if cause.named}
         super().__init__(outcome, Trial(anew), levels)
 
@@ -89,7 +89,7 @@ class _CircleJudge(CauseJudge):
         return ambiguous(self._rows, self._in_words(others), text)
 
     def _group_of(self, name: str) -> tuple[str, ...]:
-        groups = [(*one.form.names, *one.form.not_worse) for one in self._found.follows if one.form is not None]
+        groups = [(*one.form.names, *one.form.not_worse) for one in self._levels.levels.follows if one.form is not None]
         groups += [equal for equal in self._classes.values() if len(equal) > 1]
         groups += [(own, *others) for own, others in self._alternatives.ambiguities.items()]
         return next((tuple(n for n in group if JOINED not in n) for group in groups if name in group), ())

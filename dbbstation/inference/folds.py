@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import numpy as np
 
 from dbbstation.facts.serialise import AsItIs, Kept
-from dbbstation.inference.followed import left_without
+from dbbstation.inference.followed import WithoutPart, left_without
 from dbbstation.inference.triangle import rms, squares
 from dbbstation.inference.verdict import Gains, is_worse
 
@@ -107,34 +107,42 @@ class HeldOutError:
         return float(np.sqrt(np.sum(counts * np.square(errors)) / counts.sum()))
 
 
-def held_out_error(
+def selections_without(
     channel: Channel,
-    choose_without: Callable[[Channel, Flags], Settled],
+    choose: Callable[[Channel], Settled],
     progress: Callable[[str, int, int], None] = lambda _text, _done, _of: None,
     *,
     alike: float = 1.0,
-    reference: Callable[[Flags], Floats] | None = None,
-) -> HeldOutError:
-    """Predict each part [`part_numbers`] by a selection without it.
-
-    Rows correlated with the part are excluded from the selection, but not from the reference.
+) -> list[WithoutPart]:
+    """Repeat the selection without each part [`part_numbers`] and without rows correlated with it.
 
     Args:
-        choose_without: function for the complete selection without rows, shape (n,).
+        choose: the complete selection.
         alike: correlation time of noise [rows].
-        reference: function from allowed rows, shape (n,), to a prediction of all rows, shape (n,); None for their mean.
     """
-    found = []
-    parts = parts_of(channel)
+    found, parts = [], parts_of(channel)
     for done, (name, rows) in enumerate(parts):
         progress("held-out part", done, len(parts))
-        out = rows | beside(channel, rows, alike)
-        settled = choose_without(channel, out)
-        plain = float(np.mean(channel.residual[~rows])) if reference is None else reference(~rows)
-        refitted = channel.residual - channel.base.samples @ channel.without(rows).refitted()
-        corrected = settled.left
-        one, two, three = (rms(errors[rows]) for errors in (channel.residual - plain, refitted, corrected))
-        found.append(Fold(name, int(rows.sum()), one, two, three, _gains(settled, rows)))
+        settled = choose(channel.without(rows | beside(channel, rows, alike)))
+        found.append(WithoutPart(rows, settled, name))
+    return found
+
+
+def held_out_error(
+    channel: Channel, parts: Sequence[WithoutPart], reference: Callable[[Flags], Floats] | None = None
+) -> HeldOutError:
+    """Predict each part by the selection without it; the reference may use all rows of the other parts.
+
+    Args:
+        reference: function from allowed rows, shape (n,), to a prediction of all rows, shape (n,); None for their mean.
+    """
+    found, residual = [], channel.residual
+    for part in parts:
+        rows = part.rows
+        plain = float(np.mean(residual[~rows])) if reference is None else reference(~rows)
+        refitted = residual - channel.base.samples @ channel.without(rows).refitted()
+        one, two, three = (rms(left[rows]) for left in (residual - plain, refitted, part.settled.left))
+        found.append(Fold(part.name, int(rows.sum()), one, two, three, _gains(part.settled, rows)))
     return HeldOutError(tuple(found))
 
 

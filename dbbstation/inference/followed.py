@@ -45,6 +45,7 @@ class WithoutPart:
 
     rows: Flags
     settled: Settled
+    name: str = ""
 
 
 def followed_by(bank: Bank, name: str) -> frozenset[str]:

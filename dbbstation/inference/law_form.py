@@ -15,7 +15,7 @@ from dbbstation.inference.impossible import impossible
 from dbbstation.inference.levels import JOINED, LawForm, ScoredLaw
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.triangle import left_by, squares, triangle_of
-from dbbstation.inference.verdict import SURELY
+from dbbstation.inference.verdict import SURELY, DensityGains
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -131,8 +131,8 @@ def _is_possible(settled: Settled, member: Member, others: Sequence[Member]) -> 
 
 def _is_worse(best: Floats, other: Floats, parts: Sequence[Flags] | None) -> bool:
     """Return whether the best candidate is surely preferred by all rows, or by held-out parts without its strongest part."""
-    apart = best - other
-    return float(apart.sum() - (max(apart.max(), 0.0) if parts else 0.0)) >= SURELY
+    apart = DensityGains(tuple((best - other).tolist()))
+    return apart.predicts if parts else apart.total >= SURELY
 
 
 def _scores(

@@ -107,11 +107,11 @@ class Trial:
     chosen: Sequence[Mapping[str, Mapping[str, Value]]] = ()
 
 
-def read_off(settled: Settled, trial: Trial | None, levels: Levels) -> tuple[CauseFinding, ...]:
+def read_off(settled: Settled, trial: Trial, levels: Levels) -> tuple[CauseFinding, ...]:
     """Return one finding per law and pattern, ordered by presence, then size.
 
     Args:
-        trial: evidence of held-out parts; None if not tested.
+        trial: evidence of held-out parts.
         levels: source of the verdicts.
     """
     return CauseJudge(settled, trial, levels).every()
@@ -126,7 +126,7 @@ class CauseJudge:
 
     is_catalogue = False
 
-    def __init__(self, settled: Settled, trial: Trial | None, levels: Levels) -> None:
+    def __init__(self, settled: Settled, trial: Trial, levels: Levels) -> None:
         self._trial, self._rows = trial, settled.channel.rows_are
         self._settled, self._best = settled, settled.best
         self._members = {member.name: member for member in self._best.members}
@@ -218,7 +218,7 @@ class CauseJudge:
         return found
 
     def _gains(self, name: str) -> Gains | None:
-        if self._trial is None or self._trial.held_out is None:
+        if self._trial.held_out is None:
             return None
         return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._equal(name)})
 
@@ -239,7 +239,7 @@ class CauseJudge:
     def _values_of(self, member: Member, values: Floats, covariance: Floats) -> dict[str, Value]:
         found = named_values(self._settled, member, values, covariance)
         own = self._own.get(member.name)
-        if own is None or self._trial is None or not self._trial.refits:
+        if own is None or not self._trial.refits:
             return found
         first = len(self._settled.channel.base.names)
         inside = slice(first + own.start, first + own.stop)

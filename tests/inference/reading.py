@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
-from dbbstation.inference.read_off import read_off
+from dbbstation.inference.read_off import Trial, read_off
 
 if TYPE_CHECKING:
-    from dbbstation.inference.read_off import CauseFinding, Trial
+    from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
 
 
 def read_by_levels(settled: Settled, trial: Trial | None = None) -> tuple[CauseFinding, ...]:
     """Every finding, read off the levels of all rows."""
-    return read_off(settled, trial, levels_of(settled, left_over(settled), None, None))
+    return read_off(settled, trial or Trial(), levels_of(settled, left_over(settled), None, None))

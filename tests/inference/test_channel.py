@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.coloured import Coloured
-from dbbstation.inference.folds import held_out_error
+from dbbstation.inference.folds import held_out_error, selections_without
 from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 from dbbstation.inference.read_off import CauseFinding
 from dbbstation.inference.settle import settle
@@ -191,7 +191,7 @@ def test_a_law_that_would_have_to_be_negative_is_refused() -> None:
 @pytest.mark.nightly  # that of a table is in CI: tests/diagnosis/table/test_mismatch.py
 def test_held_out_error_comes_down_to_the_noise() -> None:
     data = channel(table(2, EFFECTS["hysteresis of q"]))
-    error = held_out_error(data, lambda channel, rows: settle(channel.without(rows)))
+    error = held_out_error(data, selections_without(data, settle))
     assert len(error.folds) == 10
     assert error.before == pytest.approx(np.hypot(0.15, 0.1), rel=0.06)
     assert error.after == pytest.approx(0.1, rel=0.08)

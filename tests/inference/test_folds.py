@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, part_numbers, parts_of
+from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, part_numbers, parts_of, selections_without
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.levels_of import levels_of
@@ -33,7 +34,7 @@ def both():
 def test_gains_are_what_a_refit_without_an_effect_loses(both):
     data, whole, _ = both
     beginnings = (Beginning.EVERYTHING,)
-    error = held_out_error(whole, lambda one, rows: settle(one.without(rows), look=False, beginnings=beginnings))
+    error = held_out_error(whole, selections_without(whole, partial(settle, look=False, beginnings=beginnings)))
     columns = {
         ("hysteresis of q",): [direction(data.q)],
         ("twice per turn of angle",): [np.cos(2.0 * np.radians(data.angle)), np.sin(2.0 * np.radians(data.angle))],
@@ -63,11 +64,11 @@ def test_neighbours_that_resemble_a_part_are_not_chosen_from(both, alike, gap):
     _, whole, settled = both
     seen = []
 
-    def chosen(_channel, rows):
-        seen.append(np.flatnonzero(rows))
+    def chosen(without):
+        seen.append(np.flatnonzero(~without.kept))
         return settled
 
-    held_out_error(whole, chosen, alike=alike)
+    selections_without(whole, chosen, alike=alike)
     assert len(seen) == 10
     # Ten parts of 60 rows; the widest gap is half of one.
     for k, rows in enumerate(seen):
@@ -128,15 +129,16 @@ def test_what_counts_parts_weighs_their_rows():
 def test_whole_blocks_have_no_gap(both):
     data, _, settled = both
     seen = []
-    held_out_error(channel(data, blocks=6), lambda _c, rows: seen.append(int(rows.sum())) or settled, alike=9.0)
+    selections_without(channel(data, blocks=6), lambda c: seen.append(int((~c.kept).sum())) or settled, alike=9.0)
     assert seen == [100] * 6
 
 
 def test_the_reference_is_what_the_client_says(both):
     _, whole, settled = both
-    error = held_out_error(whole, lambda _c, _rows: settled, reference=lambda _rows: np.zeros(600))
+    parts = selections_without(whole, lambda _: settled)
+    error = held_out_error(whole, parts, lambda _: np.zeros(600))
     assert error.as_simulated == pytest.approx(np.sqrt(np.mean(whole.residual**2)))
-    plain = held_out_error(whole, lambda _c, _rows: settled)
+    plain = held_out_error(whole, parts)
     assert plain.as_simulated == pytest.approx(np.std(whole.residual), rel=0.05)
 
 

@@ -15,7 +15,7 @@ from dbbstation.inference.by_level import ambiguous, open_to, with_texts
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pushes import MOST_PUSHES
-from dbbstation.inference.read_off import NOT_NEEDED, CauseFinding, CauseJudge
+from dbbstation.inference.read_off import NOT_NEEDED, CauseFinding, CauseJudge, Trial
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.verdict import OUT, SURE, Gains, Verdict
@@ -46,9 +46,8 @@ class Verdicts(CauseJudge):
     def __init__(
         self, explained: ExplainedDrive, levels: Levels, *, several_speeds: bool, held: HeldOutForce | None = None
     ) -> None:
-        self._held, self._answers = held, levels.follows
-        self._explained, self._drive, self._several = explained, explained.drive, several_speeds
-        super().__init__(explained.settled, None, levels)
+        self._held, self._explained, self._drive, self._several = held, explained, explained.drive, several_speeds
+        super().__init__(explained.settled, Trial(), levels)
         self._raw = self.every()
         self._source_of = {f.name: source_of(self._drive, self._settled.bank.patterns, f.name) for f in self._raw}
         self._least_n = METHOD_SHARE * self._drive.scale.force_n
@@ -89,7 +88,12 @@ class Verdicts(CauseJudge):
 
     def effects(self) -> tuple[UnexplainedForce, ...]:
         """Return present unmodelled forces, largest first."""
-        sure = {name for one in self._answers if one.answer is not FollowsAnswer.UNDECIDED for name in one.members}
+        sure = {
+            name
+            for one in self._levels.levels.follows
+            if one.answer is not FollowsAnswer.UNDECIDED
+            for name in one.members
+        }
         found = []
         for one in self._raw:
             if self._source_of[one.name] or one.name not in sure or one.sigmas < OUT:
@@ -222,9 +226,7 @@ class Verdicts(CauseJudge):
         return complement_of(self._pulses, float(time[0]), float(time[-1]))
 
     def _probability(self, own: Sequence[CauseFinding]) -> float:
-        names = [f.name for f in own]
-        alone = self._settled.posterior.probability(names) if names else 0.0
-        return max([alone, *(f.probability for f in own)])
+        return max([self._settled.probability([f.name for f in own]), *(f.probability for f in own)])
 
     def _others(self, source: DriveSource, findings: Sequence[CauseFinding]) -> tuple[str, ...]:
         names, impossible = set(), {f.name for f in self._raw if f.verdict is Verdict.RULED_OUT}
@@ -245,11 +247,10 @@ class Verdicts(CauseJudge):
             # A cause that cannot be distinguished, even from an unmodelled force, could not be detected.
             if finding.verdict in {Verdict.NOT_TESTABLE, Verdict.AMBIGUOUS}:
                 return Verdict.NOT_TESTABLE, finding.text
-        refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
-        refused += [why for name, why in self._settled.refused.items() if name.split(" ")[0] == source.name]
+        refused = next((f.text for f in own if f.name in self._settled.refused), "")
         if not refused and own and self._probability(own) > source.prior_probability:
             return open_to(self._rows)[::2]
-        return Verdict.RULED_OUT, refused[0] if refused else NOT_NEEDED
+        return Verdict.RULED_OUT, refused or NOT_NEEDED
 
     def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:
         scale = self._drive.scale

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.blocks import compress
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling_of
-from dbbstation.inference.folds import held_out_error, parts_of
+from dbbstation.inference.folds import held_out_error, parts_of, selections_without
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
@@ -102,7 +103,7 @@ class Mismatch:
     @property
     def there(self) -> tuple[CauseFinding, ...]:
         """Return findings that are present or happened."""
-        return tuple(one for one in self.findings if one.verdict in {Verdict.IDENTIFIED, Verdict.HAPPENED})
+        return tuple(one for one in self.findings if one.verdict.is_there)
 
     @property
     def identified(self) -> tuple[CauseFinding, ...]:
@@ -203,11 +204,17 @@ def _found(
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, most_work=BOUNDS.work, progress=progress)
-    chosen: list[WithoutPart] = []
-    held_out = _held_out(settled, table, chosen, progress) if hold_out else None
+    chosen, held_out, residual = list[WithoutPart](), None, channel.residual
+
+    def as_simulated(rows: Flags) -> Floats:
+        return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
+
+    if hold_out:
+        again = partial(chosen_again, beginning=settled.beginning)
+        chosen = selections_without(channel, again, progress, alike=settled.noise.correlation_samples)
+        held_out = held_out_error(channel, chosen, as_simulated)
     refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
-    kept = channel.residual - (float(np.mean(channel.residual)) if table.has_offset else 0.0)
-    is_worse_here = is_worse(rms(settled.left), rms(kept))
+    is_worse_here = is_worse(rms(settled.left), rms(residual - as_simulated(channel.kept)))
     left = left_over(settled)
     parts = ChosenWithoutParts(chosen) if hold_out else None
     reference = None if held_out is None else held_out.as_simulated
@@ -231,29 +238,16 @@ def _found(
     )
 
 
-def _held_out(settled: Settled, table: Table, chosen: list[WithoutPart], progress: Callable[..., None]) -> HeldOutError:
-    """Return the held-out error, relative to simulated values plus a constant; selections are appended to `chosen`."""
-    residual = settled.channel.residual
-    parts = iter(parts_of(settled.channel))
-
-    def as_simulated(rows: Flags) -> Floats:
-        return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
-
-    def choose(channel: Channel, out: Flags) -> Settled:
-        one = choose_without(channel, out, beginning=settled.beginning)
-        chosen.append(WithoutPart(next(parts)[1], one))
-        return one
-
-    return held_out_error(
-        settled.channel, choose, progress, alike=settled.noise.correlation_samples, reference=as_simulated
-    )
-
-
 @with_one_thread
-def choose_without(channel: Channel, rows: Flags, *, beginning: Beginning = Beginning.EVERYTHING) -> Settled:
-    """Repeat the selection without rows, shape (n,), by a smaller search, which can only increase the error."""
-    kept = channel.without(rows).thinned(BOUNDS.fold_rows)
-    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,), most_work=BOUNDS.work_without)
+def chosen_again(channel: Channel, *, beginning: Beginning = Beginning.EVERYTHING) -> Settled:
+    """Repeat the selection by a smaller search, which can only increase the error."""
+    return settle(
+        channel.thinned(BOUNDS.fold_rows),
+        most_expanded=0,
+        thorough=False,
+        beginnings=(beginning,),
+        most_work=BOUNDS.work_without,
+    )
 
 
 def fitted_together(settled: Settled) -> Solution:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.table.data import Table
-from dbbstation.diagnosis.table.mismatch import Mismatch, choose_without, find_mismatch
+from dbbstation.diagnosis.table.mismatch import Mismatch, chosen_again, find_mismatch
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.inference import looks
 from dbbstation.inference.bank import Bank
@@ -180,7 +180,7 @@ def test_rows_that_are_held_back_decide_nothing(tmp_path):
     whole = replace(whole, static=static_patterns(whole))
     _, rows = parts_of(whole)[4]
     other = replace(whole, residual=np.where(rows, 1.0 + np.sin(np.arange(len(rows))), whole.residual))
-    chosen, anew = (choose_without(channel, rows) for channel in (whole, other))
+    chosen, anew = (chosen_again(channel.without(rows)) for channel in (whole, other))
     assert chosen.best.names == anew.best.names
     assert "linear in oil_temp_c" in chosen.best.names
     np.testing.assert_array_equal(chosen.predicted(), anew.predicted())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 from dbbstation.diagnosis.diagnose import without_doubtful
 from dbbstation.diagnosis.explain import explain
@@ -12,6 +13,7 @@ from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.inference.chosen_anew import chosen_anew
+from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.levels import Differs, FollowsAnswer
 from dbbstation.inference.places import form_probabilities
@@ -79,6 +81,36 @@ def test_classes_are_left_out_together(both):
             whole.log_evidence(less) - others.log_evidence(less)
         )
         assert found.of_classes[0][one.wanted] == pytest.approx(brought, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_tests_that_are_held_out_give_no_cause_its_size(both):
+    """Errors of each fifth of the tests, written out: kept tests give geometry and causes, a test its own ball and bar only."""
+    explained, _, gains, _ = both
+    channel, settled = explained.channel, explained.settled
+    members = [member for member in settled.best.members if not member.cause.setup]
+    base, known, target = channel.columns.base, channel.base, channel.target(settled.after)
+    machine = (base * known.scale)[:, ~known.random] @ null_space(channel.held)
+    setup = base[:, known.random] * known.prior[known.random]
+    causes = [channel.columns.of(member.variant.columns) * member.variant.plausible for member in members]
+    columns = np.hstack([setup, *causes, machine])
+    groups = in_turn([one.test for one in channel.observations], FOLDS_OF_AN_ERROR)
+    group = np.repeat(groups, [rows.stop - rows.start for rows in channel.runs])
+
+    def fitted(rows, count, goal):
+        """Least squares of the first columns; all but those of the machine have a prior of size one."""
+        prior = settled.noise_mm * np.eye(columns.shape[1] - machine.shape[1], count)[:count]
+        goal = np.concatenate([goal, np.zeros(len(prior))])
+        return np.linalg.lstsq(np.vstack([columns[rows, :count], prior]), goal, rcond=1e-14)[0]
+
+    left = np.empty_like(target)
+    for one in range(max(groups) + 1):
+        out = group == one
+        found = fitted(~out, columns.shape[1], target[~out])
+        found[: setup.shape[1]] = 0.0
+        left[out] = target[out] - columns[out] @ found
+        left[out] -= setup[out] @ fitted(out, setup.shape[1], left[out])
+    assert gains.of(None).after == pytest.approx(np.sqrt(np.mean(left**2)), rel=1e-4)
 
 
 @pytest.mark.slow

@@ -242,10 +242,17 @@ class FinerMotion:
 
     def means(self, samples: Floats) -> Floats:
         """Return each row's mean of samples, shape (m, ...)."""
-        order = np.argsort(self.row, kind="stable")
+        order, first, count = self._by_row
+        if order is not None:
+            samples = samples[order]
+        return np.add.reduceat(samples, first, axis=0) / count.reshape(-1, *[1] * (samples.ndim - 1))
+
+    @cached_property
+    def _by_row(self) -> tuple[Integers | None, Integers, Integers]:
+        """Return the samples' order by row (None if they are in order), each row's first place and its number of samples."""
         count = np.bincount(self.row)
-        first = np.cumsum(count) - count
-        return np.add.reduceat(samples[order], first, axis=0) / count.reshape(-1, *[1] * (samples.ndim - 1))
+        order = np.argsort(self.row, kind="stable") if np.any(np.diff(self.row) < 0) else None
+        return order, np.cumsum(count) - count, count
 
 
 def of_each_strut(

@@ -29,7 +29,14 @@ def _smoothed(motion: Motion) -> Floats:
     own = reading[motion.kept]
     window = 2 * (len(own) // (2 * WINDOWS)) + 1
     if motion.reading_is_measured and window > CUBIC:
-        from scipy.signal import savgol_filter  # noqa: PLC0415 - takes half a second; every command knows all sources
+        from scipy.linalg import lstsq  # noqa: PLC0415
+        from scipy.ndimage import convolve1d  # noqa: PLC0415 - few commands filter
 
-        reading[motion.kept] = savgol_filter(own, window, CUBIC)
+        # The filter of Savitzky and Golay [Anal. Chem. 36 (1964) 1627] as in SciPy's signals, which take half a second to import.
+        half, places = window // 2, np.arange(window)
+        weights = lstsq((half - places) ** np.arange(CUBIC + 1)[:, None], np.eye(CUBIC + 1)[0])[0]
+        smooth = convolve1d(own, weights, mode="constant")
+        smooth[:half] = np.polyval(np.polyfit(places, own[:window], CUBIC), places[:half])
+        smooth[-half:] = np.polyval(np.polyfit(places, own[-window:], CUBIC), places[-half:])
+        reading[motion.kept] = smooth
     return reading

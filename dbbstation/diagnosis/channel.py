@@ -11,7 +11,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
-from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
+from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of, left_open_of
 from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms, is_shape, parts_of
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.bank import spacing_of
@@ -218,8 +218,9 @@ class CircleChannel:
             )
         ]
         discrepancy = discrepancy_of(source, self.machine, effects)
-        slack = self.columns.add(np.hstack([tangents, discrepancy]))
-        sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1], source.form_uncertainty)])
+        parts = left_open_of(source, self.machine, effects)
+        slack = self.columns.add(np.hstack([tangents, discrepancy, parts]))
+        sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1] + parts.shape[1], source.form_uncertainty)])
         plausible = np.array([p.plausible for p in parameters])[~shaped]
         at = max(rms(np.array([own[~shaped] / plausible for own in values.values()])), 1e-12)
         # A tangent covers about 2.5 grid points of a nonlinear parameter.
@@ -230,6 +231,8 @@ class CircleChannel:
                 variant,
                 slack=slack,
                 slack_sd=sd,
+                tangents=tangents.shape[1],
+                parts=parts.shape[1],
                 slack_at=at / np.sqrt(np.mean(np.square(self.to_whole(variant).sum(axis=1)))),
                 log_weight=variant.log_weight + weight,
             )

@@ -78,11 +78,13 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     by_variable = [modulated(effects, one, signs or None, degree) for one in zip(*along, strict=True)]
     # The variables share the formula's inaccuracy.
     columns = np.hstack(by_variable) / np.sqrt(len(by_variable))
-    return np.hstack([columns, _other_stages(source, machine, runs), _left_open(source, machine, runs)])
+    return np.hstack([columns, _other_stages(source, machine, runs)])
 
 
-def _left_open(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
+def left_open_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula's inaccuracy."""
+    if source.form_uncertainty == 0.0:
+        return np.zeros((sum(len(run.derivative) for run in runs), 0))
     changes = [
         run.reading.by_parameters(
             run.motion.seen(source, partial(source.left_open, machine=machine, values=run.values), 1)

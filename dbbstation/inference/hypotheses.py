@@ -393,12 +393,7 @@ class _Search:
                 continue
             best, gain = member, -np.inf
             for one in (member, *_by_other_laws(beside, members, k)):
-                tried = [
-                    one
-                    if share == one.slack_share
-                    else replace(one, slack_share=share, slack_scale=one.slack_scale * share / one.slack_share)
-                    for share in SLACK_SHARES.tolist()
-                ]
+                tried = _by_shares(one)
                 evidence = [beside.log_evidence([*members[:k], each, *members[k + 1 :]]) for each in tried]
                 averaged = float(logsumexp(evidence)) - float(np.log(len(tried)))
                 if averaged + one.variant.log_weight > gain:
@@ -451,6 +446,20 @@ class _Beside:
         if self._last is None or self._last[0] is not largest:
             self._last = largest, self.local.beside_of(largest)
         return self._last[1]
+
+
+def _by_shares(member: Member) -> list[Member]:
+    """Return a member once with each pair of shares of its slack; differences between parts have their own share if there are any."""
+    return [
+        replace(
+            member,
+            slack_share=share,
+            parts_share=of_parts,
+            slack_scale=member.slack_scale * share / member.slack_share,
+        )
+        for share, of_parts in SLACK_SHARES
+        if member.variant.parts or share == of_parts
+    ]
 
 
 def _by_other_laws(beside: _Beside, members: Sequence[Member], k: int) -> list[Member]:

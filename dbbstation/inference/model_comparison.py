@@ -35,9 +35,10 @@ NO_SLACK = np.zeros(0)
 FLEXIBLE = 12
 """Fewest amplitudes of a form that can imitate two causes: two per strut."""
 
-SLACK_SHARES = np.array([0.1, 1.0])
-"""Shares of the stated slack for averaging. Some machines follow a formula ten times better than stated, and
-unnecessary slack would count against a present cause."""
+SLACK_SHARES = ((0.1, 0.1), (0.1, 1.0), (1.0, 1.0))
+"""Shares of the stated slack for averaging: of a formula's inaccuracy, and of what its parts may differ by. Some machines
+follow a formula ten times better than stated, and unnecessary slack would count against a present cause. Struts that each
+follow a formula closely may still wind up over unlike lengths, so the two have their own shares."""
 
 MOST_SLACK = 1.5
 """Largest ratio of amplitudes to the amplitudes of a variant's slack up to which slack grows."""
@@ -62,6 +63,7 @@ class Variant:
         slack_sd: standard deviations of slack at amplitudes `slack_at`, shape (d,).
         slack_at: rms amplitude in plausible sizes.
         tangents: number of first slack columns that are derivatives by nonlinear parameters.
+        parts: number of last slack columns that are differences between parts of one law, such as struts.
         positive: amplitudes that cannot be negative, shape (p,); may be empty.
         form_uncertainty: relative inaccuracy of the formula.
     """
@@ -77,6 +79,7 @@ class Variant:
     slack_sd: Floats = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
     tangents: int = 0
+    parts: int = 0
     positive: tuple[bool, ...] = ()
     form_uncertainty: float = 0.0
 
@@ -108,6 +111,8 @@ class Member:
 
     Attributes:
         scale: prior standard deviation in plausible sizes.
+        slack_share: share of the stated slack, which `slack_scale` contains.
+        parts_share: that of differences between parts.
     """
 
     cause: Cause
@@ -115,6 +120,7 @@ class Member:
     scale: float
     slack_scale: float = 1.0
     slack_share: float = 1.0
+    parts_share: float = 1.0
 
     @property
     def name(self) -> str:
@@ -142,6 +148,7 @@ class Member:
         slack = self.variant.slack_sd * self.slack_scale
         # A formula closer than stated does not reduce the prior of parameters.
         slack[: self.variant.tangents] /= self.slack_share
+        slack[len(slack) - self.variant.parts :] *= self.parts_share / self.slack_share
         return np.concatenate([self.variant.plausible * self.scale, slack])
 
 

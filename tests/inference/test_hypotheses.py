@@ -61,6 +61,26 @@ def test_a_single_cause_is_scored_exactly(rng):
             assert posterior.weights[key] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize(("off", "shares"), [(0.0, (0.1, 0.1)), (0.2, (0.1, 1.0))])
+def test_a_law_and_the_differences_between_its_parts_have_their_own_shares(rng, off, shares):
+    """Forty changes of the formula are not there; four differences between its parts are, or are not, as large as stated."""
+    columns = rng.normal(size=(40, 45))
+    parts, formula = np.arange(1, 5), np.arange(5, 45)
+    slack = np.concatenate([formula, parts])
+    law = cause("law", variant(0, slack=slack, slack_sd=np.full(len(slack), 0.2), parts=len(parts)), odds=0.0)
+    target = columns[:, 0] + off * columns[:, parts] @ [1.0, -1.0, 0.8, -1.2] + rng.normal(0, 0.02, 40)
+    problem = Dense(BASE, columns, target, 0.02)
+    (member,) = search(problem.comparison(), [law]).best.members
+    size = member.slack_scale / member.slack_share
+    each = {
+        (of_law, of_parts): problem.log_evidence(
+            np.r_[0, slack], np.r_[member.scale, np.full(40, 0.2 * of_law * size), np.full(4, 0.2 * of_parts * size)]
+        )
+        for of_law, of_parts in ((0.1, 0.1), (0.1, 1.0), (1.0, 1.0))
+    }
+    assert (member.slack_share, member.parts_share) == max(each, key=each.get) == shares
+
+
 def test_probabilities_add_up(rng):
     columns = rng.normal(size=(40, 4))
     problem = Dense(BASE, columns, 0.3 * columns[:, 1] + rng.normal(0, 0.5, 40), 0.5)

@@ -162,6 +162,13 @@ def test_estimates_are_those_of_an_augmented_least_squares_fit(problem):
     assert problem.comparison().explained(members) == pytest.approx(without - least, abs=1e-8)
 
 
+def test_parameters_formula_and_parts_have_their_own_priors():
+    """A formula ten times closer than stated fixes neither its parameters nor the differences between parts."""
+    form = slacked(0, slack=[2, 3, 4, 5], slack_sd=[0.5, 0.2, 0.2, 0.4], tangents=1, parts=1)
+    member = Member(cause("it", form), form, 3.0, slack_scale=0.1 * 1.2, slack_share=0.1, parts_share=1.0)
+    assert member.sd == pytest.approx([3.0, 0.5 * 1.2, 0.02 * 1.2, 0.02 * 1.2, 0.4 * 1.2])
+
+
 def test_slack_grows_with_the_amplitudes_up_to_a_bound():
     form = slacked(0, 1, slack=[2], slack_sd=[0.1], plausible=2.0, slack_at=0.5)
     member = Member(cause("it", form), form, 1.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
+from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of, left_open_of
 from dbbstation.diagnosis.parts import ALIKE, amplitudes, at_point, by_amplitudes, parts_of, variable_of
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.alternatives import EQUIVALENT
@@ -201,7 +201,7 @@ class Change:
             values = self._values(point, amplitudes, group)
             derivative = reading.by_source(self.source, sides.machine, values)
             runs.append(Effects(motion, reading, values, derivative, variables(motion, sides.machine)))
-        found = discrepancy_of(self.source, sides.machine, runs)
+        found = np.hstack([of(self.source, sides.machine, runs) for of in (discrepancy_of, left_open_of)])
         return sides.averaged(side, np.split(found, np.cumsum([len(run.derivative) for run in runs])[:-1]))
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from studies.blind_figure import reliability_figure
 from studies.blind_reliability import Forecast, bins_of, forecasts
 from tests.diagnosis.table.levels_study import interval
+from tests.plant.blind.limits import TESTABLE_SIGMA
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,6 +21,9 @@ UNLISTED = {"wandering-bar": {"time"}, "stick-slip": {"strut-speed-sign", "rever
 """Variables of what is on no list."""
 
 LEVELS = ("differs", "follows", "which cause")
+
+LOUD = 100.0
+"""Log Bayes factor from which on a cause should not be missed."""
 
 REVERSAL = {"strut-speed-sign", "reversal"}
 MEANS = {
@@ -53,6 +59,7 @@ def levels_of(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> dict[str
     listed = {one["name"] for one in answer["effects"] if one.get("listed", True)}
     return {
         "differs": said["differs"]["answer"],
+        "loud": sorted(one["name"] for one in answer["effects"] if one["listed"] and log_bayes_factor(one) > LOUD),
         "effects": sorted(effects),
         "located": sorted(name for name, own in effects.items() if any(own & one for one in told)),
         "classes": [" and ".join(_names(one)) for one in classes],
@@ -64,6 +71,15 @@ def levels_of(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> dict[str
         },
         "held_out_um": [[one["before"], one["after"]] for one in classes if one["before"] is not None],
     }
+
+
+def log_bayes_factor(effect: Mapping[str, Any]) -> float:
+    """Return a cause's log Bayes factor beside all others, from the plant's sensitivities.
+
+    Its size is s standard deviations. A prior of k amplitudes that is as wide as the effect costs k/2 log(1 + s^2 / k).
+    """
+    square, count = (TESTABLE_SIGMA * effect["size"]) ** 2, max(len(effect["amplitudes"]), 1)
+    return float(0.5 * square - 0.5 * count * np.log1p(square / count))
 
 
 def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], limits: str) -> dict[str, Any]:
@@ -78,6 +94,7 @@ def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], lim
     nothing = [row for row in every if not row["levels"]["effects"]]
     listed, names = sum(row["listed"] for row in there), sum(len(row["named"]) for row in every)
     wrong = sum(not name.startswith("(") for row in every for name in row["wrong"])
+    loud = [(row, name) for row in there for name in row["levels"]["loud"]]
     figures = {
         "sessions with effects: it differs": _rate([row["levels"]["differs"] == "yes" for row in there]),
         "sessions with effects: no": _rate([row["levels"]["differs"] == "no" for row in there]),
@@ -91,7 +108,20 @@ def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], lim
         ),
         "listed causes that were named": _share(sum(len(row["right"]) for row in there), listed),
         "wrong names": _share(wrong, names),
+        f"log Bayes factor above {LOUD:g}: a class follows": _rate([n in row["levels"]["located"] for row, n in loud]),
+        f"log Bayes factor above {LOUD:g}: named": _rate([name in row["right"] for row, name in loud]),
+        f"log Bayes factor above {LOUD:g}: named or in an ambiguity": _rate(
+            [name in row["right_or_unsure"] for row, name in loud]
+        ),
+        "sessions without: a name": _rate([bool(row["named"]) for row in nothing]),
     }
+    if ratios := [row["held_out_over_true"] for row in there if row.get("held_out_over_true")]:
+        middle, high = np.percentile(ratios, (50.0, 95.0))
+        figures["held-out error over that of the causes put in"] = [
+            f"{len(ratios)} sessions",
+            f"median {middle:.2f}",
+            f"95th percentile {high:.2f}",
+        ]
     return {
         "question": "How often is each of the three levels right for circles?",
         **head,

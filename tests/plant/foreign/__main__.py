@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.diagnosis.foreign_levels import calibration_of, table_of
-from tests.plant.foreign.judge import commit_of, judge
+from tests.plant.foreign.judge import causes_of, commit_of, judge
 from tests.plant.foreign.score import as_table, scored
 from tests.plant.foreign.sessions import make
 
@@ -30,6 +30,10 @@ def main() -> None:
     parser.add_argument("of", nargs="*", help="run: one checkout; score: commits that were run")
     parser.add_argument("--seed", type=int, default=48, help="of everything")
     parser.add_argument("--count", type=int, default=60, help="sessions")
+    parser.add_argument(
+        "--wide", action="store_true", help="make: four robots, up to four causes, a fifth of them clean"
+    )
+    parser.add_argument("--true", action="store_true", help="run: with the causes that were put in, and no others")
     parser.add_argument("--only", default="", help="sessions to run or score, in this order, as in 12,3,20-40")
     parser.add_argument("--former", type=Path, help="score: an earlier score, for commits whose verdicts are gone")
     parser.add_argument("--limits", default=LIMITS, help="score: what the stored table says of its limits")
@@ -43,13 +47,16 @@ def main() -> None:
     numbers = _numbers(given.only) or list(range(1, given.count + 1))
     if given.task == "make":
         for number in range(1, given.count + 1):
-            make(given.folder, given.seed, number)
+            make(given.folder, given.seed, number, wide=given.wide)
             sys.stderr.write(f"{number} of {given.count} sessions\n")
     elif given.task == "run":
         checkout = Path(given.of[0]).resolve() if given.of else Path.cwd()
         commit = commit_of(checkout)
         for number in numbers:
-            verdict = judge(given.folder, checkout, commit, f"{number:04d}")
+            causes = causes_of(given.folder, f"{number:04d}") if given.true else None
+            if given.true and not causes:
+                continue
+            verdict = judge(given.folder, checkout, commit, f"{number:04d}", causes)
             sys.stderr.write(f"{commit} {number:04d} {verdict['processor_s']:.0f} s, {verdict['memory_mb']:.0f} MB\n")
     else:
         figures = scored(given.folder, given.of, [f"{number:04d}" for number in numbers], given.seed, given.former)

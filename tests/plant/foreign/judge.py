@@ -8,7 +8,10 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 COMMAND = {"": ("diagnose", "{session}", "--json")}
 """Words of the command by the beginning of a commit; those under "" are for all commits that say nothing else."""
@@ -17,16 +20,30 @@ INTERRUPTED = "interrupted"
 """What the program says when somebody stops it, with exit code 1: that says nothing of the session, and is not kept."""
 
 
+TRUE = "-true"
+"""What follows a commit in the name of the folder of verdicts on the causes that were put in, and no others."""
+
+
 def commit_of(checkout: Path) -> str:
     asked = ["git", "-C", str(checkout), "rev-parse", "--short=8", "HEAD"]
     return subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
 
 
-def judge(folder: Path, checkout: Path, commit: str, session: str) -> dict[str, Any]:
-    kept = folder / "verdicts" / commit / f"{session}.json"
+def causes_of(folder: Path, session: str) -> list[str]:
+    """Return the listed causes that were put into a session."""
+    answer = json.loads((folder / "answers" / f"{session}.json").read_text(encoding="utf-8"))
+    return [effect["name"] for effect in answer["effects"] if effect["listed"]]
+
+
+def judge(
+    folder: Path, checkout: Path, commit: str, session: str, causes: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """Return what a checkout says of a session, of all causes or of these."""
+    kept = folder / "verdicts" / (commit if causes is None else f"{commit}{TRUE}") / f"{session}.json"
     if kept.exists():
         return dict(json.loads(kept.read_text(encoding="utf-8")))
     words = next(COMMAND[begin] for begin in sorted(COMMAND, reverse=True) if commit.startswith(begin))
+    words = words if causes is None else (*words, "--sources", ",".join(causes))
     path = (folder / session).resolve()
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as complained:
         child = subprocess.Popen(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tests.diagnosis.foreign_levels import levels_of
+from tests.plant.foreign.judge import TRUE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -34,6 +35,9 @@ def scored(
         rows[commit] = {name: kept[name] for name in sessions if name in kept}
         for name, verdict in _verdicts(folder / "verdicts" / commit, sessions).items():
             rows[commit][name] = compare(_read(folder / "answers" / f"{name}.json"), verdict)
+        for name, verdict in _verdicts(folder / "verdicts" / f"{commit}{TRUE}", sessions).items():
+            if name in rows[commit] and (least := _held_out_um(verdict)):
+                rows[commit][name]["held_out_over_true"] = rows[commit][name]["held_out_um"] / least
     shared = [name for name in sessions if all(name in of for of in rows.values())]
     return {
         "question": "Do causes whose laws are not the textbook's keep their names, beside what is on no list?",
@@ -98,12 +102,17 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, 
             f"{name} {key}": z for name in named if name in listed for key, z in _off_u(listed[name], by_name[name])
         },
         "residual_um": residual,
+        "held_out_um": _held_out_um(verdict),
         "levels": levels_of(answer, summary),
         "silent": not named and not unsure,
         "error": verdict.get("error", ""),
         "processor_s": round(verdict["processor_s"], 1),
         "memory_mb": round(verdict["memory_mb"]),
     }
+
+
+def _held_out_um(verdict: Mapping[str, Any]) -> float:
+    return float((verdict.get("summary", {}).get("held_out_rms_um") or {}).get("after") or 0.0)
 
 
 def _off_u(amplitudes: Mapping[str, float], source: Mapping[str, Any]) -> Iterable[tuple[str, float]]:

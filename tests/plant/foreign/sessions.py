@@ -1,7 +1,8 @@
 """Sessions of machines whose laws are not those of any textbook: what is put in, and how it is drawn.
 
 Two robots, sizes as in a shop, one to three causes of the list, often with a bar that wanders, struts that stick or a
-jig that was knocked; besides sessions with nothing wrong, or with nothing but a wander or sticking.
+jig that was knocked; besides sessions with nothing wrong, or with nothing but a wander or sticking. A wide study has
+four robots and up to four causes.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ if TYPE_CHECKING:
 
 KINDS = (*["clean"] * 8, *["walk"] * 4, *["stick-slip"] * 4, *["single"] * 18, *["pair"] * 16, *["triple"] * 10)
 """Of sixty sessions; more of them begin anew, shuffled by the seed."""
-CAUSES = {"single": 1, "pair": 2, "triple": 3}
+WIDE_KINDS = (*["clean"] * 10, *["single"] * 12, *["pair"] * 12, *["triple"] * 10, *["quadruple"] * 6)
+"""Of fifty sessions of a wide study."""
+CAUSES = {"single": 1, "pair": 2, "triple": 3, "quadruple": 4}
 SIZES: dict[str, tuple[float, float, int]] = {
     "backlash": (2.0, 8.0, 3),
     "screw-cyclic": (1.5, 4.0, 3),
@@ -66,13 +69,14 @@ LEAST_SIZE = 2.0
 DRAWS = 60
 
 
-def kind_of(seed: int, number: int) -> str:
+def kind_of(seed: int, number: int, *, wide: bool = False) -> str:
     """What is put into a session, from 1 on."""
-    turn, place = divmod(number - 1, len(KINDS))
-    return str(np.random.default_rng([seed, turn, 8]).permutation(KINDS)[place])
+    kinds = WIDE_KINDS if wide else KINDS
+    turn, place = divmod(number - 1, len(kinds))
+    return str(np.random.default_rng([seed, turn, 8]).permutation(kinds)[place])
 
 
-def make(out: FilePath, seed: int, number: int) -> dict[str, Any]:
+def make(out: FilePath, seed: int, number: int, *, wide: bool = False) -> dict[str, Any]:
     """Write session `out/NNNN`, then its answer beside it; one that has its answer stays as it is."""
     folder = out / f"{number:04d}"
     kept = out / "answers" / f"{folder.name}.json"
@@ -80,8 +84,8 @@ def make(out: FilePath, seed: int, number: int) -> dict[str, Any]:
         return dict(json.loads(kept.read_text(encoding="utf-8")))
     shutil.rmtree(folder, ignore_errors=True)
     rng = np.random.default_rng([seed, number, 7])
-    session_seed, kind = int(rng.integers(2**31)), kind_of(seed, number)
-    circumstances = _circumstances(rng, session_seed)
+    session_seed, kind = int(rng.integers(2**31)), kind_of(seed, number, wide=wide)
+    circumstances = _circumstances(rng, session_seed, *(_one_of_four(rng) if wide else _one_of_two(rng)))
     hidden = _put_in(rng, circumstances, kind)
     truth = record(
         folder,
@@ -112,27 +116,51 @@ def make(out: FilePath, seed: int, number: int) -> dict[str, Any]:
 
 def small_machine() -> Machine:
     """The reference machine at 0.8 of its size, its joints in wider pairs."""
+    return _machine("PM-600-like at 0.8", (588.0, 11.0), (316.0, 16.0, 400.0))
 
-    def at(radius_mm: float, angles_deg: list[float], z_mm: float) -> Any:
-        rad = np.radians(angles_deg)
+
+def broad_machine() -> Machine:
+    """A base of 1.2 times the reference's radius, joints in pairs of 40 degrees, and a short spindle."""
+    return _machine("broad base, short spindle", (882.0, 20.0), (420.0, 20.0, 350.0))
+
+
+def slender_machine() -> Machine:
+    """A base of 0.85 times the reference's radius, close pairs, a narrow platform and a long spindle."""
+    return _machine("narrow base, long spindle", (625.0, 4.0), (300.0, 8.0, 560.0))
+
+
+def _machine(name: str, base: tuple[float, float], platform: tuple[float, float, float]) -> Machine:
+    """Joints in pairs: radius [mm] and half the angle between the two [deg], and the platform's height over the tip [mm]."""
+
+    def at(radius_mm: float, half_deg: float, z_mm: float, middles_deg: tuple[int, ...]) -> Any:
+        rad = np.radians([middle + side * half_deg for middle, side in zip(middles_deg, (1, -1) * 3, strict=True)])
         return np.stack([radius_mm * np.cos(rad), radius_mm * np.sin(rad), np.full(6, z_mm)], axis=1)
 
     return replace(
         reference_machine(),
-        base_joints_mm=at(588.0, [101, 199, 221, 319, 341, 79], 0.0),
-        platform_joints_mm=at(316.0, [134, 166, 254, 286, 14, 46], 400.0),
-        name="PM-600-like at 0.8",
+        base_joints_mm=at(*base, 0.0, (90, 210, 210, 330, 330, 90)),
+        platform_joints_mm=at(platform[0], -platform[1], platform[2], (150, 150, 270, 270, 30, 30)),
+        name=name,
     )
 
 
-def _circumstances(rng: np.random.Generator, seed: int) -> Circumstances:
+def _one_of_two(rng: np.random.Generator) -> tuple[Machine, Path]:
     small = bool(rng.random() < 0.5)
     path = Path(100.0, 2000.0) if small else Path(150.0, float(rng.choice([1500.0, 2500.0])))
+    return small_machine() if small else reference_machine(), path
+
+
+def _one_of_four(rng: np.random.Generator) -> tuple[Machine, Path]:
+    machine = (reference_machine, small_machine, broad_machine, slender_machine)[int(rng.integers(4))]()
+    return machine, Path(float(rng.choice([100.0, 150.0])), float(rng.choice([1500.0, 2000.0, 2500.0])))
+
+
+def _circumstances(rng: np.random.Generator, seed: int, machine: Machine, path: Path) -> Circumstances:
     size_mm = float(rng.uniform(0.02, 0.1))
     white_um = float(rng.uniform(0.3, 0.5))
     coloured = Noise(white_um, float(rng.uniform(0.1, 0.3)), float(rng.uniform(0.5, 0.8)))
     return Circumstances(
-        small_machine() if small else reference_machine(),
+        machine,
         table_ii_plan(seed, path),
         "table-ii",
         Kinematics(size_mm * rng.standard_normal(6), size_mm * rng.standard_normal((6, 3))),

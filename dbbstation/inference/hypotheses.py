@@ -263,6 +263,22 @@ class _Search:
         for member in hypothesis.members:
             if not member.cause.named or member.width >= FLEXIBLE:
                 self._pairs(hypothesis.without(member.name), around.without([member.name])[0])
+            if not member.cause.named:
+                self._name(hypothesis, member.name, around.without([member.name])[0])
+
+    def _name(self, hypothesis: Hypothesis, unnamed: str, scan: Scan) -> None:
+        """Try named causes in place of an unnamed effect, each with the best addition, because no law is quite followed."""
+        others = hypothesis.without(unnamed)
+        enough = 0.5 * hypothesis.log_factor(unnamed)
+        named = [
+            k for k in np.argsort(-scan.log_factor).tolist() if scan.causes[k].named and scan.log_factor[k] > enough
+        ]
+        for k in named[: BOUNDS.rivals]:
+            instead = [*others, scan.best_of(k)]
+            self.work.scan(self.causes.values())
+            beside = self.comparison.scan(instead, self.causes.values())
+            one = int(beside.log_odds.argmax())
+            self._look_at([*instead, beside.best_of(one)])
 
     def _least_worth(self, hypothesis: Hypothesis) -> list[tuple[str, str]]:
         worth = dict(zip((m.name for m in hypothesis.members), hypothesis.log_factors, strict=True))

@@ -133,6 +133,19 @@ def test_a_flexible_cause_that_imitates_two_gives_way_to_them(rng):
     assert posterior.probability(["flexible"]) == pytest.approx(inclusion(full, ["flexible"])[0], abs=0.01)
 
 
+def test_a_law_that_is_not_quite_followed_takes_the_place_of_an_unnamed_effect(rng):
+    """Eight columns without a name imitate a law and a small wave beside it; the law alone leaves far too much."""
+    columns = rng.normal(size=(40, 8))
+    law, wave = cause("law", variant(0), odds=ODDS), cause("wave", variant(1), odds=ODDS, named=False)
+    unnamed = cause("unnamed", variant(*range(8)), odds=ODDS, named=False)
+    causes = [law, wave, unnamed]
+    problem = Dense(BASE, columns, columns[:, 0] + 0.2 * columns[:, 1] + rng.normal(0, 0.02, 40), 0.02)
+    comparison = problem.comparison()
+    assert comparison.scan([], causes).log_factor.argmax() == 2
+    full = log_posteriors(problem, causes)
+    assert search(comparison, causes).best.names == max(full, key=full.get) == {"law", "wave"}
+
+
 def test_a_seed_is_looked_at_in_the_form_that_its_cause_has_now(rng):
     own = rng.normal(size=(40, 3))
     hidden = np.column_stack([own[:, 0] - own[:, 1], own[:, 1] - own[:, 2], own[:, 2] - own[:, 0]])

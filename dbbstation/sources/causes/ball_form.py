@@ -17,6 +17,12 @@ MM_PER_UM = 1e-3
 ORDERS = (2, 3, 4, 5)
 """Undulations per turn of balls of standard grades. Order 0 is the bar's length, order 1 the ball's place."""
 
+FURTHER = (6, 7, 8)
+"""Undulations that a ball may have besides."""
+
+FURTHER_SHARE = 0.2
+"""Their height over the rms height of the others, one standard deviation: height falls with the square of the order or faster."""
+
 
 class BallForm(LinearSource):
     """Where the fixed ball's surface is higher by h, the reading is lower by h.
@@ -57,9 +63,30 @@ class BallForm(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        if motion.setup is None:
-            return Effect(reading_mm=np.zeros((len(motion), 2 * len(ORDERS))))
-        away = motion.poses[:, :3] - motion.setup.fixed_ball_mm
-        across = (away[:, 0] + 1j * away[:, 1]) / np.linalg.norm(away, axis=1)
-        waves = [part for order in ORDERS for part in ((across**order).real, (across**order).imag)]
-        return Effect(reading_mm=-MM_PER_UM * np.column_stack(waves))
+        return Effect(reading_mm=-MM_PER_UM * _waves(motion, ORDERS))
+
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
+        """Return undulations of higher order, and those that change with latitude: tesseral harmonics of two more degrees.
+
+        At elevation e, degree k + 1 grows as (2 k + 1) sin e, degree k + 2 as (2 k + 3) sin^2 e beside order k
+        [DLMF 14.7.14, Ferrers functions].
+        """
+        height_mm = MM_PER_UM * FURTHER_SHARE * float(np.sqrt(np.mean(np.square(values))))
+        waves, rise, order = _waves(motion, ORDERS), _direction(motion)[:, 2:], np.repeat(ORDERS, 2)
+        by_latitude = [(2 * order + 1) * rise * waves, (2 * order + 3) * rise**2 * waves]
+        return Effect(reading_mm=-height_mm * np.hstack([_waves(motion, FURTHER), *by_latitude]))
+
+
+def _waves(motion: Motion, orders: tuple[int, ...]) -> Floats:
+    """Return cosine and sine of each order about the fixed ball, shape (n, 2 k)."""
+    direction = _direction(motion)
+    across = direction[:, 0] + 1j * direction[:, 1]
+    return np.column_stack([part for order in orders for part in ((across**order).real, (across**order).imag)])
+
+
+def _direction(motion: Motion) -> Floats:
+    """Return the unit vector from the fixed to the moving ball, shape (n, 3); zero without a fixed ball."""
+    if motion.setup is None:
+        return np.zeros((len(motion), 3))
+    away = motion.poses[:, :3] - motion.setup.fixed_ball_mm
+    return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True), dtype=np.float64)

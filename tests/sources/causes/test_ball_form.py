@@ -49,6 +49,26 @@ def test_columns_are_sectoral_harmonics_of_the_sphere(reference, rng):
         assert np.allclose(columns[:, 2 * (k - 2) : 2 * (k - 2) + 2], pair, atol=1e-15)
 
 
+def test_what_is_left_open_is_higher_orders_and_other_latitudes_of_the_sphere(reference, rng):
+    motion = random_run(rng)
+    away = motion.poses[:, :3] - motion.setup.fixed_ball_mm
+    polar = np.arccos(away[:, 2] / np.linalg.norm(away, axis=1))
+    theta = np.arctan2(away[:, 1], away[:, 0])
+    um = np.array([0.3, -0.2, 0.5, 0.1, 0.0, 0.4, 0.2, -0.1])
+    left_open = FORM.left_open(motion, reference, um).reading_mm
+    every = np.hstack([FORM.derivative(motion, reference, um).reading_mm, left_open])
+    assert left_open.shape == (len(motion), 22)
+    for k in (2, 3, 4, 5):
+        for degree in (k + 1, k + 2):
+            wanted = sph_harm_y(degree, k, polar, theta).real
+            left = wanted - every @ np.linalg.lstsq(every, wanted, rcond=None)[0]
+            assert np.abs(left).max() < 1e-9 * np.abs(wanted).max()
+    for at, k in enumerate((6, 7, 8)):
+        proud = np.sin(polar) ** k * np.cos(k * theta)
+        assert np.allclose(left_open[:, 2 * at], -1e-3 * 0.2 * np.sqrt(np.mean(um**2)) * proud, atol=1e-15)
+    assert not FORM.left_open(Motion(motion.poses), reference, um).reading_mm.any()
+
+
 def test_runs_with_one_bar_share_it(reference, rng):
     motion = random_run(rng)
     other = replace(motion, setup=replace(motion.setup, session="tomorrow", mounting="another"))

@@ -125,7 +125,7 @@ def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], lim
     return {
         "question": "How often is each of the three levels right for circles?",
         **head,
-        "data": f"{len(every)} sessions of two simulated robots whose laws are not the program's own, {len(nothing)} of them clean.",
+        "data": f"{_sessions(every)}, {len(nothing)} of them clean.",
         "limits": limits,
         "columns": ["counted", "share", "95 % interval"],
         "figures": figures,
@@ -134,7 +134,8 @@ def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], lim
 
 def calibration_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     """Return how often each level's probabilities come true, in the form of the validation page, and as a diagram."""
-    every = [row["levels"]["forecasts"] for row in rows.values() if row["levels"]]
+    judged = [row for row in rows.values() if row["levels"]]
+    every = [row["levels"]["forecasts"] for row in judged]
     bins = {
         level: bins_of([Forecast(p, None, right, perturbed=True) for one in every for p, right in one[level]])
         for level in LEVELS
@@ -142,7 +143,7 @@ def calibration_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any
     return {
         "question": "Do the probabilities of the three levels of circles come true?",
         **head,
-        "data": f"{len(every)} sessions of two simulated robots whose laws are not the program's own.",
+        "data": f"{_sessions(judged)}.",
         "limits": "Cells: right of all with such a probability, and the 95 % interval of their share.",
         "columns": list(LEVELS),
         "figures": {
@@ -163,6 +164,11 @@ def told_of(one: Mapping[str, Any]) -> set[str]:
 
 def _names(one: Mapping[str, Any]) -> Sequence[str]:
     return [*(name for names in one["variables"] for name in names), *one["or_variables"]]
+
+
+def _sessions(rows: Sequence[Mapping[str, Any]]) -> str:
+    robots = len({row["robot"] for row in rows})
+    return f"{len(rows)} sessions of {robots} simulated robots whose laws are not the program's own"
 
 
 def _rate(each: Sequence[bool]) -> list[str]:

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from tests.diagnosis.foreign_levels import calibration_of, levels_of, table_of
+from tests.diagnosis.foreign_levels import calibration_of, levels_of, log_bayes_factor, table_of
 from tests.plant.foreign.judge import judge
 from tests.plant.foreign.score import compare
-from tests.plant.foreign.sessions import KINDS, LEAST_SIZE, kind_of, make, small_machine
-from tests.plant.machine import reference_machine
+from tests.plant.foreign.sessions import (
+    KINDS,
+    LEAST_SIZE,
+    WIDE_KINDS,
+    broad_machine,
+    kind_of,
+    make,
+    slender_machine,
+    small_machine,
+)
+from tests.plant.machine import TRAVEL, reference_machine
 from tests.plant.mechanisms.reversal_forms import SoftBacklash, StickSlip
 
 if TYPE_CHECKING:
@@ -49,9 +58,20 @@ def test_the_small_robot_has_eight_tenths_of_every_radius_and_its_own_angles() -
         assert np.all(np.abs(np.sin(angles_rad)) > 0.05)
 
 
+def test_two_more_robots_have_struts_within_the_travel_of_the_plan() -> None:
+    for machine in (broad_machine(), slender_machine()):
+        tip_mm = np.array([0.0, 0.0, -1008.0])
+        struts_mm = np.linalg.norm(machine.platform_joints_mm + tip_mm - machine.base_joints_mm, axis=1)
+        assert np.ptp(struts_mm) < 1e-9
+        assert TRAVEL["strut_mm"][0] < struts_mm[0] < TRAVEL["strut_mm"][1]  # type: ignore[index]
+
+
 def test_kinds_are_those_promised_in_every_sixty() -> None:
     for first in (1, 61):
         assert Counter(kind_of(5, number) for number in range(first, first + 60)) == Counter(KINDS)
+    wide = Counter(kind_of(5, number, wide=True) for number in range(1, 251))
+    assert wide == Counter(5 * WIDE_KINDS)
+    assert wide["clean"] == 50
 
 
 def test_a_seed_makes_the_same_session_and_an_answer_is_not_made_twice(tmp_path: Path) -> None:
@@ -100,7 +120,7 @@ def test_the_score_counts_names_values_and_silence() -> None:
         "unit": "µm",
     }
     walk = {"name": "wandering-bar", "listed": False, "amplitudes": {}, "largest_amplitude": 0.05, "unit": "µm"}
-    answer = {"kind": "single", "effects": [gap, walk]}
+    answer = {"kind": "single", "effects": [gap, walk], "circumstances": {"machine": "one"}}
     found = _source("backlash", "identified", parameters={"strut_1_um": {"value": 5.4, "uncertainty": 0.1}})
     said = compare(answer, _verdict(0.4, found, _source("servo-lag", "identified"), _source("play", "ruled-out")))
     assert (said["right"], said["wrong"], said["without_answer"]) == (["backlash"], ["servo-lag"], False)
@@ -117,10 +137,14 @@ def test_the_score_counts_names_values_and_silence() -> None:
 
 def test_levels_are_scored_by_variables_that_were_put_in() -> None:
     """One of two effects is located, one of two classes is of neither, and of a class that is not sure nothing counts."""
+
+    def sizes(testable: float) -> dict[str, Any]:
+        return {"size": testable, "amplitudes": {"one": 1.0}, "listed": True}
+
     answer = {
         "effects": [
-            {"name": "backlash", "variables": ["strut-speed-sign"]},
-            {"name": "gravity", "variables": ["strut-force"]},
+            {"name": "backlash", "variables": ["strut-speed-sign"], **sizes(4.0)},
+            {"name": "gravity", "variables": ["strut-force"], **sizes(2.0)},
         ]
     }
 
@@ -136,11 +160,25 @@ def test_levels_are_scored_by_variables_that_were_put_in() -> None:
     assert row["located"] == ["backlash"]
     assert row["wrong_classes"] == ["tilt of the platform"]
     assert len(row["classes"]) == 2
-    scored = {"named": ["backlash"], "right": ["backlash"], "listed": 2, "wrong": [], "levels": row}
+    # 20 standard deviations: 200 - 1/2 log 401; 10 of them: 50 - 1/2 log 101.
+    assert [log_bayes_factor(one) for one in answer["effects"]] == pytest.approx([197.003, 47.692], abs=1e-3)
+    assert row["loud"] == ["backlash"]
+    scored = {
+        "named": ["backlash"],
+        "right": ["backlash"],
+        "right_or_unsure": ["backlash"],
+        "listed": 2,
+        "wrong": [],
+        "levels": row,
+        "robot": "one",
+        "held_out_over_true": 1.25,
+    }
     table = table_of({"0001": scored}, {"command": "c", "date": "2026-11-27", "seed": 1}, "")
     assert table["figures"]["effects that a class follows"][0] == "1 of 2"
     assert table["figures"]["classes that no effect follows"][0] == "1 of 2"
     assert table["figures"]["listed causes that were named"][0] == "1 of 2"
+    assert table["figures"]["log Bayes factor above 100: named"][0] == "1 of 1"
+    assert table["figures"]["held-out error over that of the causes put in"][1] == "median 1.25"
     table, drawn = calibration_of({"0001": scored}, {"command": "c", "date": "2026-11-27", "seed": 1})
     assert [cell.split(",")[0] for cell in table["figures"]["0.95 to 1"]] == ["1 of 1", "1 of 2", "1 of 2"]
     assert [cell.split(",")[0] for cell in table["figures"]["0.5 to 0.8"]] == ["0 of 0", "1 of 1", "0 of 0"]

@@ -90,6 +90,7 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, 
     testable = [name for name, source in by_name.items() if source["verdict"] != "not-testable"]
     return {
         "kind": answer["kind"],
+        "robot": answer["circumstances"]["machine"],
         "put_in": [_told(effect) for effect in answer["effects"]],
         "listed": len(listed),
         "named": named,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,12 +83,21 @@ class Part:
 
 
 def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
-    """Return forms with log weights; kinds weigh equally, as do a kind's forms."""
+    """Return forms with log weights: all amplitudes, one part, two parts that are not struts, or all struts alike.
+
+    Kinds weigh equally, as do a kind's forms.
+    """
     every = tuple(range(len(amplitudes) * sets))
     labels = [p.alone_with for p in amplitudes] * sets
     kinds = [[("", every)]]
     if len(set(labels)) > 1:
-        kinds.append([(part, tuple(k for k in every if labels[k] == part)) for part in sorted(set(labels))])
+        alone = [(part, tuple(k for k in every if labels[k] == part)) for part in sorted(set(labels))]
+        kinds.append(alone)
+        if any(p.part for p in amplitudes):
+            # Few orders of a figure are often large; the others would each cost as much as a size of theirs.
+            kinds.append(
+                [(f"{one} and {two}", tuple(sorted((*a, *b)))) for (one, a), (two, b) in combinations(alone, 2)]
+            )
     if sets == 1 and [p.strut for p in amplitudes] == [*STRUT_NUMBERS]:
         kinds.append([(ALIKE, every)])
     return [Part(label, own, -float(np.log(len(kinds) * len(kind)))) for kind in kinds for label, own in kind]

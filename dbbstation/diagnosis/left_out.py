@@ -57,18 +57,16 @@ def predicted_without(explained: Explained, left_out: Sequence[Collection[str]])
 def _held_out(
     explained: Explained, members: Sequence[Member], single: float | None = None
 ) -> Callable[[Sequence[Member]], HeldOut]:
-    """Return a function that predicts held-out tests with all members but some, whose sizes the other tests give."""
+    """Return a function that predicts held-out tests with all members but some."""
     channel, settled, variants = explained.channel, explained.settled, [member.variant for member in members]
     known, base = channel.known_with(variants), len(channel.base.prior)
-    known = replace(known, random=known.random & (np.arange(len(known.prior)) < base))
     blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
     groups = in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR)
 
     def but_for(some: Sequence[Member]) -> HeldOut:
         out = np.concatenate([np.zeros(base, dtype=bool), *(np.full(m.width, m in some) for m in members)])
         noise_mm, kept = max(settled.noise_mm, SMALLEST_NOISE_MM), np.flatnonzero(~out)
-        held = np.hstack([channel.held, np.zeros((len(channel.held), len(kept) - base))])
-        return held_out(blocks, groups, known, kept, noise_mm, held, single)
+        return held_out(blocks, groups, known, kept, base, noise_mm, channel.held, single)
 
     return but_for
 

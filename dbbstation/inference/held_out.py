@@ -34,6 +34,7 @@ def held_out(
     groups: Sequence[int],
     known: Columns,
     active: Integers,
+    base: int,
     noise: float,
     held: Floats,
     single: float | None = None,
@@ -42,11 +43,14 @@ def held_out(
 
     Args:
         groups: group of each block, such as the fold of its test.
+        active: columns that predict, all of the base first.
+        base: number of the base's columns. The kept blocks alone give the others, which are causes.
         noise: white noise of equal low-frequency power.
-        held: directions held at zero, in scaled columns.
+        held: directions of the base's fitted columns held at zero, in scaled columns.
         single: noise of a single measurement, if smaller than `noise`; else None.
     """
-    used = Columns(known.prior[active], known.scale[active], known.random[active])
+    used = Columns(known.prior[active], known.scale[active], known.random[active] & (active < base))
+    held = np.hstack([held, np.zeros((len(held), len(active) - base))])
     thin = [_restricted(block, active) for block in blocks]
     square, count, weighted, rows = 0.0, 0, 0.0, 0
     for group in sorted(set(groups)):

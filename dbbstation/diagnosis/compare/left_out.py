@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.blocks import Columns, compress
+from dbbstation.inference.blocks import compress
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import KnownGains, gains_of_tests, groups_of_tests, rows_of_groups
 from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn
@@ -37,13 +37,9 @@ def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True
 
 def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:
     """Return prediction errors of held-out tests with stated set-ups and some causes."""
-    bank = settled.bank
-    columns, both = bank.jointly(members)
-    prior, base = both.prior, len(settled.channel.base.prior)
-    # Kept tests give the amplitudes of causes; only the set-up of a held-out test is fitted to it.
-    known = Columns(prior, prior, np.arange(len(prior)) < base)
+    bank, channel = settled.bank, settled.channel
+    columns, known = bank.jointly(members)
     groups = in_turn([pair.test for pair in sides.pairs], FOLDS_OF_AN_ERROR)
-    every = np.arange(len(prior))
+    every = np.arange(len(known.prior))
     blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
-    noise = settled.noise.innovation
-    return held_out(blocks, groups, known, every, noise, np.zeros((0, len(prior) - base)))
+    return held_out(blocks, groups, known, every, len(channel.base.prior), settled.noise.innovation, channel.held)

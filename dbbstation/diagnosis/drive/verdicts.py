@@ -249,7 +249,8 @@ class Verdicts(CauseJudge):
                 return Verdict.NOT_TESTABLE, finding.text
         refused = next((f.text for f in own if f.name in self._settled.refused), "")
         if not refused and own and self._probability(own) > source.prior_probability:
-            return open_to(self._rows)[::2]
+            verdict, _, why = open_to(self._rows)
+            return verdict, why
         return Verdict.RULED_OUT, refused or NOT_NEEDED
 
     def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:

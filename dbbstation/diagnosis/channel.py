@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.checks.missing_physics import misfit_of
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
-from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of, left_open_of
+from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of, left_open_of, seen_of
 from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms, is_shape, parts_of
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.bank import spacing_of
@@ -19,7 +20,7 @@ from dbbstation.inference.blocks import Block, compress, slices, with_random
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.harmonics import noise_left_by
-from dbbstation.inference.model_comparison import Cause, Variant, largest_sd
+from dbbstation.inference.model_comparison import MOST_SLACK, Cause, Variant, largest_sd
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.triangle import axes_of, rms
@@ -41,6 +42,9 @@ SETUP_ODDS = float(np.log(0.01 / 0.99))
 
 SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 """Random effects of the base that may be far larger than stated."""
+
+LEAST_SLACK = 0.1
+"""Smallest change of a formula, in standard deviations of all readings together, that is kept: it moves a log Bayes factor by 0.005."""
 
 SEEN = 1e-5
 """Least relative singular value of identifiable directions of machine parameters; only these absorb effects."""
@@ -217,8 +221,12 @@ class CircleChannel:
                 self.motions, readings, shared, derivatives, self._variables, strict=True
             )
         ]
-        discrepancy = discrepancy_of(source, self.machine, effects)
-        parts = left_open_of(source, self.machine, effects)
+        discrepancy, parts = (
+            seen_of(of(source, self.machine, effects), self._least_mm / source.form_uncertainty)
+            if source.form_uncertainty
+            else of(source, self.machine, effects)
+            for of in (discrepancy_of, left_open_of)
+        )
         slack = self.columns.add(np.hstack([tangents, discrepancy, parts]))
         sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1] + parts.shape[1], source.form_uncertainty)])
         plausible = np.array([p.plausible for p in parameters])[~shaped]
@@ -242,6 +250,11 @@ class CircleChannel:
     @cached_property
     def _variables(self) -> list[dict[str, Floats]]:
         return [variables(motion, self.machine) for motion in self.motions]
+
+    @cached_property
+    def _least_mm(self) -> float:
+        """Return the norm of the smallest change of a formula that the noise lets through [mm]."""
+        return LEAST_SLACK * max(misfit_of(self.calibration).noise, SMALLEST_NOISE_MM) / MOST_SLACK
 
     def give_back(self) -> None:
         """Free the columns of forms that were replaced after the last comparison."""

@@ -81,6 +81,16 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     return np.hstack([columns, _other_stages(source, machine, runs)])
 
 
+def seen_of(columns: Floats, least: float) -> Floats:
+    """Return the principal axes of columns, shape (n, q), whose norm is at least so large, shape (n, r).
+
+    Columns with one prior and their axes stand for the same covariance [Rasmussen and Williams, Gaussian Processes for
+    Machine Learning (2006), eq 4.39], but for the axes left out.
+    """
+    squares, turned = np.linalg.eigh(columns.T @ columns)
+    return np.asarray(columns @ turned[:, squares > least**2], dtype=np.float64)
+
+
 def left_open_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:
     """Return the source's `left_open` changes as columns, shape (n, q), scaled to one standard deviation of the formula's inaccuracy."""
     if source.form_uncertainty == 0.0:

@@ -7,7 +7,7 @@ import importlib
 import importlib.metadata
 import pkgutil
 import traceback
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import getmembers, isabstract, isclass
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
 from dbbstation.errors import InputError, Problem, StationError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from types import ModuleType
 
 
@@ -36,12 +36,42 @@ class FoundClass(Generic[Base]):
     """A class outside the package.
 
     Attributes:
-        place: file and line, or entry point.
+        place: file and line, or entry point, with the remedy of its faults.
     """
 
     kind: type[Base]
     place: Problem
-    remedy: str
+
+    def fault(self, what: str) -> Problem:
+        """Return a fault of the class."""
+        return replace(self.place, what=f"{self.kind.__name__}{what}")
+
+    def broken(self, error: BaseException, when: str = "") -> Problem:
+        """Return an error of the class's own code, at its line."""
+        line = line_in(error, self.place.file) or self.place.line
+        return replace(self.fault(f": {in_words(error)}{when}"), line=line)
+
+    def made(self, undeclared: Sequence[str], tried: Callable[[Base], Sequence[str]], when: str = "") -> Base:
+        """Return an instance that passed its trial.
+
+        Args:
+            undeclared: faults of the class itself.
+            tried: returns faults of an instance.
+            when: what is said behind an error of its code.
+
+        Raises:
+            InputError: every fault, or the error of its code.
+        """
+        said = undeclared
+        if not said:
+            try:
+                one = self.kind()
+                said = tried(one)
+            except FOREIGN as error:
+                raise InputError([self.broken(error, when)]) from error
+            if not said:
+                return one
+        raise InputError([self.fault(f": {what}") for what in said])
 
 
 def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
@@ -72,10 +102,9 @@ def installed(group: str, base: type[Base], faults: list[Problem]) -> list[Found
     found = []
     for point in loaded(group, faults):
         if isclass(point.value) and issubclass(point.value, base):
-            found.append(FoundClass(point.value, point.place, point.remedy))
+            found.append(FoundClass(point.value, point.place))
         else:
-            what = f"{point.named} is no class that derives from {base.__name__}"
-            faults.append(Problem(point.place.file, 0, 0, what, point.remedy))
+            faults.append(point.fault(f" is no class that derives from {base.__name__}"))
     return found
 
 
@@ -86,7 +115,10 @@ class Loaded:
     value: object
     named: str
     place: Problem
-    remedy: str
+
+    def fault(self, what: str) -> Problem:
+        """Return a fault of the object."""
+        return replace(self.place, what=f"{self.named}{what}")
 
 
 def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
@@ -94,12 +126,11 @@ def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
     found = []
     for point in importlib.metadata.entry_points(group=group):
         package = "a package" if point.dist is None else f"the package {point.dist.name}"
-        place = Problem(f"entry point {point.name} of {package}", 0, 0, "")
-        remedy = f"mend or uninstall {package}"
+        place = Problem.of(f"entry point {point.name} of {package}", "", f"mend or uninstall {package}")
         try:
-            found.append(Loaded(point.load(), point.value, place, remedy))
+            found.append(Loaded(point.load(), point.value, place))
         except FOREIGN as error:
-            faults.append(Problem(place.file, 0, 0, f"cannot be loaded: {in_words(error)}", remedy))
+            faults.append(replace(place, what=f"cannot be loaded: {in_words(error)}"))
     return found
 
 
@@ -119,12 +150,10 @@ def files_of_packages(group: str, own: Iterable[Path], *, called: str) -> dict[s
         folders = [Path(folder) for folder in getattr(point.value, "__path__", ())]
         found = sorted(path for folder in folders for path in folder.glob("*.yaml"))
         if not found:
-            what = f"{point.named} is no package with a file that ends in .yaml in its folder"
-            faults.append(Problem(point.place.file, 0, 0, what, point.remedy))
+            faults.append(point.fault(" is no package with a file that ends in .yaml in its folder"))
         for path in found:
             if path.stem in files:
-                what = f"{called} `{path.stem}` is known already, from {whose[path.stem]}"
-                faults.append(Problem(point.place.file, 0, 0, what, "give it another name"))
+                faults.append(_taken(point.place, f"{called} `{path.stem}`", whose[path.stem]))
             else:
                 files[path.stem], whose[path.stem] = path, point.place.file
     if faults:
@@ -142,10 +171,13 @@ def added(
         called: kind in words, with its article.
     """
     if one.name in found:
-        what = f"{called} `{one.name}` is known already, from {whose.get(one.name, 'dbbstation itself')}"
-        faults.append(Problem(place.file, place.line, 0, what, "give it another name"))
+        faults.append(_taken(place, f"{called} `{one.name}`", whose.get(one.name, "dbbstation itself")))
         return
     found[one.name], whose[one.name] = one, place.file
+
+
+def _taken(place: Problem, named: str, whose: str) -> Problem:
+    return replace(place, what=f"{named} is known already, from {whose}", remedy="give it another name")
 
 
 FOREIGN = (Exception, SystemExit)

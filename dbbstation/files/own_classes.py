@@ -50,8 +50,7 @@ def classes_in_files(
         for kind in kinds:
             others = any(issubclass(other, kind) for other in kinds if other is not kind)
             if not (isabstract(kind) and others):  # what others derive from may leave things to them
-                place = Problem(str(path), lines.get(kind.__name__, 0), 0, "")
-                found.append(FoundClass(kind, place, contract))
+                found.append(FoundClass(kind, Problem.of(path, "", contract, lines.get(kind.__name__, 0))))
     return found
 
 
@@ -75,24 +74,22 @@ def own_instances(
     faults: list[Problem] = []
     found: dict[str, Base] = {}
     for one_of in classes_in_files(files, base, contract, faults):
-        kind, place = one_of.kind, one_of.place
-        lacking = [name for name in attributes if not hasattr(kind, name)]
-        lacking += sorted(getattr(kind, "__abstractmethods__", ()))
+        lacking = [name for name in attributes if not hasattr(one_of.kind, name)]
+        lacking += sorted(getattr(one_of.kind, "__abstractmethods__", ()))
         if lacking:
-            faults.append(Problem(place.file, place.line, 0, f"{kind.__name__} lacks {', '.join(lacking)}", contract))
+            faults.append(one_of.fault(f" lacks {', '.join(lacking)}"))
             continue
         try:
-            one = kind()
+            one = one_of.kind()
             fault = fault_of(one)
         except FOREIGN as error:
-            line = line_in(error, place.file) or place.line
-            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", contract))
+            faults.append(one_of.broken(error))
             continue
         name = str(getattr(one, "name", ""))
         if fault is None and name in found:
             fault = f"the name `{name}` is taken", "give it another name"
         if fault is not None:
-            faults.append(Problem(place.file, place.line, 0, *fault))
+            faults.append(Problem.of(one_of.place.file, *fault, one_of.place.line))
         found.setdefault(name, one)
     refuse(faults)
     return list(found.values())

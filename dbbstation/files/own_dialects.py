@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import FOREIGN, FoundClass, in_words, line_in
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Problem, refuse
 from dbbstation.files.own_classes import classes_in_files
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.registry import dialect_named
 from dbbstation.nc.trial import faults_of
+
+if TYPE_CHECKING:
+    from dbbstation.catalogue import FoundClass
 
 CONTRACT = "see `A new dialect` in docs/nc.md"
 
@@ -36,19 +39,8 @@ def dialect_given(name_or_file: str) -> Dialect:
 
 
 def _tried(found: FoundClass[Dialect]) -> Dialect:
-    kind, place = found.kind, found.place
-    line = place.line
+    kind = found.kind
     said = [f"it needs `{name}`, a text" for name in DECLARED if not isinstance(getattr(kind, name, None), str)]
     if not said and not kind.extension.startswith("."):
         said = ["its `extension` must begin with a dot"]
-    if not said:
-        try:
-            dialect = kind()
-            said = faults_of(dialect)
-        except FOREIGN as error:
-            said = [f"{in_words(error)}, when it was tried"]
-            line = line_in(error, place.file) or line
-        else:
-            if not said:
-                return dialect
-    raise InputError([Problem(place.file, line, 0, f"{kind.__name__}: {what}", found.remedy) for what in said])
+    return found.made(said, faults_of, ", when it was tried")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from dbbstation.catalogue import FoundClass
@@ -41,14 +42,14 @@ def _has_columns(found: FoundClass[ABC], faults: list[Problem]) -> bool:
         name for name in getattr(found.kind, "needs", ()) if issubclass(found.kind, TableSource) and name not in MOVING
     ]
     if missing:
-        what = f"{found.kind.__name__} needs {', '.join(missing)}, which a strut does not have"
-        faults.append(Problem(found.place.file, found.place.line, 0, what, f"a strut has {', '.join(MOVING)}"))
+        fault = found.fault(f" needs {', '.join(missing)}, which a strut does not have")
+        faults.append(replace(fault, remedy=f"a strut has {', '.join(MOVING)}"))
     return not missing
 
 
 def _of_struts(found: FoundClass[ABC]) -> FoundClass[ErrorSource]:
     kind = of_struts(found.kind) if issubclass(found.kind, TableSource) else cast("type[ErrorSource]", found.kind)
-    return FoundClass(kind, found.place, found.remedy)
+    return FoundClass(kind, found.place)
 
 
 def sources_of(files: Sequence[Path], known: Mapping[str, ErrorSource]) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from inspect import isabstract
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.catalogue import FOREIGN, in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
 from dbbstation.errors import InputError, Problem, refuse
@@ -131,16 +130,11 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
     faults: list[Problem] = []
     found = classes_in_files([python], Simulator, CONTRACT, faults)
     if len(found) > 1 and not faults:
-        faults.append(Problem(str(python), found[1].place.line, 0, "there are two simulators in one file", CONTRACT))
+        faults.append(replace(found[1].place, what="there are two simulators in one file"))
+    elif not faults and isabstract(found[0].kind):
+        faults.append(found[0].fault(" lacks simulate"))
     refuse(faults)
-    kind, place = found[0].kind, found[0].place
-    if isabstract(kind):
-        raise InputError.of(place.file, f"{kind.__name__} lacks simulate", CONTRACT, line=place.line)
-    try:
-        return kind()
-    except FOREIGN as error:
-        line = line_in(error, place.file) or place.line
-        raise InputError.of(place.file, f"{kind.__name__}: {in_words(error)}", CONTRACT, line=line) from error
+    return found[0].made((), lambda _one: ())
 
 
 def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:

@@ -6,7 +6,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import FOREIGN, FoundClass, added, in_folders, in_words, installed, line_in, looked_up
+from dbbstation.catalogue import FoundClass, added, in_folders, installed, looked_up
 from dbbstation.errors import InputError, ModelError, Problem
 from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
@@ -62,27 +62,15 @@ def _with(
 ) -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
     found, places = dict(known), dict(whose)
     for other in others:
-        one = _checked(other, faults)
-        if one is not None:
+        try:
+            one = other.made(
+                undeclared(other.kind), lambda one: tried(one, trial_machine()), ", when it was tried on a circle"
+            )
+        except InputError as error:
+            faults += error.problems
+        else:
             added(found, places, one, other.place, called="an error source", faults=faults)
     return MappingProxyType(dict(sorted(found.items()))), places
-
-
-def _checked(found: FoundClass[ErrorSource], faults: list[Problem]) -> ErrorSource | None:
-    kind, place = found.kind, found.place
-    said, line = undeclared(kind), place.line
-    if not said:
-        try:
-            source = kind()
-            said = tried(source, trial_machine())
-        except FOREIGN as error:
-            said = [f"{in_words(error)}, when it was tried on a circle"]
-            line = line_in(error, place.file) or line
-        else:
-            if not said:
-                return source
-    faults += [Problem(place.file, line, 0, f"{kind.__name__}: {what}", found.remedy) for what in said]
-    return None
 
 
 def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None = None) -> tuple[ErrorSource, ...]:

@@ -40,6 +40,18 @@ class Problem:
         return f"{place}: {what}".replace("\n", "\\n")
 
 
+class Faults(list[Problem]):
+    """Faults of one file."""
+
+    def __init__(self, file: object) -> None:
+        super().__init__()
+        self.file = str(file)
+
+    def add(self, what: str, remedy: str = "", line: int = 0, column: int = 0) -> None:
+        """Add a fault of the file, or of a line of it."""
+        self.append(Problem(self.file, line, column, what, remedy))
+
+
 MOST_FAULTS = 20
 """Greatest number of listed faults of one kind."""
 

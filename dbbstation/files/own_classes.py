@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 from dbbstation.catalogue import FOREIGN, FoundClass, classes_of, in_words, line_in
 from dbbstation.errors import Problem, refuse
 from dbbstation.files.places import real_path
-from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
+from dbbstation.files.source_text import LARGEST_PROGRAM, text_in
 from dbbstation.laws.contract import TableSource
 
 if TYPE_CHECKING:
@@ -101,15 +101,14 @@ def module_name(path: Path) -> str:
 
 
 def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
-    data = read_bytes(path, faults, LARGEST_PROGRAM)
-    text = None if data is None else decode(data, str(path), faults)
+    text = text_in(path, faults, LARGEST_PROGRAM)
     if text is None:
         return None
     try:
         return ast.parse(text, str(path))
     except SyntaxError as error:
         what = f"is not Python: {error.msg}"
-        faults.append(Problem(str(path), error.lineno or 0, error.offset or 0, what, "mend the line"))
+        faults.append(Problem.of(path, what, "mend the line", error.lineno or 0, error.offset or 0))
     except ValueError as error:
         faults.append(Problem.of(path, f"is not Python: {error}", "name a Python file"))
     except (MemoryError, RecursionError):
@@ -127,7 +126,7 @@ def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | No
     except FOREIGN as error:
         del sys.modules[module.__name__]
         what = f"cannot be run: {in_words(error)}"
-        faults.append(Problem(str(path), line_in(error, str(path)), 0, what, "mend the line"))
+        faults.append(Problem.of(path, what, "mend the line", line_in(error, str(path))))
         return None
     return module
 

@@ -136,14 +136,19 @@ def without_faults(read: Callable[[list[Problem]], _Found | None]) -> _Found:
     return found
 
 
-def text_of(path: Path, largest: int = LARGEST_BYTES) -> str:
+def text_of(path: Path, largest: int = LARGEST_BYTES, *, is_input: bool = True) -> str:
     """Return a file's text.
 
     Raises:
         InputError: it cannot be read, or is no UTF-8.
     """
-    data = without_faults(lambda faults: read_bytes(path, faults, largest))
-    return without_faults(lambda faults: decode(data, str(path), faults))
+    return without_faults(lambda faults: text_in(path, faults, largest, is_input=is_input))
+
+
+def text_in(path: Path, faults: list[Problem], largest: int = LARGEST_BYTES, *, is_input: bool = True) -> str | None:
+    """Return the text of a UTF-8 file; None with the reason in `faults`."""
+    data = read_bytes(path, faults, largest, is_input=is_input)
+    return None if data is None else decode(data, str(path), faults)
 
 
 def numbered_lines(text: str) -> list[tuple[int, str]]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, StationError, refuse
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import decode, read_bytes, without_faults
 from dbbstation.nc.commanded import poses_at_progress
 from dbbstation.nc.nominal import check_nominal
 from dbbstation.nc.reach import check_reach
@@ -64,10 +64,7 @@ def read_toolpath(path: Path, content: bytes) -> Toolpath:
         InputError: faults with line and column.
         ModelError: no dialect has files with that extension.
     """
-    faults: list[Problem] = []
-    text = decode(content, str(path), faults)
-    if text is None:
-        raise InputError(faults)
+    text = without_faults(lambda faults: decode(content, str(path), faults))
     return dialect_of_file(path.name, text).read(text, str(path))
 
 

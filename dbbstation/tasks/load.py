@@ -14,7 +14,7 @@ import numpy as np
 from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import text_of
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Thermometer
@@ -178,11 +178,8 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
         return observation
     from dbbstation.nc.commanded import commanded_poses
 
-    path, faults = run.program.path, list[Problem]()
-    data = read_bytes(path, faults, is_input=False)  # its hash stands in the session
-    text = None if data is None else decode(data, str(path), faults)
-    if text is None:
-        raise InputError(faults)
+    path = run.program.path
+    text = text_of(path, is_input=False)  # its hash stands in the session
     poses = commanded_poses(text, str(path), observation, session.machine.hexapod.rotation)
     return replace(observation, commanded=poses)
 

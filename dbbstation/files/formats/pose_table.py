@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, refuse
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
@@ -58,7 +58,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         if any(sign in name for name in names for sign in SEPARATORS if sign != language.separator):
             remedy += f"; {language.text}: {ELSE}"
         raise InputError.of(path, f"no column {', '.join(missing)}", remedy, line=1, column=1)
-    faults: list[Problem] = []
+    faults = Faults(path)
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
     for line, cells in table:
@@ -67,10 +67,10 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
             remedy = f"compare the line with the header; {language.text}"
-            faults.append(Problem(str(path), line, 0, what, remedy))
+            faults.add(what, remedy, line)
             continue
         row = dict(zip(names, cells, strict=True))
-        rows.append([_number(row[name], name, path, line, language, faults) for name in POSE_COLUMNS])
+        rows.append([_number(row[name], name, line, language, faults) for name in POSE_COLUMNS])
         for name, kept in others.items():
             kept.append(row[name])
     refuse(faults[:MOST_FAULTS])
@@ -79,11 +79,11 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     return PoseTable(np.array(rows), others)
 
 
-def _number(cell: str, name: str, path: Path, line: int, language: NumberLanguage, faults: list[Problem]) -> float:
+def _number(cell: str, name: str, line: int, language: NumberLanguage, faults: Faults) -> float:
     value = language.number(cell)
     if not np.isfinite(value):
         remedy = f"{language.text}: {ELSE}" if set(cell) & set(DECIMALS) else "correct or remove the line"
-        faults.append(Problem(str(path), line, 0, f"{name} is {shortened(cell)!r}, not a number", remedy))
+        faults.add(f"{name} is {shortened(cell)!r}, not a number", remedy, line)
     return value
 
 

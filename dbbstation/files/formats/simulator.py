@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dbbstation.errors import Problem
-from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes, without_faults
+from dbbstation.errors import Faults, Problem
+from dbbstation.files.source_text import LARGEST_PROGRAM, text_in, without_faults
 from dbbstation.files.yaml.schema import Schema, read_valid
 
 if TYPE_CHECKING:
@@ -174,9 +174,8 @@ def read_simulator(path: Path) -> SimulatorFile:
 
 def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, python: str, faults: list[Problem]) -> None:
     source = path.parent / python
-    own: list[Problem] = []
-    data = read_bytes(source, own, LARGEST_PROGRAM)
-    text = None if data is None else decode(data, str(source), own)
+    own = Faults(source)
+    text = text_in(source, own, LARGEST_PROGRAM)
     if text is None:
         what = f"`{python}` cannot be read: {own[0].what if own else 'it is no text'}"
         document.fault(("python",), what, "name a Python file beside this one")
@@ -185,16 +184,17 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, pyth
         tree = ast.parse(text)
     except (SyntaxError, ValueError) as error:
         line = getattr(error, "lineno", 0) or 0
-        faults.append(Problem(str(source), line, 0, f"is not Python: {error}", "mend the line"))
+        faults.append(Problem.of(source, f"is not Python: {error}", "mend the line", line))
         return
-    arguments = _arguments(tree, str(source), faults)
-    if not arguments:
+    arguments = _arguments(tree, own)
+    faults += own
+    if own:
         return
     ports, called = arguments[-1], _called(tree, arguments[-1])
     for name, line in called.items():
         if name not in found.ports:
             what = f"`{ports}.{name}` is no port of {path.name}"
-            faults.append(Problem(str(source), line, 0, what, f"there are {', '.join(found.ports)}"))
+            faults.append(Problem.of(source, what, f"there are {', '.join(found.ports)}", line))
     for name in found.ports:
         if name not in called and not _computed(tree, ports):
             at: Location = ("ports", name)
@@ -203,14 +203,14 @@ def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, pyth
             document.fault(at, what, remedy, at_key=True)
 
 
-def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
+def _arguments(tree: ast.AST, faults: Faults) -> list[str]:
     classes = [
         n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and any(_last(base) == BASE for base in n.bases)
     ]
     if len(classes) != 1:
         many = f"{len(classes)} classes derive" if classes else "no class derives"
         line = classes[1].lineno if classes else 0
-        faults.append(Problem(source, line, 0, f"{many} from {BASE}, one is expected", CONTRACT))
+        faults.add(f"{many} from {BASE}, one is expected", CONTRACT, line)
         return []
     method = next((n for n in ast.walk(classes[0]) if isinstance(n, ast.FunctionDef) and n.name == "simulate"), None)
     arguments = [argument.arg for argument in method.args.args] if method else []
@@ -219,7 +219,7 @@ def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
     what = f"`simulate` takes {', '.join(arguments)}; self, inputs, parameters and ports are expected"
     if method is None:
         what = "`simulate(self, inputs, parameters, ports)` is not there"
-    faults.append(Problem(source, (method or classes[0]).lineno, 0, what, CONTRACT))
+    faults.add(what, CONTRACT, (method or classes[0]).lineno)
     return []
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, refuse
 from dbbstation.files.formats.jig import BallSchema, JigFile, checked_jig, jig_text
 from dbbstation.files.formats.mapping import LENGTH, UNITS
 from dbbstation.files.recordings.dmis import Measured, read_dmis
@@ -17,7 +17,7 @@ from dbbstation.files.recordings.table_csv import NO_NUMBER, TableFile, missing_
 from dbbstation.files.source_text import shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.files.formats.number_language import NumberLanguage
@@ -57,15 +57,14 @@ def wide(table: TableFile, columns: Mapping[str, str], unit: str) -> tuple[Table
     if axis_name is None or value_name is None or ball_name is None:
         what = "no column says which ball a row is"
         raise InputError.of(table.file, what, "name the column with --columns NAME=ball", line=table.header)
-    faults: list[Problem] = []
+    faults = Faults(table.file)
     names = {"axis": axis_name, "value": value_name, "ball": ball_name, "unit": unit_name, "u": columns.get("u")}
     balls = _gathered(table, names, unit, faults)
     for ball, of in balls.items():
         missing = [axis for axis in AXES if axis not in of]
         if missing and not faults:
             line = next(iter(of.values())).line
-            what = f"{ball} has no {', '.join(missing)}"
-            faults.append(Problem(table.file, line, 0, what, "export all three coordinates"))
+            faults.add(f"{ball} has no {', '.join(missing)}", "export all three coordinates", line)
     refuse(faults)
     numbers = {axis: np.array([of[axis].value for of in balls.values()]) for axis in AXES}
     if "u" in columns:
@@ -86,7 +85,7 @@ class _Coordinate(NamedTuple):
 
 
 def _gathered(
-    table: TableFile, names: Mapping[str, str | None], unit: str, faults: list[Problem]
+    table: TableFile, names: Mapping[str, str | None], unit: str, faults: Faults
 ) -> dict[str, dict[str, _Coordinate]]:
     balls: dict[str, dict[str, _Coordinate]] = {}
     for k, line in enumerate(table.lines.tolist()):
@@ -98,8 +97,7 @@ def _gathered(
         value, row_unit = float(table.values[names["value"] or ""][k]), of["unit"].replace("um", "µm").replace("μ", "µ")
 
         def fault(key: str, what: str, remedy: str, line: int = line) -> None:
-            column = table.names.index(names[key] or "") + 1
-            faults.append(Problem(table.file, line, column, what, remedy))
+            faults.add(what, remedy, line, table.names.index(names[key] or "") + 1)
 
         if names["unit"] is not None and row_unit not in UNITS[LENGTH]:
             fault("unit", f"`{shortened(row_unit)}` is no unit of a length", f"use one of {', '.join(UNITS[LENGTH])}")
@@ -188,31 +186,27 @@ def read_sheet(
         raise InputError.of(path, what, "leave --unit out, or correct the sheet", line=table.header)
     unit = unit or said or "mm"
     missing = [key for key in ("x", "y") if key not in found]
-    faults = [
-        missing_column(name, table.names, str(path), table.header) for name in found.values() if name not in table.names
+    faults, header = Faults(path), table.header
+    faults += [
+        missing_column(name, table.names, faults.file, header) for name in found.values() if name not in table.names
     ]
     remedy = f"say which with --columns NAME={missing[0] if missing else 'x'}; columns here: {', '.join(table.names)}"
-    faults += [Problem(str(path), table.header, 0, f"no column is known to be {key}", remedy) for key in missing]
+    for key in missing:
+        faults.add(f"no column is known to be {key}", remedy, header)
     if "ball" not in found and not ({"bore"} if of_one_holder else {"bore", "holder"}) <= set(found):
         what = "no column says which ball a row is"
-        faults.append(
-            Problem(
-                str(path), table.header, 0, what, "name the column with --columns NAME=ball, or with bore and holder"
-            )
-        )
+        faults.add(what, "name the column with --columns NAME=ball, or with bore and holder", header)
     of_u = [key for key in ("u", "ux", "uy", "uz") if key in found]
     if of_u and coverage is None:
         what = "the sheet has uncertainties, and nothing says what they are"
-        faults.append(
-            Problem(str(path), table.header, 0, what, "give --coverage: 2 for U (k = 2), 1 for standard uncertainties")
-        )
+        faults.add(what, "give --coverage: 2 for U (k = 2), 1 for standard uncertainties", header)
     if not faults:
-        faults += [fault for key in (*AXES, *of_u) if key in found for fault in _bad_cells(table, found[key])]
+        _check_cells(table, [found[key] for key in (*AXES, *of_u) if key in found], faults)
     refuse(faults)
     factors = UNITS[LENGTH][unit], UNITS[LENGTH][u_said or unit]
     rows = [_row(table, k, found, factors, coverage) for k in range(len(table))]
     if not u_said:
-        faults += [_unlike_a_cmm(one, str(path), unit) for one in rows if not _is_like_a_cmm(one)]
+        _check_like_a_cmm(rows, unit, faults)
     refuse(faults)
     return rows
 
@@ -235,7 +229,7 @@ def jig_of_sheet(
     Raises:
         InputError: a ball is unknown, given twice or without uncertainty, or the jig is invalid.
     """
-    faults: list[Problem] = []
+    faults = Faults(file)
     balls: dict[str, BallSchema] = {}
     for one in measured:
         name = names.get(one.name) or _known_name(one, before)
@@ -244,24 +238,14 @@ def jig_of_sheet(
         u_um = one.uncertainty_um if one.uncertainty_um is not None else uncertainty_um
         if not holder:
             remedy = f"say --names '{one.name}=BALL'; the jig has {', '.join(before.balls)}"
-            faults.append(Problem(file, one.line, 0, f"the jig has no ball `{name}`", remedy))
+            faults.add(f"the jig has no ball `{name}`", remedy, one.line)
         elif name in balls:
-            faults.append(
-                Problem(file, one.line, 0, f"the ball `{name}` is in the sheet a second time", "remove one of them")
-            )
+            faults.add(f"the ball `{name}` is in the sheet a second time", "remove one of them", one.line)
         elif u_um is None:
-            what = f"nothing states an uncertainty of `{name}`"
-            faults.append(
-                Problem(
-                    file,
-                    one.line,
-                    0,
-                    what,
-                    "give --u-um, the standard uncertainty of a coordinate, or name its column: --columns NAME=u",
-                )
-            )
+            remedy = "give --u-um, the standard uncertainty of a coordinate, or name its column: --columns NAME=u"
+            faults.add(f"nothing states an uncertainty of `{name}`", remedy, one.line)
         elif not all(map(math.isfinite, one.centre_mm)):
-            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "name the column: --columns NAME=z"))
+            faults.add(f"`{name}` has no z", "name the column: --columns NAME=z", one.line)
         else:
             x, y, z = (float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
             balls[name] = BallSchema.model_construct(
@@ -310,33 +294,23 @@ def _usual(key: str, table: TableFile) -> str | None:
     return next((names[0] for names in (stated, found) if len(names) == 1), None)
 
 
-def _bad_cells(table: TableFile, name: str) -> list[Problem]:
-    lines, cells = table.lines.tolist(), table.cells[name]
-    bad = np.flatnonzero(~np.isfinite(table.values[name])).tolist()
-    return [
-        Problem(
-            table.file,
-            lines[k],
-            0,
-            f"{name} is `{cells[k]}`, not a finite number",
-            "correct the cell or remove the row",
-        )
-        for k in bad
-    ]
+def _check_cells(table: TableFile, names: Iterable[str], faults: Faults) -> None:
+    for name in names:
+        for k in np.flatnonzero(~np.isfinite(table.values[name])).tolist():
+            what = f"{name} is `{table.cells[name][k]}`, not a finite number"
+            faults.add(what, "correct the cell or remove the row", int(table.lines[k]))
 
 
 LIKE_A_CMM_UM = (0.01, 100.0)
 """Range of a CMM's standard uncertainty of a ball's centre [µm]; values outside indicate another, unstated unit."""
 
 
-def _is_like_a_cmm(one: Measured) -> bool:
+def _check_like_a_cmm(rows: Sequence[Measured], unit: str, faults: Faults) -> None:
     low, high = LIKE_A_CMM_UM
-    return not one.uncertainty_um or low <= one.uncertainty_um <= high
-
-
-def _unlike_a_cmm(one: Measured, file: str, unit: str) -> Problem:
-    what = f"the standard uncertainty of {one.name or one.bore} would be {one.uncertainty_um:.3g} µm, if it were in {unit} like its coordinates"
-    return Problem(file, one.line, 0, what, "state the unit of uncertainties: --u-unit µm")
+    for one in rows:
+        if one.uncertainty_um and not low <= one.uncertainty_um <= high:
+            what = f"the standard uncertainty of {one.name or one.bore} would be {one.uncertainty_um:.3g} µm, if it were in {unit} like its coordinates"
+            faults.add(what, "state the unit of uncertainties: --u-unit µm", one.line)
 
 
 def _said_unit(name: str, units: Mapping[str, str]) -> str:

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import Problem, refuse
+from dbbstation.errors import Faults, refuse
 from dbbstation.files.source_text import LARGEST_SHEET, shortened, text_of
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def read_dmis(path: Path) -> list[Measured]:
         InputError: it cannot be read, has no features, no unit, polar coordinates, or several frames.
     """
     text = text_of(path, LARGEST_SHEET)
-    faults: list[Problem] = []
+    faults = Faults(path)
     found: list[Measured] = []
     factor, frame = 0.0, 0
     for line, statement in _statements(text):
@@ -59,27 +59,23 @@ def read_dmis(path: Path) -> list[Measured]:
         if unit:
             factor = _MM.get(unit[1].upper(), 0.0)
             if not factor:
-                faults.append(Problem(str(path), line, 0, f"`{unit[1]}` is no unit", f"known: {', '.join(_MM)}"))
+                faults.add(f"`{unit[1]}` is no unit", f"known: {', '.join(_MM)}", line)
         elif _FRAME.match(statement) and found:
             frame = frame or line
         elif actual and actual[2].split(",")[0].strip().upper() in {"SPHERE", "POINT"}:
             if frame:
                 what = f"the frame was set anew in line {frame}, between measured features: they have no common frame"
-                faults.append(Problem(str(path), line, 0, what, "output all features in the frame of the jig"))
+                faults.add(what, "output all features in the frame of the jig", line)
                 break
-            point = _point(actual[1], actual[2], factor, str(path), line, faults)
+            point = _point(actual[1], actual[2], factor, line, faults)
             found += [] if point is None else [point]
-    faults += _of_the_whole(found, factor, str(path), faults)
-    refuse(faults)
-    return found
-
-
-def _of_the_whole(found: list[Measured], factor: float, file: str, faults: list[Problem]) -> Iterator[Problem]:
     if found and not factor:
-        yield Problem.of(file, "no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
+        faults.add("no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
     if not found and not faults:
         what = "there is no measured sphere or point: no `FA(NAME)=FEAT/SPHERE` or `FEAT/POINT`"
-        yield Problem.of(file, what, "output actual features; `F(NAME)` are nominal ones")
+        faults.add(what, "output actual features; `F(NAME)` are nominal ones")
+    refuse(faults)
+    return found
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
@@ -96,18 +92,16 @@ def _statements(text: str) -> Iterator[tuple[int, str]]:
                 yield first, whole
 
 
-def _point(name: str, said: str, factor: float, file: str, line: int, faults: list[Problem]) -> Measured | None:
+def _point(name: str, said: str, factor: float, line: int, faults: Faults) -> Measured | None:
     cells = [cell.strip() for cell in said.split(",")]
     words = [cell.upper() for cell in cells]
     if "CART" not in words:
-        faults.append(Problem(file, line, 0, f"{name} is not in cartesian coordinates", "output it with CART"))
+        faults.add(f"{name} is not in cartesian coordinates", "output it with CART", line)
         return None
     after = cells[words.index("CART") + 1 :][:3]
     try:
         x, y, z = (float(cell) * factor for cell in after)
     except ValueError:
-        faults.append(
-            Problem(file, line, 0, f"{name}: `{shortened(', '.join(after))}` are not three numbers", "check the line")
-        )
+        faults.add(f"{name}: `{shortened(', '.join(after))}` are not three numbers", "check the line", line)
         return None
     return Measured(name, None, "", (x, y, z), None, line)

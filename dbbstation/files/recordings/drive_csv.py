@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, Problem, refuse
 from dbbstation.files.formats.number_language import PLAIN
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, given_table, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
@@ -89,7 +89,7 @@ def given_drive(given: Columns, name: str) -> DriveFile:
     Raises:
         InputError: missing columns, columns of several lengths, or unusable values.
     """
-    return _checked(given_table(given, (), name), [])
+    return _checked(given_table(given, (), name), Faults(name))
 
 
 def parse_drive(text: str, file: str) -> DriveFile:
@@ -102,18 +102,18 @@ def parse_drive(text: str, file: str) -> DriveFile:
     if not lines:
         what, remedy = "there is no line that names the columns", f"begin with `{TIME},{POSITION},{FORCE}`"
         raise InputError.of(file, what, remedy)
-    warnings: list[Problem] = []
+    warnings = Faults(file)
     number, last = lines[-1]
     if not text.endswith("\n") and last.count(",") != lines[0][1].count(","):
-        warnings.append(Problem(file, number, 0, "the last line was cut off; it is left out"))
+        warnings.add("the last line was cut off; it is left out", line=number)
         text = text[: text.rindex(last)]
     return _checked(parse_table(text, file, numbers=PLAIN), warnings)
 
 
-def _checked(table: TableFile, warnings: list[Problem]) -> DriveFile:
+def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     file, header, names = table.file, table.header, list(table.names)
-    faults: list[Problem] = []
-    _check_names(names, file, header, faults)
+    faults = Faults(file)
+    _check_names(names, header, faults)
     numbers = {name: table.values[name] for name in names if name in LARGEST}
     faults += [
         Problem(file, line, 0, f"{name} is `{shortened(cell)}`, not a finite number", "correct or remove the line")
@@ -123,15 +123,15 @@ def _checked(table: TableFile, warnings: list[Problem]) -> DriveFile:
         if not np.isfinite(value)
     ]
     if not faults:
-        _check_values(numbers, table.lines.tolist(), file, faults)
+        _check_values(numbers, table.lines.tolist(), faults)
     refuse(faults[:MOST_FAULTS])
     others = {name: table.cells[name] for name in names if name not in LARGEST}
-    unknown = (f"the column `{name}` is not known; it is kept and not used" for name in others)
-    warnings += [Problem(file, header, 0, what) for what in unknown]
+    for name in others:
+        warnings.add(f"the column `{name}` is not known; it is kept and not used", line=header)
     return DriveFile(file, header, numbers, others, tuple(warnings))
 
 
-def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) -> None:
+def _check_names(names: list[str], line: int, faults: Faults) -> None:
     shown = f"columns here: {', '.join(names)}"
     if any(";" in name or "\t" in name for name in names):
         shown = "commas stand between columns, the decimal sign is a dot"
@@ -139,21 +139,21 @@ def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) 
     for missing in (name for name in REQUIRED if name not in names):
         near = difflib.get_close_matches(missing, unknown, n=1, cutoff=0.5)
         remedy = f"is it `{near[0]}`?" if near else shown
-        faults.append(Problem(file, line, 0, f"the column `{missing}` is missing", remedy))
+        faults.add(f"the column `{missing}` is missing", remedy, line)
     if FORCE not in names and CURRENT not in names:
-        faults.append(Problem(file, line, 0, f"neither `{FORCE}` nor `{CURRENT}` is there", shown))
+        faults.add(f"neither `{FORCE}` nor `{CURRENT}` is there", shown, line)
 
 
-def _check_values(numbers: dict[str, Floats], lines: list[int], file: str, faults: list[Problem]) -> None:
+def _check_values(numbers: dict[str, Floats], lines: list[int], faults: Faults) -> None:
     t = numbers[TIME]
     for index in np.flatnonzero(np.diff(t) <= 0.0)[:MOST_FAULTS] + 1:
         how = "runs backwards" if t[index] < t[index - 1] else "stands still"
         what = f"time {how} here: t_s {t[index]:g} after {t[index - 1]:g}"
-        faults.append(Problem(file, lines[index], 0, what, "the file was reordered, or two recordings were joined"))
+        faults.add(what, "the file was reordered, or two recordings were joined", lines[index])
     for name, values in numbers.items():
         for index in np.flatnonzero(np.abs(values) > LARGEST[name])[:1]:
             what = f"{name} is {values[index]:g}, sizes up to {LARGEST[name]:g} are plausible"
-            faults.append(Problem(file, lines[index], 0, what, "check the unit at the end of the column's name"))
+            faults.add(what, "check the unit at the end of the column's name", lines[index])
 
 
 def compared_csv(columns: Mapping[str, Floats]) -> str:

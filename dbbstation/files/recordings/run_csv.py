@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import MOST_FAULTS, InputError, Problem, few, refuse
+from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, few, refuse
 from dbbstation.files.formats.session import PART, Counts
 from dbbstation.files.gateway import digest_of, opened
 from dbbstation.files.inputs import note_input, note_read
@@ -231,13 +231,12 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
 
 
 def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
-    faults: list[Problem] = []
-    warnings: list[Problem] = []
+    faults, warnings = Faults(file), Faults(file)
     numbers = Numbers()
     texts: dict[str, list[str]] = {}
     known: dict[bytes, str] = {}
     header: Mapping[str, str] = {}
-    for lines in pieces_of(blocks, file, faults, warnings, partial=partial):
+    for lines in pieces_of(blocks, faults, warnings, partial=partial):
         header = lines.header
         numbers.take(lines)
         if numbers.faults.enough:
@@ -246,8 +245,7 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
             for name in (name for name in lines.columns if name not in columns.COLUMNS and name != columns.CRC):
                 texts.setdefault(name, []).extend(lines.texts(name, known))
     found = numbers.columns()
-    faults = [*few(faults), *numbers.faults.told()]
-    refuse(faults)
+    refuse([*few(faults), *numbers.faults.told()])
     status = texts.pop(columns.STATUS, [])
     usable = np.array([text in {"", columns.STATUS_GOOD} for text in status], dtype=np.bool_) if status else None
     return RunFile(

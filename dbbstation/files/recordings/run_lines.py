@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import Problem
 from dbbstation.files.formats.number_language import NUMBER
 from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable
 from dbbstation.trace import columns
@@ -19,6 +18,8 @@ from dbbstation.trace import columns
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
+
+    from dbbstation.errors import Faults, Problem
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
 _CRC_LENGTH = 8
@@ -98,9 +99,7 @@ class Lines:
         return bool((found != digits @ _HEX_PLACES).any())
 
 
-def pieces_of(
-    blocks: Iterable[bytes], file: str, faults: list[Problem], warnings: list[Problem], *, partial: bool
-) -> Iterator[Lines]:
+def pieces_of(blocks: Iterable[bytes], faults: Faults, warnings: Faults, *, partial: bool) -> Iterator[Lines]:
     """Yield a run file's usable lines in pieces, up to the first fault.
 
     Args:
@@ -108,31 +107,22 @@ def pieces_of(
         warnings: grows by unknown columns, a cut last line, lines left out.
         partial: yield only the good lines of an interrupted recording, in one piece: they may be out of order.
     """
-    pieces = split_pieces(blocks, file, faults)
+    pieces = split_pieces(blocks, faults)
     if partial:
         whole = _whole(pieces)
         pieces = iter([] if whole is None else [whole])
     for piece in pieces:
         if piece.opening:
-            _check_columns(piece.columns, file, piece.header_line, faults)
+            _check_columns(piece.columns, piece.header_line, faults)
             for name in piece.unknown:
                 what = f"the column `{shortened(name)}` is not known; it is kept and not used"
-                warnings.append(Problem(file, piece.header_line, 0, what))
+                warnings.add(what, line=piece.header_line)
         if faults:
             return
         lines = _without_cut_line(piece, warnings)
         if partial:
-            lines, bad = good_lines(lines)
-            warnings += bad
+            lines = _good_lines(lines, warnings)
         yield lines
-
-
-def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
-    """Split a whole run file; None with faults added to `faults`."""
-    whole = _whole(split_pieces([data], file, faults))
-    if whole is not None:
-        _check_columns(whole.columns, file, whole.header_line, faults)
-    return whole
 
 
 def _whole(pieces: Iterable[Lines]) -> Lines | None:
@@ -144,7 +134,7 @@ def _whole(pieces: Iterable[Lines]) -> Lines | None:
     return replace(every[0], rows=rows, numbers=range(start, start + len(rows)), ended=every[-1].ended)
 
 
-def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[Lines]:
+def split_pieces(blocks: Iterable[bytes], faults: Faults) -> Iterator[Lines]:
     """Split a run file into pieces. A file without header has no piece and a reason in `faults`.
 
     All pieces share one header, complete after the last piece.
@@ -153,7 +143,7 @@ def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> I
     top: Lines | None = None
     above, blank = 0, True
     foot: list[bytes] = []  # it is one if no row follows
-    for lines, ended in _lines(blocks, file, faults):
+    for lines, ended in _lines(blocks, faults):
         if top is None:
             at = next((at for at, line in enumerate(lines) if _names_columns(line)), len(lines))
             for line in lines[:at]:
@@ -162,10 +152,10 @@ def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> I
             above += at
             if at == len(lines):
                 continue
-            names = _names(lines[at], file, above + 1, faults)
+            names = _names(lines[at], above + 1, faults)
             if names is None:
                 return
-            top = Lines(file, header, above + 1, names, [], range(0), ended)
+            top = Lines(faults.file, header, above + 1, names, [], range(0), ended)
             above += 1
             lines = lines[at + 1 :]  # noqa: PLW2901 (the rest of them)
         rows = [*foot, *lines]
@@ -179,7 +169,7 @@ def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> I
         above += end
     if top is None and not faults:
         what = "there is no line that names the columns" if above and not blank else "the file is empty"
-        faults.append(Problem(file, above, 0, what, f"a run starts with the line `{','.join(columns.REQUIRED)}`"))
+        faults.add(what, f"a run starts with the line `{','.join(columns.REQUIRED)}`", above)
     for line in foot:
         header |= _said(line)
 
@@ -188,7 +178,7 @@ _LONGEST_FOOT = 1000
 """Greatest number of lines `# key: value` below the rows; the program writes ten."""
 
 
-def _lines(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[tuple[list[bytes], bool]]:
+def _lines(blocks: Iterable[bytes], faults: Faults) -> Iterator[tuple[list[bytes], bool]]:
     """Yield the lines of each block and whether they end with a line end; only the file's last line may lack it."""
     left = b""
     number = 1
@@ -201,8 +191,7 @@ def _lines(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterato
             number += len(lines)
             yield lines, True
         if len(left) > LONGEST_LINE:
-            what = f"the line has more than {LONGEST_LINE:,} characters"
-            faults.append(Problem(file, number, 0, what, "check which file it is"))
+            faults.add(f"the line has more than {LONGEST_LINE:,} characters", "check which file it is", number)
             return
     if left:
         yield [left], False
@@ -212,9 +201,9 @@ def _names_columns(line: bytes) -> bool:
     return bool(line.strip()) and not line.startswith((b"#", b"\xef\xbb\xbf#"))
 
 
-def _names(line: bytes, file: str, number: int, faults: list[Problem]) -> tuple[str, ...] | None:
+def _names(line: bytes, number: int, faults: Faults) -> tuple[str, ...] | None:
     bad: list[Problem] = []
-    text = decode(line, file, bad)
+    text = decode(line, faults.file, bad)
     faults.extend(replace(problem, line=number) for problem in bad)
     return None if text is None else tuple(name.strip() for name in text.split(","))
 
@@ -235,29 +224,26 @@ def _said(line: bytes) -> dict[str, str]:
     return {key.strip(): value.strip()} if colon else {}
 
 
-def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Problem]) -> None:
+def _check_columns(names: tuple[str, ...], line: int, faults: Faults) -> None:
     unknown = [name for name in names if not columns.is_known(name)]
     for missing in (name for name in columns.REQUIRED if name not in names):
         near = difflib.get_close_matches(missing, unknown, n=1, cutoff=0.5)
         remedy = f"is it `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
         unit = columns.COLUMNS[missing].unit
-        faults.append(Problem(file, line, 0, f"the column `{missing}` [{unit}] is missing", remedy))
-    faults.extend(
-        Problem(file, line, 0, f"the column `{name}` appears here more than once", "remove one")
-        for name in sorted({name for name in names if names.count(name) > 1})
-    )
+        faults.add(f"the column `{missing}` [{unit}] is missing", remedy, line)
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        faults.add(f"the column `{name}` appears here more than once", "remove one", line)
     if columns.CRC in names and names[-1] != columns.CRC:
-        faults.append(Problem(file, line, 0, "the column `crc` must be the last", "it covers all others"))
+        faults.add("the column `crc` must be the last", "it covers all others", line)
 
 
-def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
+def _without_cut_line(lines: Lines, warnings: Faults) -> Lines:
     """Drop a last line without line end unless its CRC is right, because digits may be missing."""
     if lines.ended or not lines.rows:
         return lines
-    number, last = lines.numbers[-1], lines.rows[-1]
-    if columns.CRC in lines.columns and fault_of_line(last, lines.columns) is None:
+    if columns.CRC in lines.columns and fault_of_line(lines.rows[-1], lines.columns) is None:
         return lines
-    warnings.append(Problem(lines.file, number, 0, "the last line was cut off; it is left out"))
+    warnings.add("the last line was cut off; it is left out", line=lines.numbers[-1])
     return lines.keep(slice(0, -1))
 
 
@@ -293,14 +279,13 @@ def _fault_of_fields(fields: list[bytes], names: tuple[str, ...]) -> tuple[str, 
     return None
 
 
-def good_lines(lines: Lines) -> tuple[Lines, list[Problem]]:
-    """Return trusted rows of an interrupted recording in time order, and faults of the others.
+def _good_lines(lines: Lines, warnings: Faults) -> Lines:
+    """Return trusted rows of an interrupted recording in time order, and warn of the others.
 
     After a power cut, pages may be empty, old or reordered. The checksum decides; without one, readable rows with
     rising time are trusted.
     """
     kept: list[tuple[bytes, int]] = []
-    problems: list[Problem] = []
     for number, row in zip(lines.numbers, lines.rows, strict=True):
         # Zeroed pages stand between lines without a line end of their own.
         for piece in row.split(b"\0"):
@@ -310,11 +295,11 @@ def good_lines(lines: Lines) -> tuple[Lines, list[Problem]]:
             if fault is None:
                 kept.append((piece, number))
             else:
-                problems.append(Problem(lines.file, number, 0, f"{fault[0]}; it is left out"))
-    return _in_time_order(lines, kept, problems), problems
+                warnings.add(f"{fault[0]}; it is left out", line=number)
+    return _in_time_order(lines, kept, warnings)
 
 
-def _in_time_order(lines: Lines, kept: list[tuple[bytes, int]], problems: list[Problem]) -> Lines:
+def _in_time_order(lines: Lines, kept: list[tuple[bytes, int]], warnings: Faults) -> Lines:
     at = lines.columns.index(columns.TIME)
     times = [float(row.split(b",")[at]) for row, _ in kept]
     order = sorted(range(len(kept)), key=times.__getitem__)
@@ -325,15 +310,14 @@ def _in_time_order(lines: Lines, kept: list[tuple[bytes, int]], problems: list[P
         what = (
             f"time runs backwards here: t_s {times[end]:g} after {times[end - 1]:g}; the lines from here are left out"
         )
-        problems.append(Problem(lines.file, kept[end][1], 0, what))
+        warnings.add(what, line=kept[end][1])
         order = list(range(end))
     elif moved:
-        problems.append(Problem.of(lines.file, "lines were found out of order; they are sorted by time"))
+        warnings.add("lines were found out of order; they are sorted by time")
     chosen: list[int] = []
     for index in order:
         if not chosen or times[index] > times[chosen[-1]]:
             chosen.append(index)
         elif kept[index][0] != kept[chosen[-1]][0]:
-            what = f"time stands still here: t_s {times[index]:g}; it is left out"
-            problems.append(Problem(lines.file, kept[index][1], 0, what))
+            warnings.add(f"time stands still here: t_s {times[index]:g}; it is left out", line=kept[index][1])
     return replace(lines, rows=[kept[i][0] for i in chosen], numbers=[kept[i][1] for i in chosen], ended=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, refuse
 from dbbstation.files.formats.session import LogMark, Seal, SessionFile
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.places import SESSION_FILE
@@ -25,7 +25,7 @@ from dbbstation.files.recordings.seal import (
 )
 from dbbstation.files.recordings.session_state import SEALED, Stands, data_of, mark_of, standing
 from dbbstation.files.recordings.session_store import SessionStore, log_faults
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import text_in
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
@@ -101,20 +101,16 @@ def sealing(folder: Path) -> Sealing:
         InputError: no session file, no list of runs, a missing file, or a change of what was sealed.
     """
     path = folder if folder.is_file() else folder / SESSION_FILE
-    faults: list[Problem] = []
-    data = read_bytes(path, faults)
-    text = None if data is None else decode(data, str(path), faults)
+    faults = Faults(path)
+    text = text_in(path, faults)
     if text is None or parse_yaml(text, str(path), faults) is None:
         raise InputError(faults)
     hashed, files = _with_hashes(text, path)
     runs, seal, log = _chain(hashed, path)
-    faults += [
-        Problem.of(path, f"run {run.label} is of {wrong}: it is not sealed", "set its date right")
-        for run in runs
-        if run.started is not None
-        and not (run.instrument and run.instrument.virtual)
-        and (wrong := impossible_day(run.started))
-    ]
+    for run in runs:
+        real = not (run.instrument and run.instrument.virtual)
+        if run.started is not None and real and (wrong := impossible_day(run.started)):
+            faults.add(f"run {run.label} is of {wrong}: it is not sealed", "set its date right")
     refuse(faults)
     whole, linked = _with_links(hashed, path, runs)
     spoilt = [copy for copy, digest in _copies(seal).items() if hashes(path.parent, (copy,)).get(copy) != digest]
@@ -126,7 +122,7 @@ def _copies(seal: Seal) -> dict[str, str]:
 
 
 def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
-    faults: list[Problem] = []
+    faults = Faults(path)
     additions: list[tuple[int, str]] = []
     named = []
     for run in _runs(text, path):
@@ -137,8 +133,7 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
         recorded = path.parent / file.value
         if not recorded.is_file():
             place = (file.start_mark.line + 1, file.start_mark.column + 1)
-            what = f"the run file {file.value} is missing"
-            faults.append(Problem(str(path), *place, what, "put it there or leave the run out"))
+            faults.add(f"the run file {file.value} is missing", "put it there or leave the run out", *place)
             continue
         additions.append(_behind(run, "file", f"sha256: {digest_of(recorded)}", text))
         named.append(file.value)
@@ -147,7 +142,7 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog | None]:
-    faults: list[Problem] = []
+    faults = Faults(path)
     document = parse_yaml(text, str(path), faults)
     session = None if document is None else validate(document, SessionFile, path.parent)
     if session is None:
@@ -160,18 +155,16 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog 
     if seal is None:
         sealed = sealed_names(folder, names)
         found = hashes(folder, sealed)
-        faults += [
-            Problem.of(path, f"there is no file `{name}` to be sealed", "put it there")
-            for name in sealed
-            if name not in found
-        ]
+        for name in sealed:
+            if name not in found:
+                faults.add(f"there is no file `{name}` to be sealed", "put it there")
     else:
         found = dict(seal.files)
         faults += seal_faults(folder, path, seal, names, [run for run in runs if run.chain_sha256 or not run.sha256])
     linked = chained(runs)
     if [run.label for run in linked] != [run.label for run in runs]:
         what = "runs without a link in the chain stand before runs that have one"
-        faults.append(Problem.of(path, what, "put them behind the runs that are sealed"))
+        faults.add(what, "put them behind the runs that are sealed")
     refuse(faults)
     over = sealed_over(found, linked)
     return linked, over if seal is None else replace(over, log=seal.log), log

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, TraceError, refuse
+from dbbstation.errors import Faults, InputError, Problem, TraceError, refuse
 from dbbstation.facts.quantities import Quantity
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
@@ -24,7 +24,7 @@ from dbbstation.files.recordings.run_csv import (
     counts_in,
     read_run,
 )
-from dbbstation.files.recordings.run_lines import split_file
+from dbbstation.files.recordings.run_lines import split_pieces
 from dbbstation.files.recordings.seal import seal_faults
 from dbbstation.files.recordings.session_checks import check_bar, check_runs, check_set_up_errors, mounted_name
 from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
@@ -194,8 +194,7 @@ class SessionFolder(SessionDetails):
         return ""
 
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
-        circle, file = self.circle(run), str(run.path)
-        faults = []
+        circle, faults = self.circle(run), Faults(run.path)
         bar = circle.bar_mm
         length = float(np.median(recording.length_mm))
         likely = Quantity("mm", (1.0 - _UNLIKE_RADIUS) * bar, (1.0 + _UNLIKE_RADIUS) * bar)
@@ -205,17 +204,17 @@ class SessionFolder(SessionDetails):
             if not guess and abs(length) < _UNLIKE_RADIUS * bar:
                 guess = " (it looks like a deviation from the radius)"
             remedy = "give the whole distance between the balls in mm, nothing taken off"
-            faults.append(Problem.of(file, what + guess, remedy))
+            faults.add(what + guess, remedy)
         if run.state is RunState.RECORDING:
             return faults
         expected = 360.0 / circle.turning_deg_s
         duration = float(recording.t_s[-1] - recording.t_s[0])
         if not _FASTEST * expected < duration < _SLOWEST * expected:
             what = f"t_s spans {duration:g}, a turn takes {expected:.1f} s at the plan's feed"
-            faults.append(Problem.of(file, what, "give t_s in seconds, and the feed that was programmed"))
+            faults.add(what, "give t_s in seconds, and the feed that was programmed")
         if recording.theta_deg is not None and np.ptp(recording.theta_deg) < np.pi * 2.0 + 0.1:
             what = f"theta_deg spans {np.ptp(recording.theta_deg):.3f} only (it looks like rad)"
-            faults.append(Problem.of(file, what, "give a full turn in degrees"))
+            faults.add(what, "give a full turn in degrees")
         return faults
 
 
@@ -324,14 +323,11 @@ def _unlisted(folder: Path, entries: Sequence[RunEntry], plan: Plan, faults: lis
     found = []
     for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):
         entry = None if path.name in listed else part_entry(path)
-        if entry is None or path.name in listed:
-            continue
-        if entry.test not in plan.tests:
-            faults.append(
-                Problem(str(path), 1, 0, f"the plan has no test `{entry.test}`: this is a run of another plan")
-            )
-        else:
+        if entry is not None and entry.test in plan.tests:
             found.append(entry)
+        elif entry is not None:
+            what = f"the plan has no test `{entry.test}`: this is a run of another plan"
+            faults.append(Problem.of(path, what, line=1))
     return found
 
 
@@ -344,9 +340,8 @@ def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
 
 def part_entry(path: Path) -> RunEntry | None:
     """Return the entry that a run file states in its header, or None."""
-    data = read_bytes(path, [])
-    lines = None if data is None else split_file(data, str(path), [])
-    header = {} if lines is None else lines.header
+    pieces = list(split_pieces([read_bytes(path, []) or b""], Faults(path)))
+    header = pieces[0].header if pieces else {}
     repeat = count_in(header.get("repeat", ""))
     if not header.get("test") or header.get("direction") not in set(Direction) or repeat is None:
         return None
@@ -361,9 +356,9 @@ def part_entry(path: Path) -> RunEntry | None:
 
 
 def _header_faults(run: RunEntry, header: Mapping[str, str]) -> list[Problem]:
-    faults = []
+    faults = Faults(run.path)
     for key, expected in (("test", run.test), ("direction", str(run.direction)), ("repeat", str(run.repeat))):
         if header.get(key, expected) != expected:
             what = f"the file is {key} `{header[key]}`, the session calls it {key} `{expected}`"
-            faults.append(Problem.of(run.path, what, "check which file belongs to which run"))
+            faults.add(what, "check which file belongs to which run")
     return faults

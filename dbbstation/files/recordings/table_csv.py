@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, Problem, refuse
 from dbbstation.files.csv_rows import csv_cells, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
@@ -63,7 +63,7 @@ class TableFile:
 
     def faults_of(self, name: str) -> list[Problem]:
         """Return a column's cells that are neither numbers nor empty, with their lines."""
-        found: list[Problem] = []
+        found = Faults(self.file)
         if np.isfinite(self.values[name]).all():
             return found
         comma = next((cell for cell in self.cells[name] if _COMMA.fullmatch(cell)), None)
@@ -71,11 +71,12 @@ class TableFile:
             _COMMA.fullmatch(cell) or _WHOLE.fullmatch(cell) or cell.lower() in NO_NUMBER for cell in self.cells[name]
         ):
             what = f"{name} has decimal commas, such as `{shortened(comma)}`"
-            return [Problem(self.file, self.header, 0, what, "state the decimal sign: `--decimal ,`")]
+            found.add(what, "state the decimal sign: `--decimal ,`", self.header)
+            return found
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
             if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
                 what = f"{name} is `{shortened(cell)}`, not a finite number"
-                found.append(Problem(self.file, line, 0, what, "correct the cell, or leave it empty"))
+                found.add(what, "correct the cell, or leave it empty", line)
         return found
 
     def is_text(self, name: str) -> bool:
@@ -109,14 +110,14 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
     names = [name.strip() for name in csv_cells(head, separator, file, header)]
     faults = _faults_of_names(names, needed, file, header)
     if not faults and len(lines) == 1:
-        faults.append(Problem(file, header, 0, "there are no rows below this line"))
+        faults.add("there are no rows below this line", line=header)
     rows, places = [], []
     for number, line in lines[1:]:
         cells = [cell.strip() for cell in csv_cells(line, separator, file, number)]
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
             remedy = f"compare the line with the header; {(numbers or PLAIN).text}"
-            faults.append(Problem(file, number, 0, what, remedy))
+            faults.add(what, remedy, number)
             continue
         rows.append(cells)
         places.append(number)
@@ -201,14 +202,13 @@ def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
     return csv_text([names, *rows])
 
 
-def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> list[Problem]:
-    faults = [
-        Problem(file, line, 0, f"the column `{name}` appears here more than once", "rename one")
-        for name, times in sorted(Counter(filter(None, names)).items())
-        if times > 1
-    ]
+def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> Faults:
+    faults = Faults(file)
+    for name, times in sorted(Counter(filter(None, names)).items()):
+        if times > 1:
+            faults.add(f"the column `{name}` appears here more than once", "rename one", line)
     if "" in names:
-        faults.append(Problem(file, line, 0, f"column {names.index('') + 1} has no name", "name it"))
+        faults.add(f"column {names.index('') + 1} has no name", "name it", line)
     there = set(names)
     faults += [missing_column(name, names, file, line) for name in dict.fromkeys(needed) if name not in there]
     return faults

@@ -20,7 +20,7 @@ from ruamel.yaml.reader import ReaderError
 from ruamel.yaml.scanner import Scanner
 
 from dbbstation.errors import Problem, few
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import shortened, text_in
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,8 +100,7 @@ LONGEST_S = 60.0
 
 def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
     """Read a YAML file; None with reasons added to `faults`."""
-    data = read_bytes(path, faults, LARGEST_BYTES)
-    text = None if data is None else decode(data, str(path), faults)
+    text = text_in(path, faults)
     return None if text is None else parse_yaml(text, str(path), faults)
 
 

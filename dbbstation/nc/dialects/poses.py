@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import Faults, refuse
 from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.toolpath import RowKind, Toolpath, ToolpathBuilder, rounded
 from dbbstation.nc.words import CannotSayError, digits
@@ -51,34 +51,28 @@ class Poses(Dialect):
 
     def read(self, text: str, name: str, *, start: Floats | None = None) -> Toolpath:  # type: ignore[override]  # takes no setup
         """Return the moves of a table."""
-        path, faults, named = ToolpathBuilder(name, start), [], False
+        path, faults, named = ToolpathBuilder(name, start), Faults(name), False
         for line, row in enumerate(csv.reader(text.splitlines()), 1):
             if row and row[0].startswith("#"):
                 path.say(RowKind.COMMENT, ",".join(row).removeprefix("# "), line=line)
             elif not named and row:
                 named = True
                 if ",".join(each.strip() for each in row) != COLUMNS:
-                    faults.append(Problem(name, line, 1, "the columns are others", f"name them {COLUMNS}"))
+                    faults.add("the columns are others", f"name them {COLUMNS}", line, 1)
             elif row:
-                self._move(
-                    path,
-                    row,
-                    Problem(name, line, 1, "no pose and feed", "give seven numbers, the feed empty in rapids"),
-                    faults,
-                )
-        if faults:
-            raise InputError(faults[:20])
+                self._move(path, row, line, faults)
+        refuse(faults[:20])
         return path.built()
 
     @staticmethod
-    def _move(path: ToolpathBuilder, row: list[str], fault: Problem, faults: list[Problem]) -> None:
+    def _move(path: ToolpathBuilder, row: list[str], line: int, faults: Faults) -> None:
         try:
             pose, feed = np.array([float(each) for each in row[:6]]), float(row[6]) if row[6].strip() else 0.0
         except (ValueError, IndexError):
             pose, feed = np.full(6, np.nan), -1.0
         if len(row) != len(COLUMNS.split(",")) or not np.isfinite([*pose, feed]).all() or feed < 0.0:
-            faults.append(fault)
+            faults.add("no pose and feed", "give seven numbers, the feed empty in rapids", line, 1)
         elif feed > 0.0:
-            path.feed(pose[None], feed, line=fault.line)
+            path.feed(pose[None], feed, line=line)
         else:
-            path.rapid(pose, line=fault.line)
+            path.rapid(pose, line=line)

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Generic, Protocol, TypeVar
 
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import InputError, Problem, StationError, refuse
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -156,8 +156,7 @@ def files_of_packages(group: str, own: Iterable[Path], *, called: str) -> dict[s
                 faults.append(_taken(point.place, f"{called} `{path.stem}`", whose[path.stem]))
             else:
                 files[path.stem], whose[path.stem] = path, point.place.file
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return dict(sorted(files.items()))
 
 

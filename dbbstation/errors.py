@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import errno
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.text.written import natural, on_one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Iterable, Sequence
+
+Thing = TypeVar("Thing")
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, order=True)
@@ -133,6 +136,23 @@ def refuse(faults: Collection[Problem]) -> None:
     """
     if faults:
         raise InputError(faults)
+
+
+def read_each(read: Callable[[Thing], Read], things: Iterable[Thing]) -> list[Read]:
+    """Return what is read of each thing.
+
+    Raises:
+        InputError: the faults of all.
+    """
+    found: list[Read] = []
+    faults: list[Problem] = []
+    for one in things:
+        try:
+            found.append(read(one))
+        except InputError as error:
+            faults += error.problems
+    refuse(faults)
+    return found
 
 
 class ArgumentError(StationError, ValueError):

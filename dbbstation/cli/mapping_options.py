@@ -12,7 +12,7 @@ import click
 from dbbstation.cli.instrument_options import ZERO_MM
 from dbbstation.cli.output import say
 from dbbstation.cli.shop import shop_settings
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import InputError, read_each
 from dbbstation.files.formats.number_language import SEPARATORS, number_language
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
@@ -140,15 +140,7 @@ def read_tables(files: Sequence[Path], options: MappingOptions) -> dict[Path, Fo
         mapping = read_mapping(kept)
         language, encoding = mapping.numbers, mapping.encoding
     shops = shops_numbers() if language is None else None
-    found: dict[Path, ForeignTable] = {}
-    faults: list[Problem] = []
-    for path in files:
-        try:
-            found[path] = _read(path, language, shops, encoding)
-        except InputError as error:
-            faults += error.problems
-    refuse(faults)
-    return found
+    return dict(zip(files, read_each(lambda path: _read(path, language, shops, encoding), files), strict=True))
 
 
 def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | None, encoding: str) -> ForeignTable:

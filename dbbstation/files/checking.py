@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, TravelError, few
+from dbbstation.errors import Faults, InputError, Problem, TravelError, few
 from dbbstation.facts.serialise import adapter
 from dbbstation.files.formats.bar import BarFile, parse_bar
 from dbbstation.files.formats.jig import JigFile, parse_jig
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     from dbbstation.facts.record import Record
     from dbbstation.files.formats.session import RunEntry
-    from dbbstation.files.formats.settings import Settings
     from dbbstation.files.yaml.schema import Schema
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.quality.judge import Judgement
@@ -106,6 +105,17 @@ class Checked:
 def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
     """Check one file of any format, or a session folder."""
     checked = Checked(path)
+    try:
+        _look(checked, known_sources)
+    except InputError as error:
+        checked.problems += error.problems
+    if checked.problems:
+        checked.summary = ""
+    return checked
+
+
+def _look(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
+    path = checked.path
     if path.is_dir():
         if (path / SESSION_FILE).exists():
             document = load_yaml(path / SESSION_FILE, [])
@@ -122,9 +132,6 @@ def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
             _run(checked)
     else:
         _yaml(checked, known_sources)
-    if checked.problems:
-        checked.summary = ""
-    return checked
 
 
 def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
@@ -152,14 +159,6 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
     what = "the file does not say what format it has" if given is None else f"`{given}` is no format"
     formats = ", ".join((*SCHEMAS, "dbb-instrument/1"))
     checked.problems.append(document.problem(("format",), what, f"begin it with `format: `, one of {formats}"))
-
-
-def _settings(path: Path, faults: list[Problem]) -> Settings | None:
-    try:
-        return read_settings([path])
-    except InputError as error:
-        faults += error.problems
-        return None
 
 
 def _model(model: IdentifiedModel) -> str:
@@ -190,7 +189,10 @@ _READERS: dict[str, tuple[Callable[..., Any], Callable[[Any], str]]] = {
         lambda one: f"jig with {_count(len(one.jig.bores), 'bore')}, {_count(len(one.balls), 'ball')}",
     ),
     "dbb-model": (parse_model, _model),
-    "dbb-settings": (_settings, lambda one: f"settings: {_count(len(one.values) + len(one.tolerances), 'value')}"),
+    "dbb-settings": (
+        lambda path, _faults: read_settings([path]),
+        lambda one: f"settings: {_count(len(one.values) + len(one.tolerances), 'value')}",
+    ),
     "dbb-bar": (parse_bar, _bar),
     "dbb-job": (parse_job, _job),
     "dbb-mapping": (parse_mapping, lambda mapping: f"mapping of {_count(len(mapping.columns), 'column')}"),
@@ -200,11 +202,7 @@ _READERS: dict[str, tuple[Callable[..., Any], Callable[[Any], str]]] = {
 
 
 def _run(checked: Checked) -> None:
-    try:
-        run = read_run(checked.path)
-    except InputError as error:
-        checked.problems += error.problems
-        return
+    run = read_run(checked.path)
     checked.warnings += run.warnings
     if checked.path.suffix != PART:  # the good lines of a run that died are what they are
         checked.problems += _implausible(checked.path, run.recording)
@@ -216,28 +214,23 @@ def _run(checked: Checked) -> None:
 
 
 def _implausible(path: Path, recording: Recording) -> list[Problem]:
-    faults = []
+    faults = Faults(path)
     usable = np.arange(len(recording)) if recording.usable is None else np.flatnonzero(recording.usable)
     if len(usable) < FEWEST_SAMPLES:
         what = f"{_count(len(usable), 'usable sample')}: a circle takes {FEWEST_SAMPLES} at the least"
-        faults.append(Problem.of(path, what, "check that it is the whole recording, and what `status` says"))
+        faults.add(what, "check that it is the whole recording, and what `status` says")
     lengths = recording.length_mm[usable]
     wrong = np.flatnonzero((lengths < BAR_LENGTH.least) | (lengths > BAR_LENGTH.most))
     if wrong.size:
         found = float(lengths[wrong[0]])
         what = f"length_mm is {found:g} in sample {usable[wrong[0]] + 1}, expected {BAR_LENGTH.range}{BAR_LENGTH.guess(found)}"
         more = f"; {wrong.size - 1} more are so" if wrong.size > 1 else ""
-        remedy = "give the whole distance between the balls in mm, nothing taken off"
-        faults.append(Problem.of(path, what + more, remedy))
+        faults.add(what + more, "give the whole distance between the balls in mm, nothing taken off")
     return faults
 
 
 def _drive(checked: Checked) -> None:
-    try:
-        drive = read_drive(checked.path)
-    except InputError as error:
-        checked.problems += error.problems
-        return
+    drive = read_drive(checked.path)
     checked.warnings += drive.warnings
     t = drive.numbers["t_s"]
     checked.summary = f"drive: {_count(len(t), 'sample')} in {t[-1] - t[0]:.1f} s"

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import added, in_folders, installed, looked_up
-from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.errors import Problem, StationError, refuse
 from dbbstation.nc import dialects
 from dbbstation.nc.dialect import Dialect
 
@@ -36,8 +36,7 @@ def known_dialects() -> Mapping[str, Dialect]:
     whose: dict[str, str] = {}
     for other in installed(GROUP, Dialect, faults):  # type: ignore[type-abstract]  # what derives from it is made
         added(found, whose, other.kind(), other.place, called="an NC dialect", faults=faults)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return MappingProxyType(dict(sorted(found.items())))
 
 

@@ -188,25 +188,15 @@ def _tables(
             faults += table.faults_of(name)
             missing = np.flatnonzero(~np.isfinite(table.values[name]))
             if len(missing) and not table.faults_of(name):
-                what = f"{name} has no number"
-                faults.append(
-                    Problem(table.file, int(table.lines[missing[0]]), 0, what, "leave out the row, or fill it")
-                )
+                line = int(table.lines[missing[0]])
+                faults.append(Problem.of(path, f"{name} has no number", "leave out the row, or fill it", line))
         back = np.flatnonzero(np.diff(table.values[file.time]) <= 0.0)
         if len(back):
-            what = f"{file.time} does not rise"
-            faults.append(
-                Problem(
-                    table.file,
-                    int(table.lines[back[0] + 1]),
-                    0,
-                    what,
-                    "order the rows by time, and put each run into its own file",
-                )
-            )
+            remedy = "order the rows by time, and put each run into its own file"
+            faults.append(Problem.of(path, f"{file.time} does not rise", remedy, int(table.lines[back[0] + 1])))
     if not faults and sum(map(len, found)) < FEWEST_ROWS:
         what = f"{sum(map(len, found))} rows are too few to compare, {FEWEST_ROWS} are needed"
-        faults.append(Problem(found[0].file, found[0].header, 0, what, "record more"))
+        faults.append(Problem.of(found[0].file, what, "record more", found[0].header))
     return tuple(found)
 
 

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dbbstation.catalogue import FoundClass, added, in_folders, installed, looked_up
-from dbbstation.errors import InputError, ModelError, Problem
+from dbbstation.errors import InputError, ModelError, Problem, refuse
 from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
 from dbbstation.sources.trial import trial_machine, tried, undeclared
@@ -36,8 +36,7 @@ def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
     faults: list[Problem] = []
     others = installed(GROUP, _BASE, faults)
     found, whose = _with(in_folders(_BASE, causes, unmodelled), {}, others, faults)
-    if faults:
-        raise InputError(faults)
+    refuse(faults)
     return found, whose
 
 

@@ -59,9 +59,7 @@ def check_session(
 def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> list[Problem]:
     if instrument is None or (not session.runs and session.virtual is None):
         return []
-    if session.virtual is None and not instrument.virtual:
-        return []
-    if session.virtual is instrument.virtual:
+    if bool(session.virtual) is instrument.virtual:
         return []
     kinds = {True: "a virtual machine", False: "a real machine", None: "a machine that is not noted as virtual"}
     what = f"this session is of {kinds[session.virtual]}, and {instrument.text} is that of {kinds[instrument.virtual]}"
@@ -74,8 +72,7 @@ def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | N
     Raises:
         InputError: they would be mixed.
     """
-    faults = _mixed(folder, session, instrument)
-    refuse(faults)
+    refuse(_mixed(folder, session, instrument))
 
 
 def open_session(

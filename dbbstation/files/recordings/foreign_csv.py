@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows
 from dbbstation.files.formats.number_language import NumberLanguage, is_number
 from dbbstation.files.recordings.table_csv import TableFile, parse_table
-from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened, without_faults
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,14 +76,11 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     Raises:
         InputError: it cannot be read, has no table, or rows of different width.
     """
-    faults: list[Problem] = []
-    data = read_bytes(path, faults, LARGEST_TABLE)
-    encoding = encoding or _encoding(data or b"")
-    if data is not None and encoding not in _WIDE and (kind := kind_of(data)) is not None:
-        raise InputError([Problem(str(path), 1, 1, *kind)])
-    text = None if data is None else _text(data, str(path), encoding, faults)
-    if data is None or text is None:
-        raise InputError(faults)
+    data = without_faults(lambda faults: read_bytes(path, faults, LARGEST_TABLE))
+    encoding = encoding or _encoding(data)
+    if encoding not in _WIDE and (kind := kind_of(data)) is not None:
+        raise InputError.of(path, *kind, 1, 1)
+    text = _text(data, str(path), encoding)
     lines = _without_end(text.replace(_MINUS, "-").splitlines())
     chosen = language or _language(lines, str(path))
     lines = _without_last_separator(lines, chosen.separator)
@@ -128,20 +125,14 @@ def _no_table(lines: list[str], language: NumberLanguage, file: str, stated: str
     groups = [len(re.findall(r"\d+", line)) for line in lines[:_LOOKED_AT]]
     most = max(groups, default=0)
     if most < 2:  # noqa: PLR2004 - a row has two numbers
-        return Problem.of(
-            file, "there is no table of numbers in this file", f"check which file it is; {language.text}{stated}"
-        )
+        what = "there is no table of numbers in this file"
+        return Problem.of(file, what, f"check which file it is; {language.text}{stated}")
     line = groups.index(most) + 1
     what = (
         f"there is no table of numbers in this file; the line `{shortened(lines[line - 1].strip())}` is no row of one"
     )
-    return Problem(
-        file,
-        line,
-        1,
-        what,
-        f"state --decimal and --separator, or check which file it is; the file was read with this assumption: {language.text}{stated}",
-    )
+    remedy = f"state --decimal and --separator, or check which file it is; the file was read with this assumption: {language.text}{stated}"
+    return Problem.of(file, what, remedy, line, 1)
 
 
 def _without_last_separator(lines: list[str], separator: str) -> list[str]:
@@ -172,24 +163,23 @@ def _without_end(lines: list[str]) -> list[str]:
     return lines if last is None or not re.fullmatch(r"\s*(END|EOF|ENDE)\s*", lines[last]) else lines[:last]
 
 
-def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str | None:
+def _text(data: bytes, file: str, encoding: str) -> str:
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encoding = "utf-16"
     if encoding == "utf-8" or data.startswith(codecs.BOM_UTF8):
         found: list[Problem] = []
-        text = decode(data, file, found)
+        if (text := decode(data, file, found)) is not None:
+            return text
         remedy = (
             "say --encoding cp1252 where a western Windows program wrote it (cp1250 central European, cp1251 Cyrillic, cp932 Japanese, gb18030 "
             "Chinese), or save it as UTF-8"
         )
-        faults += [Problem(one.file, one.line, one.column, one.what, remedy) for one in found]
-        return text
+        raise InputError([replace(one, remedy=remedy) for one in found])
     try:
         return data.decode(encoding)
     except UnicodeDecodeError as error:
         what = f"byte {data[error.start]:#04x} at position {error.start} is no {encoding} text"
-        faults.append(Problem.of(file, what, "give another --encoding, or save the file as UTF-8"))
-        return None
+        raise InputError.of(file, what, "give another --encoding, or save the file as UTF-8") from error
 
 
 _WIDE = ("utf-16-be", "utf-16-le")

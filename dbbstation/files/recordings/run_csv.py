@@ -30,28 +30,25 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.run_lines import Lines
 
 
-class Counted:
+class Counted(Faults):
     """The first faults of a file, and their count."""
 
-    def __init__(self) -> None:
-        self.first: list[Problem] = []
-        self.count = 0
+    number = 0
 
-    def add(self, problems: Iterable[Problem]) -> None:
-        """Count faults and keep the first."""
-        for problem in problems:
-            self.count += 1
-            if len(self.first) <= MOST_FAULTS:
-                self.first.append(problem)
+    def append(self, fault: Problem) -> None:
+        """Count a fault and keep the first."""
+        self.number += 1
+        if len(self) <= MOST_FAULTS:
+            super().append(fault)
 
     @property
     def enough(self) -> bool:
         """Return whether further lines need not be read."""
-        return self.count >= _MOST_COUNTED
+        return self.number >= _MOST_COUNTED
 
     def told(self) -> list[Problem]:
         """Return the first faults, and how many follow."""
-        return few(self.first, self.count)
+        return few(self, self.number)
 
 
 _MOST_COUNTED = 10_000
@@ -61,8 +58,8 @@ _MOST_COUNTED = 10_000
 class Numbers:
     """Numeric columns of a run file, 8 bytes a number."""
 
-    def __init__(self) -> None:
-        self.faults = Counted()
+    def __init__(self, file: str) -> None:
+        self.faults = Counted(file)
         self._parts: dict[str, list[Floats]] = {}
         self._last: Lines | None = None
 
@@ -73,18 +70,18 @@ class Numbers:
             return
         numbers = _numbers_in(lines)
         if numbers is None:
-            self.faults.add(_faults_of_lines(lines))
-        elif not self.faults.count:
+            _check_lines(lines, self.faults)
+        elif not self.faults.number:
             for name, values in numbers.items():
                 self._parts.setdefault(name, []).append(values)
 
     def columns(self) -> dict[str, Floats]:
         """Return every numeric column, shape (n,), and release the pieces; faults are added to `faults`."""
         last = self._last
-        if self.faults.count or last is None:
+        if self.faults.number or last is None:
             return {}
         if not self._parts:
-            self.faults.add([Problem(last.file, last.header_line, 0, "there are no samples below this line")])
+            self.faults.add("there are no samples below this line", line=last.header_line)
             return {}
         # One column after the other, so that no more than one stands twice in the memory.
         joined = {name: np.concatenate(self._parts.pop(name)) for name in list(self._parts)}
@@ -92,8 +89,8 @@ class Numbers:
         numbers = (
             last.numbers if len(last.numbers) == count else range(last.header_line + 1, last.header_line + 1 + count)
         )
-        self.faults.add(_faults_of_time(last.file, joined[columns.TIME], numbers))
-        self.faults.add(_faults_of_size(last.file, joined, numbers))
+        _check_time(joined[columns.TIME], numbers, self.faults)
+        _check_sizes(joined, numbers, self.faults)
         return joined
 
 
@@ -111,33 +108,29 @@ def _numbers_in(lines: Lines) -> dict[str, Floats] | None:
     return {name: table[:, i].copy() for i, name in enumerate(names)}
 
 
-def _faults_of_lines(lines: Lines) -> Iterator[Problem]:
-    found = False
+def _check_lines(lines: Lines, faults: Counted) -> None:
+    before = faults.number
     for number, row in zip(lines.numbers, lines.rows, strict=True):
         fault = fault_of_line(row, lines.columns)
         if fault is not None:
-            found = True
-            yield Problem(lines.file, number, 0, *fault)
-    if not found:
-        what = "NumPy reads this file otherwise than line by line"
-        yield Problem.of(lines.file, what, "write plain decimal numbers")
+            faults.add(*fault, number)
+    if faults.number == before:
+        faults.add("NumPy reads this file otherwise than line by line", "write plain decimal numbers")
 
 
-def _faults_of_time(file: str, t_s: Floats, numbers: Sequence[int]) -> Iterator[Problem]:
+def _check_time(t_s: Floats, numbers: Sequence[int], faults: Faults) -> None:
     for index in (np.flatnonzero(t_s[1:] <= t_s[:-1]) + 1).tolist():
         what = "runs backwards" if t_s[index] < t_s[index - 1] else "stands still"
         what = f"time {what} here: t_s {t_s[index]:g} after {t_s[index - 1]:g}"
-        remedy = "the file was reordered, or the clock was set while recording"
-        yield Problem(file, numbers[index], 0, what, remedy)
+        faults.add(what, "the file was reordered, or the clock was set while recording", numbers[index])
 
 
-def _faults_of_size(file: str, found: dict[str, Floats], numbers: Sequence[int]) -> Iterator[Problem]:
+def _check_sizes(found: dict[str, Floats], numbers: Sequence[int], faults: Faults) -> None:
     for name, values in found.items():
         column = columns.COLUMNS[name]
         for index in np.flatnonzero((values > column.size) | (values < -column.size))[:1].tolist():
             what = f"{name} is {values[index]:g}, sizes up to {column.size:g} {column.unit} are plausible"
-            remedy = f"check the unit, {column.unit} is needed"
-            yield Problem(file, numbers[index], 0, what, remedy)
+            faults.add(what, f"check the unit, {column.unit} is needed", numbers[index])
 
 
 """Ending, after `.csv`, of a run that is being recorded."""
@@ -232,7 +225,7 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
 
 def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
     faults, warnings = Faults(file), Faults(file)
-    numbers = Numbers()
+    numbers = Numbers(file)
     texts: dict[str, list[str]] = {}
     known: dict[bytes, str] = {}
     header: Mapping[str, str] = {}
@@ -241,7 +234,7 @@ def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
         numbers.take(lines)
         if numbers.faults.enough:
             break
-        if not numbers.faults.count:
+        if not numbers.faults.number:
             for name in (name for name in lines.columns if name not in columns.COLUMNS and name != columns.CRC):
                 texts.setdefault(name, []).extend(lines.texts(name, known))
     found = numbers.columns()

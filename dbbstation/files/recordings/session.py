@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import Faults, InputError, Problem, TraceError, refuse
+from dbbstation.errors import Faults, InputError, Problem, TraceError, read_each, refuse
 from dbbstation.facts.quantities import Quantity
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
@@ -163,15 +163,7 @@ class SessionFolder(SessionDetails):
         Raises:
             InputError: every fault of all files.
         """
-        read: list[RunFile] = []
-        faults: list[Problem] = []
-        for run in runs:
-            try:
-                read.append(self.load(run))
-            except InputError as error:
-                faults += error.problems
-        refuse(faults)
-        return read
+        return read_each(self.load, runs)
 
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Return a note if more samples were lost than the plan allows."""

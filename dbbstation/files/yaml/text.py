@@ -19,7 +19,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 from ruamel.yaml.scanner import Scanner
 
-from dbbstation.errors import Problem, few
+from dbbstation.errors import Faults, Problem, few
 from dbbstation.files.source_text import shortened, text_in
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | No
 
 
 def _parsed(text: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
-    faults: list[Problem] = []
+    faults = Faults("")
     return _composed(text, faults), tuple(faults)
 
 
@@ -121,23 +121,23 @@ _of_the_last = functools.lru_cache(maxsize=1)(_parsed)
 _of_many = functools.lru_cache(maxsize=64)(_parsed)
 
 
-def _composed(text: str, faults: list[Problem]) -> YamlDocument | None:
+def _composed(text: str, faults: Faults) -> YamlDocument | None:
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _Counting
     yaml.Scanner = _BoundedScanner
     try:
         root = yaml.compose(text)
     except YAMLError as error:
-        faults.append(_syntax_problem(error, text))
+        _tell_syntax(error, text, faults)
         return None
     except ValueError as error:  # a version of YAML with a thousand digits
-        faults.append(Problem("", 1, 1, f"not YAML: {error}", "compare it with the example of its format"))
+        faults.add(f"not YAML: {error}", "compare it with the example of its format", 1, 1)
         return None
     except _OverBudgetError as error:
-        faults.append(Problem("", *error.place, error.what, "check that it is the right file"))
+        faults.add(error.what, "check that it is the right file", *error.place)
         return None
     if root is None:
-        faults.append(Problem("", 1, 1, "the file is empty", "start it with `format: ` and the format's name"))
+        faults.add("the file is empty", "start it with `format: ` and the format's name", 1, 1)
         return None
     walk = _Walk()
     data = walk.value(root, ())
@@ -189,28 +189,31 @@ class _Counting(Composer):
         return node
 
 
-def _syntax_problem(error: YAMLError, text: str) -> Problem:
+def _tell_syntax(error: YAMLError, text: str, faults: Faults) -> None:
     if isinstance(error, ReaderError):
         before = text[: error.position]
         line, column = before.count("\n") + 1, error.position - (before.rfind("\n") + 1) + 1
-        return Problem("", line, column, f"character {error.character:#04x} is not allowed", "remove it")
+        faults.add(f"character {error.character:#04x} is not allowed", "remove it", line, column)
+        return
     mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
     if not isinstance(error, MarkedYAMLError) or mark is None:
-        return Problem.of("", f"not YAML: {error}", "compare it with the example of its format")
+        faults.add(f"not YAML: {error}", "compare it with the example of its format")
+        return
     place = (mark.line + 1, mark.column + 1)
     said = error.problem or ""
     if "'\\t'" in said:
-        return Problem("", *place, "a tab is used for indentation", "indent with spaces")
-    if "another document" in said:
-        return Problem("", *place, "a second document starts here", "keep one document per file, remove `---`")
-    return Problem("", *place, f"not YAML: {said}", "check brackets, quotes and indentation here and just above")
+        faults.add("a tab is used for indentation", "indent with spaces", *place)
+    elif "another document" in said:
+        faults.add("a second document starts here", "keep one document per file, remove `---`", *place)
+    else:
+        faults.add(f"not YAML: {said}", "check brackets, quotes and indentation here and just above", *place)
 
 
 class _Walk:
     """Turns nodes into data and notes their places."""
 
     def __init__(self) -> None:
-        self.faults: list[Problem] = []
+        self.faults = Faults("")
         self.value_places: dict[Location, tuple[int, int]] = {}
         self.key_places: dict[Location, tuple[int, int]] = {}
         self._open: set[int] = set()
@@ -302,7 +305,7 @@ class _Walk:
             )
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
-        self.faults.append(Problem("", *_place(node), what, remedy))
+        self.faults.add(what, remedy, *_place(node))
 
 
 def _place(node: Node) -> tuple[int, int]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, StationError, refuse
+from dbbstation.errors import InputError, StationError, read_each
 from dbbstation.files.source_text import decode, read_bytes, without_faults
 from dbbstation.nc.commanded import poses_at_progress
 from dbbstation.nc.nominal import check_nominal
@@ -45,16 +45,13 @@ def load_programs(folder: Path, plan: Plan, machine: Machine) -> dict[tuple[str,
         InputError: a program is missing, cannot be read, or runs another circle; every fault of every file.
         TravelError: a program leaves the machine's travel.
     """
-    faults: list[Problem] = []
-    programs = {}
-    for name, test in plan.tests.items():
-        for direction in test.directions:
-            path = _file_of(folder, f"{name}-{direction}", faults)
-            program = None if path is None else _loaded(path, test.run(direction), machine, faults)
-            if program is not None:
-                programs[name, direction] = program
-    refuse(faults)
-    return programs
+
+    def read(run: tuple[str, Direction]) -> RunProgram:
+        test, direction = run
+        return _loaded(_file_of(folder, f"{test}-{direction}"), plan.tests[test].run(direction), machine)
+
+    runs = [(name, direction) for name, test in plan.tests.items() for direction in test.directions]
+    return dict(zip(runs, read_each(read, runs), strict=True))
 
 
 def read_toolpath(path: Path, content: bytes) -> Toolpath:
@@ -68,7 +65,7 @@ def read_toolpath(path: Path, content: bytes) -> Toolpath:
     return dialect_of_file(path.name, text).read(text, str(path))
 
 
-def _file_of(folder: Path, stem: str, faults: list[Problem]) -> Path | None:
+def _file_of(folder: Path, stem: str) -> Path:
     extensions = sorted({dialect.extension for dialect in known_dialects().values()})
     candidates = [folder / (stem + extension) for extension in extensions]
     found = [path for path in candidates if path.is_file()]
@@ -77,26 +74,21 @@ def _file_of(folder: Path, stem: str, faults: list[Problem]) -> Path | None:
     what = f"there is no program {stem}" if not found else f"several programs are called {stem}"
     names = ", ".join(path.name for path in found or candidates)
     remedy = f"write it with `dbbstation program` ({names})" if not found else f"leave one of {names}"
-    faults.append(Problem.of(folder, what, remedy))
-    return None
+    raise InputError.of(folder, what, remedy)
 
 
-def _loaded(path: Path, circle: Circle, machine: Machine, faults: list[Problem]) -> RunProgram | None:
-    content = read_bytes(path, faults)
-    if content is None:
-        return None
+def _loaded(path: Path, circle: Circle, machine: Machine) -> RunProgram:
+    content = without_faults(lambda faults: read_bytes(path, faults))
     try:
         toolpath = read_toolpath(path, content)
         poses_at_progress(toolpath, circle, _PHI_DEG)
         if machine.control is not None:
             check_nominal(toolpath)
-    except InputError as error:
-        faults.extend(error.problems)
-        return None
+    except InputError:
+        raise
     except StationError as error:
         what = f"{error.what}, and the control corrects already: {machine.control.said if machine.control else ''}"
-        faults.append(Problem.of(path, what, "measure with nominal programs"))
-        return None
+        raise InputError.of(path, what, "measure with nominal programs") from error
     check_reach(machine, toolpath)
     named = [match[1] for text in toolpath.text.values() if (match := _MODEL.match(text))]
     return RunProgram(path.name, content, named[0] if named else "")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.errors import InputError, OutputError, Problem, TraceError, refuse
+from dbbstation.errors import InputError, OutputError, TraceError, read_each
 from dbbstation.files.atomic import streamed, write_text
 from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.formats.session import RunState
@@ -71,15 +71,10 @@ def exporting(runs: Sequence[tuple[SessionFolder, RunEntry]]) -> Exporting:
     Raises:
         InputError: there is no run, or a file is no run.
     """
-    faults: list[Problem] = []
-    found: dict[str, None] = {}
-    for _, run in runs:
-        found |= dict.fromkeys(split_head(run.path, faults))
     if not runs:
-        faults.append(
-            Problem.of("export", "no run is left to be exported", "exclude fewer tests, or give another --states")
-        )
-    refuse(faults)
+        raise InputError.of("export", "no run is left to be exported", "exclude fewer tests, or give another --states")
+    heads = read_each(split_head, [run.path for _, run in runs])
+    found = dict.fromkeys(name for head in heads for name in head)
     known = [
         name for name in columns.COLUMNS if name in found and name not in {columns.TIME, columns.THETA, columns.LENGTH}
     ]

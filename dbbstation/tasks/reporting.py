@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.effects import effects_of
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.errors import Problem, StationError, refuse
-from dbbstation.files.source_text import read_bytes
+from dbbstation.errors import InputError, StationError
+from dbbstation.files.source_text import read_bytes, without_faults
 from dbbstation.report.content import Modelled
 from dbbstation.results.model_warnings import lacks_physics
 from dbbstation.results.report_verdict import Ranked
@@ -47,12 +47,11 @@ def logo_of(settings: Settings) -> str:
     """
     if (stated := settings.values.get("report.logo")) is None:
         return ""
-    path, faults = stated.file.parent / stated.value, list[Problem]()
-    data = read_bytes(path, faults, LARGEST_LOGO_BYTES) or b""
+    path = stated.file.parent / stated.value
+    data = without_faults(lambda faults: read_bytes(path, faults, LARGEST_LOGO_BYTES))
     kind = next((kind for begins, kind in _PICTURES.items() if data.startswith(begins)), "")
-    if not kind and not faults:
-        faults.append(Problem.of(path, "no PNG or JPEG picture", f"name one in {stated.origin}"))
-    refuse(faults)
+    if not kind:
+        raise InputError.of(path, "no PNG or JPEG picture", f"name one in {stated.origin}")
     return f"data:image/{kind};base64,{b64encode(data).decode()}"
 
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import NUMBER
-from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable
+from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable, without_faults
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
@@ -208,15 +209,18 @@ def _names(line: bytes, number: int, faults: Faults) -> tuple[str, ...] | None:
     return None if text is None else tuple(name.strip() for name in text.split(","))
 
 
-def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
-    """Return a run file's columns without reading samples. A file without header has none, and a reason in `faults`."""
+def split_head(path: Path) -> tuple[str, ...]:
+    """Return a run file's columns without reading samples; none without a header.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
     try:
         head = first_line(path)
     except OSError as error:
-        faults.append(unreadable(path, error))
-        return ()
-    text = decode(head, str(path), faults)
-    return () if not text else tuple(name.strip() for name in text.split(","))
+        raise InputError([unreadable(path, error)]) from error
+    text = without_faults(lambda faults: decode(head, str(path), faults))
+    return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
 def _said(line: bytes) -> dict[str, str]:

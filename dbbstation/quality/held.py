@@ -17,6 +17,7 @@ from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.limits import SHARE, quantile
 
 if TYPE_CHECKING:
+    from dbbstation.computing.arrays import Integers
     from dbbstation.trace.circle import RawCircle
 
 SHORTEST_S = 1.0
@@ -52,14 +53,22 @@ def chance_of(variance_mm2: float, step_mm: float) -> float:
     return 1.0 / finer if finer > 1.0 else 1.0
 
 
+ALL_EQUAL = "all readings of the turn are the same: the step is not finer than the noise"
+
+
+def equal_readings(raw: RawCircle) -> tuple[Integers, Integers]:
+    """Return the indices of the first and the last reading of each sequence of equal readings."""
+    ends = np.flatnonzero(np.diff(raw.length_mm))
+    return np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+
+
 def moving_noise(raw: RawCircle) -> tuple[float, int, float]:
     """Return the inputs of `chance_equal` from a turn's moving readings: sum of squares [mm²], number, step [mm]."""
     differs = np.abs(np.diff(raw.length_mm))
-    ends = np.flatnonzero(differs)
-    first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+    first, last = equal_readings(raw)
     moving = np.repeat(raw.t_s[last] - raw.t_s[first] < SHORTEST_S, last - first + 1)[1:-1]
     squares = np.diff(raw.length_mm, 2)[moving] ** 2
-    return float(squares.sum()), len(squares), float(np.min(differs[ends]))
+    return float(squares.sum()), len(squares), float(np.min(differs[last[:-1]]))
 
 
 def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
@@ -127,10 +136,9 @@ class HeldLength:
 
 def held(raw: RawCircle) -> Finding:
     """Judge the longest sequence of equal readings."""
-    ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
-    if not len(ends):
-        return undecided(Name.HELD, "all readings of the turn are the same: the step is not finer than the noise", "s")
-    first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+    first, last = equal_readings(raw)
+    if len(first) == 1:
+        return undecided(Name.HELD, ALL_EQUAL, "s")
     durations = raw.t_s[last] - raw.t_s[first]
     longest = int(np.argmax(durations))
     most = equal_limit(*moving_noise(raw), len(raw))

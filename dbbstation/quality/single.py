@@ -10,7 +10,7 @@ from scipy.special import bdtrik
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
-from dbbstation.quality.held import SHORTEST_S, chance_equal, held, moving_noise
+from dbbstation.quality.held import ALL_EQUAL, SHORTEST_S, chance_equal, equal_readings, held, moving_noise
 from dbbstation.quality.knowledge import Others, due_s
 from dbbstation.quality.limits import FEWEST_OTHERS, SHARE, joined, quantile, scale_of
 from dbbstation.quality.spike import spike
@@ -32,12 +32,9 @@ sqrt(0.81); U is stated to two digits."""
 
 def repeated(raw: RawCircle) -> Finding:
     """Judge how many readings repeat the previous reading, except in long standstills."""
-    ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
-    if not len(ends):
-        return undecided(
-            Name.REPEATED, "all readings of the turn are the same: the step is not finer than the noise", "%"
-        )
-    first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+    first, last = equal_readings(raw)
+    if len(first) == 1:
+        return undecided(Name.REPEATED, ALL_EQUAL, "%")
     short = raw.t_s[last] - raw.t_s[first] < SHORTEST_S
     squares_mm2, count, step_mm = moving_noise(raw)
     chance = chance_equal(squares_mm2, count, step_mm)

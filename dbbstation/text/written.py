@@ -96,10 +96,10 @@ def to_its_place(value: float, uncertainty: float) -> tuple[str, str]:
     return f"{value:z.{max(digits, 0)}e}", f"{uncertainty:.{SIGNIFICANT - 1}e}"
 
 
-def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tuple[str, str]:
+def with_uncertainty(value: float, expanded: float | None) -> tuple[str, str]:
     """Return a value and its expanded uncertainty as text with the same decimals."""
     if expanded is None:
-        return f"{value:z.{plain}f}", "-"
+        return f"{value:z.1f}", "-"
     decimals = decimals_of(expanded)
     return f"{value:z.{decimals}f}", f"{expanded:.{decimals}f}"
 

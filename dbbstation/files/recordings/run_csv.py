@@ -211,7 +211,7 @@ def changed(file: str) -> Problem:
     return Problem.of(file, what, "restore the file as recorded, or reject the run")
 
 
-def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False) -> RunFile:
+def parse_run(data: bytes, file: str, *, partial: bool = False) -> RunFile:
     """Parse the bytes of a run file into a checked recording.
 
     Args:
@@ -220,7 +220,7 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     Raises:
         InputError: every fault of the file with its line.
     """
-    return replace(_parsed([data], file, partial=partial), sha256=sha256)
+    return _parsed([data], file, partial=partial)
 
 
 def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:

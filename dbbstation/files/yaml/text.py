@@ -100,7 +100,7 @@ LONGEST_S = 60.0
 
 def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
     """Read a YAML file; None with reasons added to `faults`."""
-    text = text_in(path, faults)
+    text = text_in(path, faults, LARGEST_BYTES)
     return None if text is None else parse_yaml(text, str(path), faults)
 
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import MOST_FAULTS, InputError, Problem, refuse
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
 from dbbstation.files.keys import digests_of, key_of
 from dbbstation.files.own_classes import classes_in_files, module_name, own_instances
 from dbbstation.files.places import real_path
-from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.files.recordings.table_csv import TableFile, read_table
 from dbbstation.laws.contract import PortSource, TableSource
 from dbbstation.simulators.allowed import files_of_simulator
 from dbbstation.simulators.fmu import FmuSimulator, fault_of_fmu

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError, Problem, refuse
+from dbbstation.errors import Faults, InputError, Problem, refuse
 from dbbstation.files.formats.session import ReadBy, RunState, SessionDetails
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_checks import unlike_bar
@@ -53,15 +53,11 @@ def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
         InputError: readings cannot show a test's begin and end; names every such test.
         TravelError: a circle leaves the machine's travel; names test, direction, pose and limit.
     """
-    faults = [
-        Problem.of(
-            file,
-            f"test {test.name} has no feed-in: a recording of it cannot be cut",
-            "give `feed_in_mm` in its path, 1.5 mm is usual",
-        )
-        for test in plan.tests.values()
-        if test.circle.feed_in_mm <= 0.0
-    ]
+    faults = Faults(file)
+    for test in plan.tests.values():
+        if test.circle.feed_in_mm <= 0.0:
+            what = f"test {test.name} has no feed-in: a recording of it cannot be cut"
+            faults.add(what, "give `feed_in_mm` in its path, 1.5 mm is usual")
     refuse(faults)
     plan.check(machine)
 
@@ -73,7 +69,7 @@ def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None
         InputError: a circle or feed-in lies outside; names every such test.
     """
     low_mm, high_mm = range_mm
-    faults = []
+    faults = Faults(file)
     for test in plan.tests.values():
         bar_mm, outside_mm = test.circle.bar_mm, test.circle.bar_mm + test.circle.feed_in_mm
         if low_mm <= bar_mm and outside_mm <= high_mm:
@@ -82,7 +78,7 @@ def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None
             f"test {test.name}: the bar goes from {bar_mm:g} to {outside_mm:g} mm with its feed-in, and the instrument"
         )
         remedy = "take an instrument or a profile with more range, or a shorter `feed_in_mm` in its path"
-        faults.append(Problem.of(file, f"{what} reads {low_mm:g} to {high_mm:g} mm", remedy))
+        faults.add(f"{what} reads {low_mm:g} to {high_mm:g} mm", remedy)
     refuse(faults)
 
 

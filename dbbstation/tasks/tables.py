@@ -13,8 +13,8 @@ import numpy as np
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
-from dbbstation.errors import ArgumentError, InputError, Problem, refuse
-from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, given_table, read_table
+from dbbstation.errors import MOST_FAULTS, ArgumentError, Faults, InputError, Problem, refuse
+from dbbstation.files.recordings.table_csv import TableFile, given_table, read_table
 from dbbstation.inference.triangle import left_by
 from dbbstation.inference.variables import Kind, Variable
 
@@ -137,7 +137,7 @@ def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabula
     """
     needed = [asked.measured, asked.simulated, *(asked.variables or ())]
     needed += [name for name in (asked.run, asked.time) if name is not None and name != ROWS]
-    faults: list[Problem] = []
+    faults = Faults(tables[0] if isinstance(tables[0], Path) else "table 1")
     files: list[TableFile] = []
     for number, one in enumerate(tables, start=1):
         try:
@@ -148,14 +148,13 @@ def load_tables(tables: Sequence[Path | Columns], asked: TableOptions) -> Tabula
             )
         except InputError as error:
             faults += error.problems
-    first = str(tables[0]) if isinstance(tables[0], Path) else "table 1"
     units = {name: meaning_of(name).unit for name in (asked.measured, asked.simulated)}
     if len({unit for unit in units.values() if unit}) > 1:
         said = " and ".join(f"`{name}` in {unit}" for name, unit in units.items())
-        faults.append(Problem.of(first, f"{said} cannot be compared", "give both in the same unit"))
+        faults.add(f"{said} cannot be compared", "give both in the same unit")
     if asked.measured == asked.simulated:
         what = f"`{asked.measured}` is named for measured and for simulated values"
-        faults.append(Problem.of(first, what, "name the column of the simulation"))
+        faults.add(what, "name the column of the simulation")
     certain = [asked.measured, asked.simulated, *(asked.variables or ())]
     faults += [fault for file in files for name in dict.fromkeys(certain) for fault in file.faults_of(name)]
     faults += [fault for file in files for fault in _faults_of_size(file, certain if asked.variables else file.names)]
@@ -213,8 +212,8 @@ LARGEST_RATIO = 1e6
 greater ratio, the difference has no digits of the smaller value."""
 
 
-def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
-    faults = []
+def _faults_of_size(file: TableFile, names: Sequence[str]) -> Faults:
+    faults = Faults(file.file)
     for name in dict.fromkeys(names):
         size = np.abs(np.nan_to_num(file.values[name], nan=0.0, posinf=0.0, neginf=0.0))
         row = int(size.argmax())
@@ -222,7 +221,7 @@ def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
             what = (
                 f"{name} goes up to {size[row]:g}, sizes from {1.0 / LARGEST_SIZE:g} to {LARGEST_SIZE:g} are compared"
             )
-            faults.append(Problem(file.file, int(file.lines[row]), 0, what, "check the column and its unit"))
+            faults.add(what, "check the column and its unit", int(file.lines[row]))
     return faults
 
 
@@ -234,7 +233,7 @@ def _faults_of_scale(files: Sequence[TableFile], asked: TableOptions) -> list[Pr
     what = (
         f"`{more}` goes up to {greatest[more]:g}, `{less}` to {greatest[less]:g}: these are no values of one quantity"
     )
-    return [Problem(files[0].file, files[0].header, 0, what, "give both in the same unit")]
+    return [Problem.of(files[0].file, what, "give both in the same unit", files[0].header)]
 
 
 def _greatest(files: Sequence[TableFile], name: str) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import Faults, InputError, refuse
+from dbbstation.errors import MOST_FAULTS, Faults, InputError, refuse
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
@@ -26,7 +26,6 @@ REASON_COLUMN = "u_not_known_because"
 """Column with the reason for empty uncertainties; its cell is empty if all three are known."""
 WARNING_COLUMN = "model_warning"
 """Column with an objection to the model, the same in all rows; absent without one."""
-MOST_FAULTS = 20
 ELSE = "other tables need --decimal and --separator, or `numbers` in the settings"
 
 

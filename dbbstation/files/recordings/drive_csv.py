@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import Faults, InputError, Problem, refuse
+from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.formats.number_language import PLAIN
-from dbbstation.files.recordings.table_csv import MOST_FAULTS, given_table, parse_table
+from dbbstation.files.recordings.table_csv import given_table, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
 from dbbstation.trace.recording import DriveRecording
 
@@ -115,13 +115,10 @@ def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     faults = Faults(file)
     _check_names(names, header, faults)
     numbers = {name: table.values[name] for name in names if name in LARGEST}
-    faults += [
-        Problem(file, line, 0, f"{name} is `{shortened(cell)}`, not a finite number", "correct or remove the line")
-        for name, values in numbers.items()
-        if not np.isfinite(values).all()
-        for line, cell, value in zip(table.lines.tolist(), table.cells[name], values, strict=True)
-        if not np.isfinite(value)
-    ]
+    for name, values in numbers.items():
+        for k in np.flatnonzero(~np.isfinite(values)).tolist():
+            what = f"{name} is `{shortened(table.cells[name][k])}`, not a finite number"
+            faults.add(what, "correct or remove the line", int(table.lines[k]))
     if not faults:
         _check_values(numbers, table.lines.tolist(), faults)
     refuse(faults[:MOST_FAULTS])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from dbbstation.errors import Faults, InputError, Problem, refuse
+from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.csv_rows import csv_cells, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import LARGEST_TABLE, numbered_lines, shortened, text_of
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
 
 SEPARATORS = ",;\t"
-MOST_FAULTS = 20
 OF_SHEETS = frozenset({"#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#ref!", "#bezug!"})
 """Cells that a spreadsheet could not compute, in small letters."""
 

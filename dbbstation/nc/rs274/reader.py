@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import MOST_FAULTS, InputError, Problem
 from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
 from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 
 from dbbstation.nc.rs274.modes import DWELL, LINEAR, MACHINE, RAPID, TAKES_AXES, Feed, Stored
 from dbbstation.nc.rs274.moves import FARTHEST_DEG, MOST_ROWS, Moves, named_axes, too_long
-
-MOST_FAULTS = 20
-"""Greatest number of reported faults: a program of another language has a fault in every line."""
 
 NO_END = "the program ends without M2, M30 or %: check that it is whole"
 

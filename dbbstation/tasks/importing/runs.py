@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import MOST_FAULTS, InputError, Problem
 from dbbstation.files.formats.mapping import (
     ANGLE,
     DEVIATION,
@@ -30,7 +30,6 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import impossible_day
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.run_csv import count_in
-from dbbstation.files.recordings.table_csv import MOST_FAULTS
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.tasks.importing.moments import UnclearMomentError, moment_of
 from dbbstation.tasks.importing.names import WORDS, RunName, named_by, run_name

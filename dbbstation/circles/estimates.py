@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from dbbstation.circles.extremes import (
 from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
 from dbbstation.circles.strip import strip_widths
+from dbbstation.computing.kept import once_for_each
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -37,17 +37,10 @@ CLEAR = 2.0
 
 def estimate_of(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate | None:
     """Return the estimate of G, G(LS), Fmax or Fmin; None for too few samples."""
-    if not one.noise.known:
-        return None
-    found = _FOUND.setdefault(one, {})
-    if quantity not in found:
-        found[quantity] = _estimate(one, quantity)
-    return found[quantity]
+    return _estimate(one, quantity) if one.noise.known else None
 
 
-_FOUND: WeakKeyDictionary[CircleAnalysis, dict[BudgetQuantity, Estimate]] = WeakKeyDictionary()
-
-
+@once_for_each
 def _estimate(one: CircleAnalysis, quantity: BudgetQuantity) -> Estimate:
     drawn = _drawn(one).alone
     radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
@@ -78,16 +71,8 @@ def slow_noise_um(one: CircleAnalysis, undulations: int) -> float:
     return float(np.hypot(np.sqrt(_apart(one).continued.mean[undulations]), one.noise.least_um))
 
 
+@once_for_each
 def _apart(one: CircleAnalysis) -> FormAndNoise:
-    if one not in _APART:
-        _APART[one] = _taken_apart(one)
-    return _APART[one]
-
-
-_APART: WeakKeyDictionary[CircleAnalysis, FormAndNoise] = WeakKeyDictionary()
-
-
-def _taken_apart(one: CircleAnalysis) -> FormAndNoise:
     if one.closure is None or abs(one.closure.height_um) <= CLEAR * one.closure.u_um:
         return form_and_noise(one.residual_um)
     ramp_um = one.closure.height_um * one.raw.phi_deg / FULL_TURN_DEG
@@ -108,35 +93,23 @@ class _Drawn:
     beside: DrawnPath
 
 
+@once_for_each
 def _drawn(one: CircleAnalysis) -> _Drawn:
-    if one not in _DRAWN:
-        apart = _apart(one)
-        form_um = _filtered(apart.form_um, one.chosen)
-        passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
-        seed = int(one.raw.circle.direction.sign > 0)
-        own = replace(apart, form_um=form_um)
-        alone, beside = drawn_paths(own, one.path.theta_deg, passed, seed, (OF_A_CIRCLE, 0))
-        _DRAWN[one] = _Drawn(form_um, alone, beside)
-    return _DRAWN[one]
-
-
-_DRAWN: WeakKeyDictionary[CircleAnalysis, _Drawn] = WeakKeyDictionary()
-"""Cache, shared by tables, budgets and tolerances."""
+    apart = _apart(one)
+    form_um = _filtered(apart.form_um, one.chosen)
+    passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
+    seed = int(one.raw.circle.direction.sign > 0)
+    own = replace(apart, form_um=form_um)
+    alone, beside = drawn_paths(own, one.path.theta_deg, passed, seed, (OF_A_CIRCLE, 0))
+    return _Drawn(form_um, alone, beside)
 
 
 def pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate | None:
     """Return the estimate of G(b), G(b)(LS) or H; None for too few samples."""
-    if not (pair.one.noise.known and pair.other.noise.known):
-        return None
-    found = _OF_PAIRS.setdefault(pair, {})
-    if quantity not in found:
-        found[quantity] = _pair_estimate(pair, quantity)
-    return found[quantity]
+    return _pair_estimate(pair, quantity) if pair.one.noise.known and pair.other.noise.known else None
 
 
-_OF_PAIRS: WeakKeyDictionary[PairAnalysis, dict[BudgetQuantity, Estimate]] = WeakKeyDictionary()
-
-
+@once_for_each
 def _pair_estimate(pair: PairAnalysis, quantity: BudgetQuantity) -> Estimate:
     if quantity is BudgetQuantity.H:
         return _hysteresis(pair)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from dbbstation.computing.kept import once_for_each
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.trace.circle import RawCircle, means
@@ -82,7 +82,7 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
             possible cause.
     """
     try:
-        return _cut(recording, circle)
+        return _turn(recording, circle)
     except TraceError as error:
         lost = max(lost_samples(recording.t_s), counted_lost)
         if not lost:
@@ -100,7 +100,7 @@ def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
     Unusable samples count as missing. Losses outside the turn are harmless.
     """
     try:
-        t_s = _cut(recording, circle).t_s
+        t_s = _turn(recording, circle).t_s
     except TraceError:
         t_s = recording.t_s
     return max(lost_samples(t_s), _left_out(recording, t_s)), len(t_s)
@@ -109,7 +109,7 @@ def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
 def unusable_on_turn(recording: Recording, circle: Circle) -> int:
     """Return the number of unusable samples within the turn; 0 without a turn."""
     try:
-        return _left_out(recording, _cut(recording, circle).t_s)
+        return _left_out(recording, _turn(recording, circle).t_s)
     except TraceError:
         return 0
 
@@ -120,17 +120,7 @@ def _left_out(recording: Recording, t_s: Floats) -> int:
     return int(np.count_nonzero(~recording.usable & (recording.t_s >= t_s[0]) & (recording.t_s <= t_s[-1])))
 
 
-def _cut(recording: Recording, circle: Circle) -> RawCircle:
-    found = _TURNS.setdefault(recording, {})
-    if circle not in found:
-        found[circle] = _turn(recording, circle)
-    return found[circle]
-
-
-_TURNS: WeakKeyDictionary[Recording, dict[Circle, RawCircle]] = WeakKeyDictionary()
-"""Cached turns, shared by findings, expectations and figures."""
-
-
+@once_for_each
 def _turn(recording: Recording, circle: Circle) -> RawCircle:
     if recording.theta_deg is not None:
         phi = one_turn_deg(recording.theta_deg, circle)
@@ -281,24 +271,9 @@ def overlap_feed_under(
     return (feed, u) if u <= TELLING * feed else None
 
 
+@once_for_each
 def _found_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float, float] | None:
-    """Return feed and standard deviation [mm/min], and standard deviation per mm of white noise [1/min], cached."""
-    found = _FEEDS.setdefault(recording, {})
-    key = (circle, edges)
-    if key not in found:
-        found[key] = _overlap_feed(recording, circle, edges)
-    return found[key]
-
-
-_FEEDS: WeakKeyDictionary[Recording, dict[tuple[Circle, tuple[float, float]], tuple[float, float, float] | None]] = (
-    WeakKeyDictionary()
-)
-"""Cached feeds of overlaps, shared by cutting, figures and findings."""
-
-
-def _overlap_feed(
-    recording: Recording, circle: Circle, edges: tuple[float, float]
-) -> tuple[float, float, float] | None:
+    """Return feed and standard deviation [mm/min], and standard deviation per mm of white noise [1/min]."""
     turn_s = FULL_TURN_DEG / circle.turning_deg_s
     by_duration_s = (edges[1] - edges[0]) * FULL_TURN_DEG / circle.swept_deg
     middle = (edges[0] + edges[1]) / 2.0

@@ -11,8 +11,17 @@ from matplotlib.patches import Circle as Ring
 from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.residual_map import ball_shifts, circle_tests, residual_map
-from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, ShownFigure, draw_maps, in_style
+from dbbstation.report.drawing import (
+    AFTER,
+    BEFORE,
+    LINE_OF_DIRECTION,
+    ROW_IN,
+    SET,
+    WIDTH_IN,
+    ShownFigure,
+    draw_maps,
+    in_style,
+)
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.report.polar import step_of
 from dbbstation.results.frame import OnePanel
@@ -26,14 +35,11 @@ if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.reporting.residual_map import BallShift, CircleTest
 
-WIDTH_IN = 11.0
 COLUMNS = 5
 """Number of circles side by side."""
 
 LONGEST_MM = 60.0
 """Length of the longest arrow [mm of the plate]."""
-
-LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
 def calibration_figure(calibration: Calibration, wanted: Wanted = FigureFormat.SVG) -> Any:  # noqa: ANN401 - as `in_format`

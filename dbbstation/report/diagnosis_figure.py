@@ -13,7 +13,18 @@ from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.diagnosis.shapes import EVERY, PULL, SIGNED, TOWARDS
 from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, ShownFigure, draw_maps, in_style
+from dbbstation.report.drawing import (
+    AFTER,
+    BEFORE,
+    LINE_OF_DIRECTION,
+    MEASURED,
+    QUARTERS,
+    ROW_IN,
+    WIDTH_IN,
+    ShownFigure,
+    draw_maps,
+    in_style,
+)
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
 from dbbstation.results.levels_text import place_of
@@ -85,13 +96,11 @@ def _cosine_and_sine(angle_rad: Floats) -> Floats:
     return np.column_stack([np.cos(angle_rad), np.sin(angle_rad)])
 
 
-WIDTH_IN = 11.0
 TRACES = 4
 """Number of tests whose traces are drawn."""
 
 LINE_OF = {"": "-", "lengthening": "-", "shortening": "--"}
 MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}
-LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
 def diagnosis_figure(

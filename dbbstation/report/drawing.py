@@ -54,6 +54,9 @@ DIVERGING = "RdBu_r"
 
 QUARTERS = range(0, 361, 90)
 
+WIDTH_IN = 11.0
+LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
+
 ROW_IN = 0.15
 """Height of a row of a map [inch]."""
 

@@ -347,6 +347,10 @@ def _sum(a: Floats | None, b: Floats | None) -> Floats | None:
     return a + b
 
 
+MM_PER_UM = 1e-3
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
 SMOOTH_MM = math.inf
 """`detail_mm` of a source that varies over hundreds of millimetres."""
 

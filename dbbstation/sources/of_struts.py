@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.laws.contract import MOVING, TableSource
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
-from dbbstation.sources.contract import Effect, ErrorSource, Need, Owner, Parameter
+from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Need, Owner, Parameter
 from dbbstation.sources.laws.rates import SHORTEST_S
 from dbbstation.sources.laws.turning import since_turning
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Motion
-
-MM_PER_UM = 1e-3
 
 SHAPE_STEP = 1e-4
 """Half step of the derivative by a nonlinear parameter, relative to its usual size."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
+    MM_PER_UM,
     SMOOTH_MM,
     Effect,
     Motion,
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource
-
-MM_PER_UM = 1e-3
 
 
 class Backlash(SourceWithHistory):

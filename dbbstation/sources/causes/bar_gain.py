@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 
 class BarGain(LinearSource):

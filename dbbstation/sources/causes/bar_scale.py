@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws.encoder import reading_without_noise_mm
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 REACH_MM = 0.1
 """Encoder travel at which the error is stated [mm]."""

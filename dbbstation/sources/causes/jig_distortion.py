@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 REACH_MM = 100.0
 """Distance from the plate's origin at which heights are stated [mm]."""

@@ -6,15 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM_M, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.by_temperature import STEEL_UM_M_K
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM_M = 1e-6
-"""One µm/m in mm/mm."""
 
 
 class JigThermal(LinearSource):

@@ -18,6 +18,7 @@ from dbbstation.machine.statics import (
 )
 from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import (
+    MM_PER_UM,
     SMOOTH_MM,
     Effect,
     ErrorSource,
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 FRICTION_N = (0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Tried friction forces, from zero to more than a strut's load in upright circles [N]."""

@@ -9,6 +9,7 @@ import numpy as np
 from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
+    MM_PER_UM,
     SMOOTH_MM,
     Effect,
     ErrorSource,
@@ -26,8 +27,6 @@ from dbbstation.sources.laws.unlike_struts import of_own_lengths
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 DECAY_S = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
 """Tried time constants of the position loop [s]."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 
 class ScrewCyclic(LinearSource):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import (
+    MM_PER_UM_M,
     SMOOTH_MM,
     Effect,
     LinearSource,
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
-
-MM_PER_UM_M = 1e-6
-"""One µm/m in mm/mm."""
 
 
 class ScrewLead(LinearSource):

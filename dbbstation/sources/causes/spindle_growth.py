@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, FollowsTemperature
 from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 BEGUN_PERCENT = (-100.0, 0.0, 40.0)
 """Tried initial states [%]: a warm start that cools, a cold start, and ten minutes of earlier work at a time constant of half an hour."""

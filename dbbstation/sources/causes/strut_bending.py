@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING
 
 from dbbstation.machine.statics import DOWN
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM = 1e-3
 
 USUAL_UM = 0.3
 """Shortening of a level rod of 1000 mm and 25 kg with the stiffness of a steel bar of 30 mm [µm]; its sag is 0.38

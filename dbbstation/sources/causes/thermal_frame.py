@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    MM_PER_UM_M,
+    SMOOTH_MM,
+    Effect,
+    ErrorSource,
+    Motion,
+    Need,
+    Owner,
+    Parameter,
+    Texts,
+)
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
 from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
@@ -15,9 +25,6 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-
-MM_PER_UM_M = 1e-6
-"""One µm/m in mm/mm."""
 
 
 class ThermalFrame(ErrorSource):

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import GRAVITY_M_S2, platform_weight, strut_tensions
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
 
-
-MM_PER_UM = 1e-3
 
 POINTS = 25
 """Points of a curve: over the whole travel of a strut, one per 45 mm on the reference machine; or from minus to plus the

@@ -74,8 +74,9 @@ def fleet(
     """
     from dbbstation.files.atomic import refuse_outputs
     from dbbstation.files.formats.settings import Settings
-    from dbbstation.tasks.fleet import FORMATS, write_fleet_table
+    from dbbstation.tasks.export import FORMATS
     from dbbstation.tasks.fleet import fleet as worked_out
+    from dbbstation.tasks.fleet import write_fleet_table
     from dbbstation.tasks.fleet_work import FleetOptions
 
     _refuse_options_of_others(task)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -137,6 +137,11 @@ LimitsDeg = Annotated[tuple[_ANGLE, _ANGLE], AfterValidator(Rising(Quantity("deg
 """Least and greatest [deg]."""
 JointMm = Annotated[Point, AfterValidator(Reach(Quantity("mm", 20, 20_000)))]
 """A joint's centre: x, y, z [mm]."""
+BarMm = Annotated[float, Quantity("mm", 20, 2_000)]
+FormUm = Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)]
+Mass = Annotated[float, Quantity("kg", 0, 2_000)]
+Text = Annotated[str, Field(min_length=1)]
+Ordinal = Annotated[int, Field(ge=1)]
 TemperatureDegc = Annotated[float, Quantity("degC", -30, 80)]
 ExpansionUmMK = Annotated[float, Quantity("µm/(m K)", 0.01, 50, or_zero=True)]
 

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from dbbstation.computing.arrays import Floats
-from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Quantity
+from dbbstation.facts.quantities import LimitsDeg, LimitsMm, Mass, Quantity
 from dbbstation.facts.record import AsArray, Record, Sha256Hex
 from dbbstation.machine.rotation import Rotation
 
@@ -119,13 +119,13 @@ class Compliance(Record):
 class StrutMasses(Record):
     """Masses of each of the six struts, on the line through its joints."""
 
-    strut_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    strut_kg: Mass
     """Mass that is spread evenly between base joint and platform joint at every length [kg]."""
-    motor_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    motor_kg: Mass
     """Mass behind the base joint that turns with the strut [kg]."""
     motor_length_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True)]
     """Length of that part; its centre is half of it behind the joint [mm]."""
-    screw_kg: Annotated[float, Quantity("kg", 0, 2_000)] = 0.0
+    screw_kg: Mass = 0.0
     """Screw that ends at the platform joint and slides through the base joint [kg]."""
     screw_length_mm: Annotated[float, Quantity("mm", 5, 10_000, or_zero=True)] = 0.0
     """Length of that screw; its rear end sticks out behind the joint [mm]."""

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from dbbstation.facts.quantities import ExpansionUmMK, Quantity, TemperatureDegc
+from dbbstation.facts.quantities import ExpansionUmMK, FormUm, Quantity, TemperatureDegc
 from dbbstation.facts.record import Day, Moment, Record
 
 BAR_LENGTH = Quantity("mm", 20, 2_000)
@@ -66,7 +66,7 @@ class Bar(Record):
     """Date of the certificate."""
     calibrator_valid_until: Day | None = None
     """Last day on which the certificate is valid."""
-    ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    ball_form_um: FormUm | None = None
     """Largest deviation of the bar's ball from a sphere by its certificate [µm]."""
 
     def certificate_fault(self, day: date) -> str:

@@ -25,6 +25,7 @@ from dbbstation.results.fleet import TABLE, FleetFound, FleetResult, FleetSessio
 from dbbstation.sisters.unlike import FALSE_ALARMS
 from dbbstation.tasks.declare import paths_of
 from dbbstation.tasks.executors import Ended, WorkPool
+from dbbstation.tasks.export import FORMATS
 from dbbstation.tasks.exporting import pyarrow_for
 from dbbstation.tasks.fleet_compare import Sister, compared
 from dbbstation.tasks.fleet_work import TASKS, FleetOptions, FleetPiece, Worked, worked
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
     from dbbstation.tasks.load import Sessions
     from dbbstation.tasks.telling import Progress
 
-
-FORMATS = (".csv", ".parquet")
-"""Formats of a table, by the ending of its file."""
 
 _NUMBERS = frozenset({"value", "u", "usual", "scatter", "score", "smallest_seen"})
 _WHOLE = frozenset({"sisters"})

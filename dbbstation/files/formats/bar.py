@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dbbstation.errors import Problem
-from dbbstation.facts.quantities import ExpansionUmMK, Quantity, TemperatureDegc
+from dbbstation.facts.quantities import BarMm, ExpansionUmMK, FormUm, Quantity, TemperatureDegc, Text
 from dbbstation.facts.record import Day, Moment
 from dbbstation.files.atomic import write_text
 from dbbstation.files.source_text import without_faults
@@ -15,17 +15,15 @@ from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_valid
 from dbbstation.plan.bar import Bar
 
-_Uncertainty = Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)]
-
 
 class CalibratorSchema(Schema):
     """The block of known length that the bar was put on."""
 
-    serial_number: Annotated[str, Field(min_length=1)]
+    serial_number: Text
     """Serial number of the block."""
-    length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    length_mm: BarMm
     """Length at 20 degC by its certificate [mm]."""
-    uncertainty_um: _Uncertainty
+    uncertainty_um: FormUm
     """Standard uncertainty of the length: half of a certificate's U (k = 2) [µm]."""
     certified: Day
     """Date of the certificate."""
@@ -44,11 +42,11 @@ class ReadingsSchema(Schema):
     """Name of the instrument."""
     count: Annotated[int, Field(ge=2)]
     """Readings."""
-    mean_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    mean_mm: BarMm
     """Their mean [mm]."""
-    uncertainty_um: _Uncertainty
+    uncertainty_um: FormUm
     """Standard uncertainty of the mean, resolution included [µm]."""
-    scatter_um: _Uncertainty
+    scatter_um: FormUm
     """Standard deviation of single readings [µm]."""
     resolution_um: Annotated[float, Quantity("µm", 0.0001, 100)]
     """Step of the readings [µm]."""
@@ -59,7 +57,7 @@ class BarFile(Schema):
 
     format: Literal["dbb-bar/1"]
     """Name and version of this format."""
-    serial_number: Annotated[str, Field(min_length=1)]
+    serial_number: Text
     """Serial number of the bar."""
     calibrated: Moment
     """Time of the reading on the calibrator."""
@@ -69,7 +67,7 @@ class BarFile(Schema):
     """Standard uncertainty of a temperature of the bar, on the calibrator and during measurements [K]."""
     expansion_um_m_k: ExpansionUmMK
     """Thermal expansion of the bar [µm/(m K)]."""
-    ball_form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    ball_form_um: FormUm | None = None
     """Largest deviation of the bar's ball from a sphere, by the ball's certificate [µm]."""
     calibrator: CalibratorSchema
     """The calibrator of the bar."""

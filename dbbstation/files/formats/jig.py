@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.facts.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
+from dbbstation.facts.quantities import Coordinate, ExpansionUmMK, FormUm, Point, Quantity, TemperatureDegc, Text
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_document, validate
@@ -74,7 +74,7 @@ class BallSchema(Schema):
     """Centre: x, y, z, jig frame; under the spindle, the machine's commanded position when it is put up [mm]."""
     uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)] | None = None
     """Standard uncertainty of each coordinate; only for a ball measured by CMM [µm]."""
-    form_um: Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)] | None = None
+    form_um: FormUm | None = None
     """Largest deviation from a sphere by its certificate [µm]; it enters U of figures if the bar's ball has one too."""
 
 
@@ -83,7 +83,7 @@ class JigFile(Schema):
 
     format: Literal["dbb-jig/1"]
     """Name and version of this format."""
-    name: Annotated[str, Field(min_length=1)] | None = None
+    name: Text | None = None
     """Name of the plate."""
     jig: JigSchema
     """The plate."""

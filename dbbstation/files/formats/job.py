@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dbbstation.errors import Problem
+from dbbstation.facts.quantities import Ordinal, Text
 from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
@@ -14,8 +15,6 @@ from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.schema import Schema, read_valid
 from dbbstation.files.yaml.text import YamlDocument
 from dbbstation.system.ports import FASTEST, SLOWEST, misspelt, time_scale_of, virtual_port
-
-_Text = Annotated[str, Field(min_length=1)]
 
 MayChange = Literal["operator", "order", "port", "temperature"]
 """Choices that may be left to the operator."""
@@ -26,19 +25,19 @@ class JobFile(Schema):
 
     format: Literal["dbb-job/1"]
     """Name and version of this format."""
-    name: _Text
+    name: Text
     """Name of the job for the operator."""
-    plan: _Text
+    plan: Text
     """The plan, a path from this file's folder."""
-    machine: _Text
+    machine: Text
     """The nominal machine, likewise."""
-    instrument: _Text
+    instrument: Text
     """Name of the instrument, or its protocol file."""
     profile: str = ""
     """Its variant; absent: the usual one."""
-    port: _Text
+    port: Text
     """Name or URL of the port; `virtual machine` tries the job without hardware."""
-    baud: Annotated[int, Field(ge=1)] | None = None
+    baud: Ordinal | None = None
     """Baud rate, if the instrument is not set to the usual one [1/s]."""
     bar: str = ""
     """Calibration of the bar, a path from this file's folder."""

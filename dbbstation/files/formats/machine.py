@@ -9,7 +9,7 @@ from pydantic import Field
 
 from dbbstation.computing.arrays import Floats
 from dbbstation.errors import Problem
-from dbbstation.facts.quantities import JointMm, Quantity
+from dbbstation.facts.quantities import JointMm, Quantity, Text
 from dbbstation.facts.record import AsArray
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
@@ -35,7 +35,7 @@ _SIX_LENGTHS = AsArray(tuple[_Millimetre, _Millimetre, _Millimetre, _Millimetre,
 class MachineParts(Schema):
     """The machine: the content of a machine file without its `format` line, also inline in models."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Text
     """Name of the machine."""
     rotation: Literal["Rx(A) Ry(B) Rz(C)", "Rz(C) Ry(B) Rx(A)"]
     """Rotation of platform axes into machine axes by the tilt angles; LinuxCNC's genhexkins uses the second."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dbbstation.facts.quantities import Quantity
+from dbbstation.facts.quantities import BarMm, Quantity, Text
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.number_language import number_language
 from dbbstation.files.source_text import without_faults
@@ -117,7 +117,7 @@ class MappingFile(Schema):
 
     format: Literal["dbb-mapping/1"]
     """Name and version of this format."""
-    name: Annotated[str, Field(min_length=1)] | None = None
+    name: Text | None = None
     """Name of the program that wrote the files."""
     encoding: Literal["utf-8", "utf-16", "cp1252", "cp1250", "cp1251", "cp932", "gb18030"] = "utf-8"
     """Encoding of the files' text: Windows code pages are western, central European, Cyrillic and Japanese, GB 18030 is
@@ -133,7 +133,7 @@ class MappingFile(Schema):
     trace: Literal["whole", "turn"] | None = None
     """Content of files with times and without angles: the `whole` run with feed-in and feed-out, or the full `turn`
     alone."""
-    zero_mm: Annotated[float, Quantity("mm", 20, 2_000)] | None = None
+    zero_mm: BarMm | None = None
     """Length of the bar at which the deviation is 0; required if a column is a deviation [mm]."""
     file_name: str | None = None
     """Pattern of file names without ending, such as `{test}_{direction}` or `{test}-{direction}-{repeat}`."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import Field
 
 from dbbstation.catalogue import nearest
 from dbbstation.errors import ModelError, Problem
-from dbbstation.facts.quantities import Quantity
+from dbbstation.facts.quantities import Quantity, Text
 from dbbstation.facts.record import Sha256Hex
 from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import MachineParts, machine_data
@@ -57,7 +56,7 @@ class SourceSchema(Schema):
 class EffectSchema(SourceSchema):
     """An error source of session, mounting or instrument, with its parameters in one set of runs."""
 
-    shared: Annotated[str, Field(min_length=1)]
+    shared: Text
     """Name of the set: the session, mounting, ball or bar whose runs share these numbers."""
 
 

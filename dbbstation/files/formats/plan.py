@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Problem
-from dbbstation.facts.quantities import Quantity, twice
+from dbbstation.facts.quantities import BarMm, Quantity, Text, twice
 from dbbstation.files.formats.jig import (
     BY_CMM,
     UNDER_SPINDLE,
@@ -40,7 +40,6 @@ def _once(directions: tuple[str, ...]) -> tuple[str, ...]:
     return directions
 
 
-_Radius = Annotated[float, Quantity("mm", 20, 2_000)]
 _Feed = Annotated[float, Quantity("mm/min", 20, 100_000)]
 _Start = Annotated[float, Quantity("deg", 0, 720, signed=True)]
 _Overshoot = Annotated[float, Quantity("deg", 1, 360, or_zero=True)]
@@ -53,7 +52,7 @@ _Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 class PathSchema(Schema):
     """Path of every circle."""
 
-    radius_mm: _Radius
+    radius_mm: BarMm
     """Length of the bar R, distance between the ball centres [mm]."""
     feed_mm_min: _Feed
     """Speed of the tool tip along its path [mm/min]."""
@@ -94,7 +93,7 @@ class PlanFile(Schema):
 
     format: Literal["dbb-plan/1"]
     """Name and version of this format."""
-    name: Annotated[str, Field(min_length=1)]
+    name: Text
     """Name of the plan."""
     path: PathSchema
     """How the circles are travelled."""

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, ValidationInfo
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
-from dbbstation.facts.quantities import Point, Quantity, TemperatureDegc
+from dbbstation.facts.quantities import Ordinal, Point, Quantity, TemperatureDegc, Text
 from dbbstation.facts.record import LEFT_OUT_EMPTY, Moment, OrEmpty, Record, Sha256Hex, Sha256OrEmpty
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
@@ -103,7 +103,7 @@ class Counts(Record):
     """Samples in the run file."""
     lost: Annotated[int, Field(ge=0)]
     """Samples that the line lost."""
-    rejected: Mapping[str, Annotated[int, Field(ge=1)]] = field(default_factory=dict)
+    rejected: Mapping[str, Ordinal] = field(default_factory=dict)
     """Samples of the file that no calculation uses, by what the instrument said of them, such as `overrange`, and
     unreadable bytes by fault, such as `unreadable checksum`."""
 
@@ -123,9 +123,9 @@ class RunEntry(Record):
     """Test of the plan."""
     direction: Annotated[Direction, Field(strict=False)]
     """Sense of travel, seen from +Z."""
-    repeat: Annotated[int, Field(ge=1)]
+    repeat: Ordinal
     """Counts the runs of this test and direction, from 1."""
-    mounting: Annotated[int, Field(ge=1)] | None = None
+    mounting: Ordinal | None = None
     """Number of the ball's mounting; runs with the same number and ball share the ball's position. Absent: one mounting
     per test."""
     path: PathInFolder
@@ -187,7 +187,7 @@ class SetUpReadings(Record):
 
     test: str
     """A test of this mounting."""
-    mounting: Annotated[int, Field(ge=1)] | None = None
+    mounting: Ordinal | None = None
     """Number of the mounting in the runs; absent if they have none."""
     fixed_ball_um: Readings = _NOT_READ
     """Fixed ball minus tool tip with the machine at the ball's commanded position: x, y, z, machine frame; null if not
@@ -207,7 +207,7 @@ class SetUpReadings(Record):
 class LogMark(Record):
     """Position in the session's event log when this file was written."""
 
-    events: Annotated[int, Field(ge=1)]
+    events: Ordinal
     """Number of its events."""
     sha256: Sha256Hex
     """Link of the last event."""
@@ -239,7 +239,7 @@ class Amendment(Record):
     """The same hash now."""
     former: Annotated[OrEmpty, AfterValidator(lambda path: path and _inside(path)), Field(default="")]
     """Path of the former file in the session folder."""
-    reason: Annotated[str, Field(min_length=1)]
+    reason: Text
     """Reason, as the user stated it."""
     made: Moment
     """Date and time."""

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from dbbstation.facts.quantities import Quantity, TemperatureDegc
+from dbbstation.facts.quantities import BarMm, Ordinal, Quantity, TemperatureDegc, Text
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
 from dbbstation.plan.circle import Direction
@@ -13,15 +13,13 @@ from dbbstation.plan.tolerance import FILTERED, OF_BOTH_DIRECTIONS, USUAL_UPR, C
 
 _UM_PER = {"µm": 1.0, "mm": 1e3}
 
-_Word = Annotated[str, Field(min_length=1)]
-
 
 class BarSettings(Schema):
     """The shop's ball bar, with the keys of a session file."""
 
     serial_number: str = ""
     """Serial number of the bar."""
-    calibrated_length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    calibrated_length_mm: BarMm
     """Distance between the ball centres [mm]; compared with the plan's radii, never added to readings."""
     calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
     """Standard uncertainty of this length [mm]."""
@@ -32,7 +30,7 @@ class BarSettings(Schema):
 class ProgramSettings(Schema):
     """How NC programs are written."""
 
-    dialect: _Word | None = None
+    dialect: Text | None = None
     """Language of the control."""
     step_deg: Annotated[float, Quantity("deg", 0.01, 5.0)] | None = None
     """Angle between points of a circle [deg]."""
@@ -77,7 +75,7 @@ class ToleranceSettings(Schema):
     """Greatest size within tolerance, in `unit`."""
     unit: Literal["µm", "mm"]
     """Unit of `largest`."""
-    tests: tuple[_Word, ...] = ()
+    tests: tuple[Text, ...] = ()
     """Tests of the tolerance; absent: all."""
     directions: tuple[Literal["ccw", "cw"], ...] = ()
     """Directions of the tolerance; absent: both. It is not allowed for figures of both directions."""
@@ -109,11 +107,11 @@ class ToleranceSettings(Schema):
 class ReportSettings(Schema):
     """Head of reports."""
 
-    laboratory: _Word | None = None
+    laboratory: Text | None = None
     """Name and address of the measuring laboratory."""
-    customer: _Word | None = None
+    customer: Text | None = None
     """Name and address of the machine's owner."""
-    logo: _Word | None = None
+    logo: Text | None = None
     """Picture of the shop, PNG or JPEG; a path from this file's folder."""
 
 
@@ -122,15 +120,15 @@ class SettingsFile(Schema):
 
     format: Literal["dbb-settings/1"]
     """Name and version of this format."""
-    instrument: _Word | None = None
+    instrument: Text | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""
-    profile: _Word | None = None
+    profile: Text | None = None
     """Variant of the instrument, if not the usual one."""
-    port: _Word | None = None
+    port: Text | None = None
     """Port that the instrument is connected to, or a URL."""
-    baud: Annotated[int, Field(ge=1)] | None = None
+    baud: Ordinal | None = None
     """Baud rate, if the instrument is not set to the usual one."""
-    serial_number: _Word | None = None
+    serial_number: Text | None = None
     """Serial number of the machine; noted in every session."""
     bar: BarSettings | None = None
     """The ball bar."""

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Faults, Problem
+from dbbstation.facts.quantities import Text  # noqa: TC001 - types of fields are read when files are read
 from dbbstation.files.source_text import LARGEST_PROGRAM, text_in, without_faults
 from dbbstation.files.yaml.schema import Schema, read_valid
 
@@ -63,7 +64,7 @@ class ParameterSchema(Schema):
 class OutputSchema(Schema):
     """One quantity that is measured and simulated."""
 
-    column: Annotated[str, Field(min_length=1)]
+    column: Text
     """Column of the measured values in the recordings."""
     unit: str = ""
     """Unit of both."""
@@ -107,18 +108,18 @@ class SimulatorFile(Schema):
 
     format: Literal["dbb-simulator/1"]
     """Name and version of this format."""
-    name: Annotated[str, Field(min_length=1)]
+    name: Text
     """Name of the simulator."""
-    python: Annotated[str, Field(min_length=1)] | None = None
+    python: Text | None = None
     """Python file with a class that derives from `Simulator`, beside this file. It is executed."""
-    program: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(min_length=1)] | None = None
+    program: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
     """Program and its arguments, in place of `python`: it reads `inputs.csv` and `parameters.json` and writes
     `outputs.csv` in its working folder. It is executed."""
-    fmu: Annotated[str, Field(min_length=1)] | None = None
+    fmu: Text | None = None
     """FMU (FMI 2 or 3) beside this file, in place of `python`. It is executed by FMPy, an extra of the installation."""
     variables: dict[str, str] = Field(default_factory=dict)
     """Variables of the FMU by the names here, if they differ; a signal is named `port.signal`, or `signal`."""
-    time: Annotated[str, Field(min_length=1)]
+    time: Text
     """Column of the recordings with the rising time [s]."""
     inputs: dict[Name, str] = Field(default_factory=dict)
     """Columns of the recordings for the simulator, by the simulator's name for each; `t` is the time."""

@@ -44,12 +44,12 @@ class FoundClass(Generic[Base]):
 
     def fault(self, what: str) -> Problem:
         """Return a fault of the class."""
-        return replace(self.place, what=f"{self.kind.__name__}{what}")
+        return replace(self.place, what=what)
 
     def broken(self, error: BaseException, when: str = "") -> Problem:
         """Return an error of the class's own code, at its line."""
         line = line_in(error, self.place.file) or self.place.line
-        return replace(self.fault(f": {in_words(error)}{when}"), line=line)
+        return replace(self.fault(f"{self.kind.__name__}: {in_words(error)}{when}"), line=line)
 
     def made(self, undeclared: Sequence[str], tried: Callable[[Base], Sequence[str]], when: str = "") -> Base:
         """Return an instance that passed its trial.
@@ -71,7 +71,7 @@ class FoundClass(Generic[Base]):
                 raise InputError([self.broken(error, when)]) from error
             if not said:
                 return one
-        raise InputError([self.fault(f": {what}") for what in said])
+        raise InputError([self.fault(f"{self.kind.__name__}: {what}") for what in said])
 
 
 def in_folders(base: type[Thing], *folders: ModuleType) -> Mapping[str, Thing]:
@@ -104,7 +104,7 @@ def installed(group: str, base: type[Base], faults: list[Problem]) -> list[Found
         if isclass(point.value) and issubclass(point.value, base):
             found.append(FoundClass(point.value, point.place))
         else:
-            faults.append(point.fault(f" is no class that derives from {base.__name__}"))
+            faults.append(replace(point.place, what=f"{point.named} is no class that derives from {base.__name__}"))
     return found
 
 
@@ -115,10 +115,6 @@ class Loaded:
     value: object
     named: str
     place: Problem
-
-    def fault(self, what: str) -> Problem:
-        """Return a fault of the object."""
-        return replace(self.place, what=f"{self.named}{what}")
 
 
 def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
@@ -150,7 +146,8 @@ def files_of_packages(group: str, own: Iterable[Path], *, called: str) -> dict[s
         folders = [Path(folder) for folder in getattr(point.value, "__path__", ())]
         found = sorted(path for folder in folders for path in folder.glob("*.yaml"))
         if not found:
-            faults.append(point.fault(" is no package with a file that ends in .yaml in its folder"))
+            what = f"{point.named} is no package with a file that ends in .yaml in its folder"
+            faults.append(replace(point.place, what=what))
         for path in found:
             if path.stem in files:
                 faults.append(_taken(point.place, f"{called} `{path.stem}`", whose[path.stem]))

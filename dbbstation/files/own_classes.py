@@ -77,7 +77,7 @@ def own_instances(
         lacking = [name for name in attributes if not hasattr(one_of.kind, name)]
         lacking += sorted(getattr(one_of.kind, "__abstractmethods__", ()))
         if lacking:
-            faults.append(one_of.fault(f" lacks {', '.join(lacking)}"))
+            faults.append(one_of.fault(f"{one_of.kind.__name__} lacks {', '.join(lacking)}"))
             continue
         try:
             one = one_of.kind()

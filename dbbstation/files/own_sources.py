@@ -42,7 +42,7 @@ def _has_columns(found: FoundClass[ABC], faults: list[Problem]) -> bool:
         name for name in getattr(found.kind, "needs", ()) if issubclass(found.kind, TableSource) and name not in MOVING
     ]
     if missing:
-        fault = found.fault(f" needs {', '.join(missing)}, which a strut does not have")
+        fault = found.fault(f"{found.kind.__name__} needs {', '.join(missing)}, which a strut does not have")
         faults.append(replace(fault, remedy=f"a strut has {', '.join(MOVING)}"))
     return not missing
 

@@ -132,7 +132,7 @@ def _simulator_of(python: Path, _content: bytes) -> Simulator:
     if len(found) > 1 and not faults:
         faults.append(replace(found[1].place, what="there are two simulators in one file"))
     elif not faults and isabstract(found[0].kind):
-        faults.append(found[0].fault(" lacks simulate"))
+        faults.append(found[0].fault(f"{found[0].kind.__name__} lacks simulate"))
     refuse(faults)
     return found[0].made((), lambda _one: ())
 

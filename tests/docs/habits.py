@@ -98,7 +98,7 @@ def in_messages(root: Path) -> Iterator[str]:
     for path in sorted((root / "dbbstation").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Raise) or (
-                isinstance(node, ast.Call) and _name(node) in {"say", "echo", "Problem", "of"}
+                isinstance(node, ast.Call) and _name(node) in {"say", "echo", "Problem", "of", "add"}
             ):
                 for text in _texts(node):
                     yield from sentences_of(text)

@@ -132,7 +132,7 @@ def _write_files(folder: Path, seed: int, tests: Collection[str] | None) -> Mach
     if not (folder / "truth.yaml").exists():
         whole = read_inline_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
         write_text(folder / "machine.yaml", machine_text(machine), force=True)
-        write_plan(folder / "plan.yaml", whole, tests or [test.name for test in whole.plan.tests])
+        write_plan(folder / "plan.yaml", whole, tests or [test.name for test in whole.tests])
         write_model(folder / "faultless.yaml", IdentifiedModel(MachineModel(machine), (), np.zeros((0, 0))))
         write_truth(folder / "truth.yaml", folder / "machine.yaml", seed)
     return machine

@@ -8,8 +8,8 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Owner, Parameter
-from dbbstation.sources.unmodelled.curves import MM_PER_UM, PLAUSIBLE_UM, TOLERANCE_UM, texts
+from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, ErrorSource, Motion, Owner, Parameter
+from dbbstation.sources.unmodelled.curves import PLAUSIBLE_UM, TOLERANCE_UM, texts
 
 if TYPE_CHECKING:
     from collections.abc import Collection

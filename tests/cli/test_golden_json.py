@@ -11,7 +11,7 @@ from dbbstation.service.work import SessionTask
 from dbbstation.tui.results_screen import result_lines
 from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
 from tests.cli.json_schema import faults
-from tests.once import OF_TABLES, computed_once
+from tests.once import OF_SESSIONS, OF_TABLES, computed_once
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def printed(tmp_path_factory, run):
     """Keys of what every command printed, by the name of its golden file; in their order, since some take what others wrote."""
     lines = lines_of(tmp_path_factory.mktemp("golden"))
     with pytest.MonkeyPatch.context() as patch:
-        computed_once(tmp_path_factory, patch, *OF_TABLES)
+        computed_once(tmp_path_factory, patch, *OF_SESSIONS, *OF_TABLES)
         return {name: run(*arguments, "--json") for name, arguments in lines.items()}
 
 

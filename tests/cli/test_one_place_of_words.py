@@ -13,6 +13,8 @@ from dbbstation.service.work import SessionTask
 from dbbstation.tui import texts
 from dbbstation.tui.results_screen import result_lines
 
+pytestmark = pytest.mark.usefixtures("answers_kept")
+
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 SETTINGS = """format: dbb-settings/1
 tolerances:

@@ -10,13 +10,12 @@ from dbbstation.quality.answer import DO, EXPLAINS, SHOWN_BY, Advice, answer
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
-from tests.quality.sessions import sound
 from tests.quality.spoilers import at_feed, bumpy, drifting, elsewhere, mirrored
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    return sound(tmp_path_factory.mktemp("word") / "session", 5, "abdh")
+@pytest.fixture
+def whole(four_tests):
+    return four_tests
 
 
 def answered(whole, label, spoiler=None, *sizes):

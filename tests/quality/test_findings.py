@@ -27,7 +27,7 @@ from dbbstation.quality.limits import (
 )
 from dbbstation.quality.single import feed
 from tests.cli.conftest import call
-from tests.quality.sessions import calibrated, finding_of, read, sound
+from tests.quality.sessions import finding_of, read, sound
 from tests.quality.shares import spoil
 from tests.quality.spoilers import SPOILERS, mirrored
 
@@ -35,9 +35,9 @@ USUAL = {Name.NOISE, Name.DRIFT, Name.SPIKE, Name.DIRECTION, Name.RADIUS, Name.O
 """Findings whose limits are tried by default: of one run, of its place, and beside another run. The others are nightly."""
 
 
-@pytest.fixture(scope="module")
-def machine_session(tmp_path_factory):
-    return calibrated(tmp_path_factory.mktemp("sabotage"), 1001)
+@pytest.fixture
+def machine_session(modelled):
+    return modelled
 
 
 def label(whole, name):

@@ -11,14 +11,13 @@ from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, stricter, undecided
 from dbbstation.quality.knowledge import seen
 from dbbstation.sources.registry import known_sources
-from tests.quality.sessions import calibrated, drifting_session, finding_of, judged, run, sound, spoilt
+from tests.quality.sessions import drifting_session, finding_of, judged, run, spoilt
 from tests.quality.spoilers import begun_elsewhere, drifting, elsewhere, larger, mirrored
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """Four tests of a machine without a model; the first one is repeated at the end."""
-    return sound(tmp_path_factory.mktemp("first") / "session", 5, "abdh")
+@pytest.fixture
+def whole(four_tests):
+    return four_tests
 
 
 def numbered(one, repeat):
@@ -96,11 +95,6 @@ def test_the_circle_of_another_test_is_recognised_once_that_was_measured(whole):
         assert "run b" in found.text
     assert finding_of(judged(before, own), Name.TEST).verdict is FindingVerdict.GOOD
     assert finding_of(judged([], own), Name.TEST).verdict is FindingVerdict.CANNOT_TELL
-
-
-@pytest.fixture(scope="module")
-def modelled(tmp_path_factory):
-    return calibrated(tmp_path_factory.mktemp("modelled"), 1001)
 
 
 @pytest.mark.slow

@@ -15,15 +15,15 @@ from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import edges_of
 from dbbstation.trace.feeding import feeding_ways
 from dbbstation.trace.recording import Recording
-from tests.quality.sessions import finding_of, judged, run, sound, spoilt
+from tests.quality.sessions import finding_of, judged, run, spoilt
 from tests.quality.spoilers import coming_twice, oval, scaled
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0.0, 45, 1.5, 0, Direction.CCW)
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    return sound(tmp_path_factory.mktemp("gauge") / "session", 5, "abdfhk")
+@pytest.fixture
+def whole(six_tests):
+    return six_tests
 
 
 def trace(dwell_s: float, seed: int, noise_um: float = 0.3, rate_hz: float = 50.0) -> Recording:

@@ -15,7 +15,7 @@ from dbbstation.quality.forms import Forms, form_of
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import COEFFICIENTS, Expected, along_travel, seen
 from dbbstation.quality.together import Together, expected_beside, together
-from tests.quality.sessions import finding_of, sound
+from tests.quality.sessions import finding_of
 from tests.quality.spoilers import elsewhere, larger, mirrored
 
 N = COEFFICIENTS
@@ -77,9 +77,9 @@ def test_nothing_is_expected_beside_no_others() -> None:
     assert expected_beside(None) is None
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    return sound(tmp_path_factory.mktemp("together") / "session", 5, "abdfhk")
+@pytest.fixture
+def whole(six_tests):
+    return six_tests
 
 
 def both_spoilt(whole, test, spoiler, *sizes):

@@ -170,7 +170,7 @@ def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> N
             assert "ann" in rows(app)[1]
             # Beside the machine, as `open` does it.
             app._runner, app._show = runner, Happening().shown()
-            app.push_screen(OperateScreen(app, app._show))
+            await app.push_screen(OperateScreen(app, app._show))
             await pilot.pause()
             app.look()
             await pilot.pause()
@@ -213,7 +213,7 @@ def test_a_sound_circle_is_accepted_by_enter() -> None:
 
     async def run() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
-            app.push_screen(OperateScreen(app, Happening().shown()))
+            await app.push_screen(OperateScreen(app, Happening().shown()))
             app.look()
             await pilot.pause()
             await pilot.press("enter")
@@ -228,7 +228,7 @@ def test_a_circle_that_cannot_be_told_has_a_key_of_its_own() -> None:
 
     async def run() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
-            app.push_screen(OperateScreen(app, Happening().shown()))
+            await app.push_screen(OperateScreen(app, Happening().shown()))
             app.look()
             await pilot.pause()
             said = " ".join(str(app.screen.query_one("#now").visual).split())
@@ -252,7 +252,7 @@ def test_a_second_run_of_a_test_and_direction_is_offered_in_place_of_the_first(*
     async def run() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
             if operated:
-                app.push_screen(OperateScreen(app, happening.shown()))
+                await app.push_screen(OperateScreen(app, happening.shown()))
             app.look()
             await pilot.pause()
             said = " ".join(str(app.screen.query_one("#now").visual).split())
@@ -419,7 +419,7 @@ def test_an_operator_goes_back_to_a_test() -> None:
 
     async def run() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
-            app.push_screen(OperateScreen(app, happening.shown()))
+            await app.push_screen(OperateScreen(app, happening.shown()))
             app.look()
             await pilot.pause()
             await pilot.press("o")

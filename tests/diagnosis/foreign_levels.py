@@ -123,7 +123,7 @@ def table_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any], lim
             f"95th percentile {high:.2f}",
         ]
     return {
-        "question": "How often is each of the three levels right for circles?",
+        "question": "How often is each of the three levels correct for circles?",
         **head,
         "data": f"{_sessions(every)}, {len(nothing)} of them clean.",
         "limits": limits,
@@ -141,7 +141,7 @@ def calibration_of(rows: Mapping[str, Mapping[str, Any]], head: Mapping[str, Any
         for level in LEVELS
     }
     return {
-        "question": "Do the probabilities of the three levels of circles come true?",
+        "question": "Are the stated probabilities of the three levels correct for circles?",
         **head,
         "data": f"{_sessions(judged)}.",
         "limits": "Cells: right of all with such a probability, and the 95 % interval of their share.",

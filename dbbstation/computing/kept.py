@@ -21,8 +21,9 @@ def once_for_each(compute: Callable[Concatenate[Key, P], Result]) -> Callable[Co
     @functools.wraps(compute)
     def cached(first: Key, /, *args: P.args, **named: P.kwargs) -> Result:
         found = kept.setdefault(first, {})
-        if args not in found:
-            found[args] = compute(first, *args, **named)
-        return found[args]
+        asked = (args, tuple(sorted(named.items())))
+        if asked not in found:
+            found[asked] = compute(first, *args, **named)
+        return found[asked]
 
     return cached

@@ -221,10 +221,9 @@ class CircleChannel:
                 self.motions, readings, shared, derivatives, self._variables, strict=True
             )
         ]
+        least_mm = LEAST_SLACK * max(self.first_noise_mm, SMALLEST_NOISE_MM) / MOST_SLACK
         discrepancy, parts = (
-            seen_of(of(source, self.machine, effects), self._least_mm / source.form_uncertainty)
-            if source.form_uncertainty
-            else of(source, self.machine, effects)
+            seen_of(of(source, self.machine, effects), source.form_uncertainty, least_mm)
             for of in (discrepancy_of, left_open_of)
         )
         slack = self.columns.add(np.hstack([tangents, discrepancy, parts]))
@@ -252,9 +251,9 @@ class CircleChannel:
         return [variables(motion, self.machine) for motion in self.motions]
 
     @cached_property
-    def _least_mm(self) -> float:
-        """Return the norm of the smallest change of a formula that the noise lets through [mm]."""
-        return LEAST_SLACK * max(misfit_of(self.calibration).noise, SMALLEST_NOISE_MM) / MOST_SLACK
+    def first_noise_mm(self) -> float:
+        """Return the noise of a reading, estimated before any cause is known."""
+        return misfit_of(self.calibration).noise
 
     def give_back(self) -> None:
         """Free the columns of forms that were replaced after the last comparison."""

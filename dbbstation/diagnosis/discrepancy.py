@@ -81,14 +81,14 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     return np.hstack([columns, _other_stages(source, machine, runs)])
 
 
-def seen_of(columns: Floats, least: float) -> Floats:
-    """Return the principal axes of columns, shape (n, q), whose norm is at least so large, shape (n, r).
+def seen_of(columns: Floats, sd: float, least: float) -> Floats:
+    """Return the principal axes of columns, shape (n, q), whose norm is larger than `least` at `sd`, shape (n, r).
 
     Columns with one prior and their axes stand for the same covariance [Rasmussen and Williams, Gaussian Processes for
     Machine Learning (2006), eq 4.39], but for the axes left out.
     """
     squares, turned = np.linalg.eigh(columns.T @ columns)
-    return np.asarray(columns @ turned[:, squares > least**2], dtype=np.float64)
+    return np.asarray(columns @ turned[:, sd**2 * squares > least**2], dtype=np.float64)
 
 
 def left_open_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> Floats:

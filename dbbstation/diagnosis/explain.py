@@ -110,7 +110,7 @@ class _Settling:
     def __init__(self, channel: CircleChannel, progress: Callable[[str], None]) -> None:
         self._channel, self._progress = channel, progress
         self._unmodelled = Unmodelled(channel)
-        self._fit, self._noise_mm, self._scatter = channel.calibration, misfit_of(channel.calibration).noise, 1.0
+        self._fit, self._noise_mm, self._scatter = channel.calibration, channel.first_noise_mm, 1.0
         self._fitted: frozenset[tuple[str, str]] = frozenset()
         self._laid_out: set[tuple[str, str]] = set()
         self._tried: set[frozenset[tuple[str, str]]] = set()

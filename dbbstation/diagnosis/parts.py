@@ -48,10 +48,8 @@ def at_point(
 
 def by_amplitudes(reading: BarReading, source: ErrorSource, machine: Machine, point: Sequence[float]) -> Floats:
     """Return a reading's derivative by a source's amplitudes at nonlinear parameters, shape (n, a)."""
-    shaped = is_shape(source, machine)
-    values = np.zeros(len(shaped))
-    values[shaped] = point
-    return reading.by_source(source, machine, values)[:, ~shaped]
+    derivative = reading.by_source(source, machine, at_point(source, machine, point))
+    return derivative[:, ~is_shape(source, machine)]
 
 
 def by_terms(reading: BarReading, layout: Layout, x: Floats) -> Floats:

@@ -261,10 +261,12 @@ class _Search:
             if self._may_be_likely(others, evidence, float(scan.log_odds[k])):
                 self._look_at([*others, scan.best_of(k)])
         for member in hypothesis.members:
-            if not member.cause.named or member.width >= FLEXIBLE:
-                self._pairs(hypothesis.without(member.name), around.without([member.name])[0])
+            if member.cause.named and member.width < FLEXIBLE:
+                continue
+            scan = around.without([member.name])[0]
+            self._pairs(hypothesis.without(member.name), scan)
             if not member.cause.named:
-                self._name(hypothesis, member.name, around.without([member.name])[0])
+                self._name(hypothesis, member.name, scan)
 
     def _name(self, hypothesis: Hypothesis, unnamed: str, scan: Scan) -> None:
         """Try named causes in place of an unnamed effect, each with the best addition, because no law is quite followed."""

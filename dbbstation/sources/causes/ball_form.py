@@ -61,7 +61,7 @@ class BallForm(LinearSource):
         )
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
-        return Effect(reading_mm=-MM_PER_UM * _waves(motion, ORDERS))
+        return Effect(reading_mm=-MM_PER_UM * _waves(_direction(motion), ORDERS))
 
     def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
         """Return undulations of higher order, and those that change with latitude: tesseral harmonics of two more degrees.
@@ -70,14 +70,14 @@ class BallForm(LinearSource):
         [DLMF 14.7.14, Ferrers functions].
         """
         height_mm = MM_PER_UM * FURTHER_SHARE * float(np.sqrt(np.mean(np.square(values))))
-        waves, rise, order = _waves(motion, ORDERS), _direction(motion)[:, 2:], np.repeat(ORDERS, 2)
+        direction, order = _direction(motion), np.repeat(ORDERS, 2)
+        waves, rise = _waves(direction, ORDERS), direction[:, 2:]
         by_latitude = [(2 * order + 1) * rise * waves, (2 * order + 3) * rise**2 * waves]
-        return Effect(reading_mm=-height_mm * np.hstack([_waves(motion, FURTHER), *by_latitude]))
+        return Effect(reading_mm=-height_mm * np.hstack([_waves(direction, FURTHER), *by_latitude]))
 
 
-def _waves(motion: Motion, orders: tuple[int, ...]) -> Floats:
-    """Return cosine and sine of each order about the fixed ball, shape (n, 2 k)."""
-    direction = _direction(motion)
+def _waves(direction: Floats, orders: tuple[int, ...]) -> Floats:
+    """Return cosine and sine of each order at unit vectors, shape (n, 3): shape (n, 2 k)."""
     across = direction[:, 0] + 1j * direction[:, 1]
     return np.column_stack([part for order in orders for part in ((across**order).real, (across**order).imag)])
 

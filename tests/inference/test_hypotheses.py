@@ -134,7 +134,7 @@ def test_a_flexible_cause_that_imitates_two_gives_way_to_them(rng):
 
 
 def test_a_law_that_is_not_quite_followed_takes_the_place_of_an_unnamed_effect(rng):
-    """Eight columns without a name imitate a law and a small wave beside it; the law alone leaves far too much."""
+    """An unnamed effect of eight columns imitates a law and a small wave. The law alone leaves most of the wave."""
     columns = rng.normal(size=(40, 8))
     law, wave = cause("law", variant(0), odds=ODDS), cause("wave", variant(1), odds=ODDS, named=False)
     unnamed = cause("unnamed", variant(*range(8)), odds=ODDS, named=False)

@@ -362,25 +362,29 @@ class _Search:
 
     def _settled(self, members: list[Member]) -> Hypothesis:
         many = len(members) > BOUNDS.many
+        single = [k for k, member in enumerate(members) if many and _single(member)]
         beside = _Beside(self.comparison, members)
         for _ in range(BOUNDS.sweeps if len(members) > 1 else 1):
-            at_once = [one for one, _, _ in beside.local.each_beside_others(members)] if many else members
-            for k, member in enumerate(members):
-                if many and _single(member):
-                    members[k] = at_once[k]
+            before, at_once = list(members), beside.each_of(members, single)
+            for k, member in enumerate(before):
+                if k in at_once:
+                    members[k] = at_once[k][0]
                     continue
                 comparison, others = beside.others(members, k)
                 members[k] = comparison.scan(others, [member.cause]).best_of(0)
             members = self._with_slack(beside.local, members)
+            if all(one.variant is was.variant and one.scale == was.scale for one, was in zip(members, before, strict=True)):
+                break
         members, more = self._as_close_as_it_is(beside, members)
         evidence, factors = beside.log_evidence(members), []
         possible = self._possible(beside.local, members)
         more += sum(possible)
-        each = beside.local.each_beside_others(members) if many else []
+        at_once = beside.each_of(members, single)
         for k, member in enumerate(members):
-            if many and _single(member):
-                factors.append(each[k][1] + possible[k])
-                more += each[k][1] - each[k][2]
+            if k in at_once:
+                _, averaged, best = at_once[k]
+                factors.append(averaged + possible[k])
+                more += averaged - best
                 continue
             comparison, others = beside.others(members, k)
             scan = comparison.scan(others, [member.cause])
@@ -458,6 +462,10 @@ class _Beside:
             return self.local.log_evidence(members)
         first = self._largest
         return self._beside_largest(members).log_evidence([*members[:first], *members[first + 1 :]])
+
+    def each_of(self, members: Sequence[Member], which: Sequence[int]) -> dict[int, tuple[Member, float, float]]:
+        """Return scans of some members' present variants given the other members, by place [`each_beside_others`]."""
+        return dict(zip(which, self.local.each_beside_others(members, which), strict=True)) if which else {}
 
     def _beside_largest(self, members: Sequence[Member]) -> ModelComparison:
         largest = members[self._largest]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.linalg import cho_solve
-from scipy.linalg.lapack import dtrtrs
+from scipy.linalg.lapack import dtrtri, dtrtrs
 
 from dbbstation.inference.blocks import slices
 from dbbstation.inference.triangle import rms
@@ -404,28 +404,31 @@ class ModelComparison:
         towards = self._towards[forms.needed] - across.T @ z
         return Around(tuple(members), forms, lower, z, evidence, across, towards)
 
-    def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
+    def each_beside_others(
+        self, members: Sequence[Member], which: Sequence[int] | None = None
+    ) -> list[tuple[Member, float, float]]:
         """Scan each member's present variant given the other members, without slack, over all sizes.
 
+        Args:
+            which: places of the members to scan; None for all.
+
         Returns:
-            Per member: the member with its best size, the log Bayes factor averaged over sizes with the variant's
-            weight, and the log Bayes factor of the best size without weights.
+            Per scanned member: the member with its best size, the log Bayes factor averaged over sizes with the
+            variant's weight, and the log Bayes factor of the best size without weights.
         """
         # The inverse of a block of A's inverse is the block's information given the others [Schur complement; Horn and
         # Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
-        columns, sd = _stacked(members)
-        information = self._information(columns, sd)
-        inverse = cho_solve((cholesky(information), True), np.eye(len(sd)))
-        values = inverse @ (sd * self._towards[self._at(columns)])
+        lower, z, _ = self._eliminated(members)
+        inverse, places = _inverse_of(lower), slices_of(members)
         found = []
-        for member, every in zip(members, slices_of(members), strict=True):
-            own = slice(every.start, every.start + member.width)
-            beside = np.linalg.inv(inverse[own, own])
-            towards = beside @ values[own] / member.scale
-            blocks = (beside - np.eye(len(beside))) / member.scale**2
-            seen, axes = np.linalg.eigh(blocks)
-            along = np.square(axes.T @ towards)
-            factors = _log_factors(np.maximum(seen, 0.0)[None], along[None])[0]
+        for k in range(len(members)) if which is None else which:
+            member, first = members[k], places[k].start
+            own = inverse[first:, first : first + member.width]
+            variance, axes = np.linalg.eigh(own.T @ own)
+            information = 1.0 / variance
+            along = np.square(information * (axes.T @ (own.T @ z[first:]))) / member.scale**2
+            seen = np.maximum(information - 1.0, 0.0) / member.scale**2
+            factors = _log_factors(seen[None], along[None])[0]
             weighted = factors + LOG_SCALE_WEIGHTS + member.variant.log_weight
             best = int(weighted.argmax())
             averaged = float(weighted[best] + np.log(np.exp(weighted - weighted[best]).sum()))
@@ -510,7 +513,7 @@ class Around:
     @cached_property
     def _turned(self) -> tuple[Floats, Floats, Floats]:
         rows, values = (_solved(self.lower, right, transposed=True) for right in (self.across, self.z))
-        return rows, values, _solved(self.lower, np.eye(len(self.z)))
+        return rows, values, _inverse_of(self.lower)
 
     def scan(self) -> Scan:
         """Return the scan given all members."""
@@ -555,6 +558,13 @@ def _solved(lower: Floats, right: Floats, *, transposed: bool = False) -> Floats
     if info:
         raise np.linalg.LinAlgError("singular triangle")
     return found
+
+
+def _inverse_of(lower: Floats) -> Floats:
+    found, info = dtrtri(np.asarray(lower, order="C").T, lower=0)
+    if info:
+        raise np.linalg.LinAlgError("singular triangle")
+    return np.asarray(found.T, dtype=np.float64)
 
 
 def _factors(information: Floats) -> Floats:

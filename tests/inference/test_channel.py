@@ -213,6 +213,7 @@ def test_all_members_at_once_are_what_each_is_beside_the_others() -> None:
         assert averaged == pytest.approx(scan.log_factor[0], rel=1e-9)
         assert best == pytest.approx(scan.log_best[0], rel=1e-9)
         assert found.scale == scan.best[0].scale
+        assert comparison.each_beside_others(members, [k])[0][1:] == (averaged, best)
 
 
 def test_a_law_with_several_forms_says_which_one_is_there() -> None:

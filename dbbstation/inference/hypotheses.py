@@ -373,7 +373,9 @@ class _Search:
                 comparison, others = beside.others(members, k)
                 members[k] = comparison.scan(others, [member.cause]).best_of(0)
             members = self._with_slack(beside.local, members)
-            if all(one.variant is was.variant and one.scale == was.scale for one, was in zip(members, before, strict=True)):
+            if all(
+                one.variant is was.variant and one.scale == was.scale for one, was in zip(members, before, strict=True)
+            ):
                 break
         members, more = self._as_close_as_it_is(beside, members)
         evidence, factors = beside.log_evidence(members), []

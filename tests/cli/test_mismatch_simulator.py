@@ -9,6 +9,7 @@ import pytest
 
 from dbbstation.files.places import shipped_folder
 from tests.cli.test_schemas_of_results import faults
+from tests.once import OF_TABLES, computed_once
 
 FOLDER = shipped_folder("fixtures") / "simulators"
 ASKED = ("mismatch", FOLDER / "pendulum.csv", "--simulator", FOLDER / "pendulum.yaml")
@@ -95,7 +96,10 @@ def test_how_many_simulations_are_allowed_is_said_beforehand_and_where_it_ended(
     assert "60" in outcome.out + outcome.err
 
 
-def test_where_simulations_are_spent_what_would_come_next_is_a_mismatch_without_a_verdict(run, tmp_path):
+def test_where_simulations_are_spent_what_would_come_next_is_a_mismatch_without_a_verdict(
+    run, tmp_path, tmp_path_factory, monkeypatch
+):
+    computed_once(tmp_path_factory, monkeypatch, *OF_TABLES)
     figure = tmp_path / "figure.svg"
     outcome = run(*ASKED, "--most-runs", "400", "--json", "--figure", figure)
     assert outcome.code == 0, outcome.err

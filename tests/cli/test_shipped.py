@@ -97,6 +97,7 @@ def test_examples_of_quick_commands_run(folder, line):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("answers_kept")
 @pytest.mark.parametrize("line", all_but_the_first_by_night(runnable(LONGER)))
 def test_examples_of_longer_commands_run(folder, line):
     done = said(folder, line)

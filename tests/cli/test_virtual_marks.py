@@ -52,11 +52,12 @@ def test_every_command_on_a_virtual_session_marks_what_it_makes(tmp_path: Path) 
     plan = shipped_folder("protocols") / "plans" / "table2.yaml"
     machine = fixtures / "machines" / "reference.yaml"
     model, session = here / "model.yaml", here / "sim"
-    told = call(
-        "simulate", "--model", fixtures / "models" / "small.yaml", plan, "--tests", "a,b,c,d", "--samples", 60,
-        "--out", session,
-    )  # fmt: skip
-    assert told.code == 0, told.err
+    for made, samples in ((session, 60), (here / "again", 72)):
+        told = call(
+            "simulate", "--model", fixtures / "models" / "small.yaml", plan, "--tests", "a,b,c,d", "--samples", samples,
+            "--out", made,
+        )  # fmt: skip
+        assert told.code == 0, told.err
     shutil.copytree(fixtures / "sessions" / "small", here / "real")
     shutil.copytree(fixtures / "sessions" / "virtual", here / "other")
     commands = (
@@ -66,7 +67,7 @@ def test_every_command_on_a_virtual_session_marks_what_it_makes(tmp_path: Path) 
         ("export", session, "--out", here / "samples.csv"),
         ("calibrate", session, "--sources", "strut-reference-length", "--out", model),
         ("evaluate", session, "--model", model),
-        ("compare", session, here / "other"),
+        ("compare", session, here / "again"),
         ("history", here, "--page", here / "history.html"),
         ("report", session, "--page", here / "report.html"),
         ("program", "--plan", plan, "--machine", machine, "--model", model, "--out", here / "programs"),

@@ -16,7 +16,8 @@ import pytest
 from dbbstation.tasks import executors
 from dbbstation.tasks.executors import Ended, SchedulerError, WorkPool
 from tests.cli.conftest import call
-from tests.tasks.fleet_sessions import ends_always, ends_once, machines, squared, told_and_slow
+from tests.tasks.fleet_sessions import machines
+from tests.tasks.pieces import ends_always, ends_once, squared, told_and_slow
 
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 120.0

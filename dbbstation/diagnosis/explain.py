@@ -41,6 +41,11 @@ if TYPE_CHECKING:
 GRID = 0.3
 """Relative prior standard deviation of nonlinear parameters in a second try, about their grid spacing."""
 
+ROUGH = 0.1
+"""Relative error of a law at the best point of a grid over its nonlinear parameters, which lie an octave apart. Before the
+first joint fit, fainter causes may only fit this error: a spike that did so led a wind-up to a wrong length, for which the
+law was given up."""
+
 IDLE = 0.9
 """A nonlinear parameter is undetermined if its uncertainty exceeds this share of the prior: the runs then contain less
 than a quarter of the prior's information."""
@@ -167,20 +172,21 @@ class _Settling:
     def _is_done(self, settled: SettledCircles) -> bool:
         if self._is_laid_out_better(settled):
             return False
-        named = frozenset((m.name, m.variant.law) for m in settled.members)
+        best = settled.best if self._fitted else _loud(settled.best)
+        named = frozenset((m.name, m.variant.law) for m in best.members if m.cause.named)
         if named == self._fitted or named in self._tried:
             done, self._likely = self._likely == LIKELY, LIKELY
             return done
         self._tried.add(named)
         self._progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
-        joint = _joint(self._channel, settled.comparison, settled.best)
+        joint = _joint(self._channel, settled.comparison, best)
         if joint is None:
             return True
         if idle := _idle_laws(joint, self._channel):
             self._given_up |= idle
             return False
         if not self._fitted:
-            self._unmodelled.look(joint, settled.best.members, self._noise_mm)
+            self._unmodelled.look(joint, best.members, self._noise_mm)
         self._fit, self._fitted = joint, named
         _refine(self._channel, joint, named)
         return False
@@ -196,6 +202,14 @@ class _Settling:
         wider = usual > self._scatter
         self._scatter = max(usual, self._scatter)
         return bool(rough) or wider
+
+
+def _loud(best: Hypothesis) -> Hypothesis:
+    """Return the set without named causes that are faint enough to fit only the initial error of a louder law."""
+    rough = [f for m, f in zip(best.members, best.log_factors, strict=True) if m.variant.nonlinear]
+    least = ROUGH**2 * max(rough, default=0.0)
+    faint = [m.name for m in best.members if m.cause.named and best.log_factor(m.name) < least]
+    return replace(best, members=best.without(*faint))
 
 
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:

@@ -78,6 +78,14 @@ def explain(
     return explained
 
 
+def loud(best: Hypothesis) -> Hypothesis:
+    """Return the set without named causes that are faint enough to fit only the initial error of a louder law."""
+    rough = [f for m, f in zip(best.members, best.log_factors, strict=True) if m.variant.nonlinear]
+    least = ROUGH**2 * max(rough, default=0.0)
+    faint = [m.name for m in best.members if m.cause.named and best.log_factor(m.name) < least]
+    return replace(best, members=best.without(*faint))
+
+
 def without(explained: Explained, names: Collection[str]) -> Explained:
     """Return the result with the best hypothesis without these causes, jointly fitted."""
     settled = explained.settled
@@ -172,7 +180,7 @@ class _Settling:
     def _is_done(self, settled: SettledCircles) -> bool:
         if self._is_laid_out_better(settled):
             return False
-        best = settled.best if self._fitted else _loud(settled.best)
+        best = settled.best if self._fitted else loud(settled.best)
         named = frozenset((m.name, m.variant.law) for m in best.members if m.cause.named)
         if named == self._fitted or named in self._tried:
             done, self._likely = self._likely == LIKELY, LIKELY
@@ -202,14 +210,6 @@ class _Settling:
         wider = usual > self._scatter
         self._scatter = max(usual, self._scatter)
         return bool(rough) or wider
-
-
-def _loud(best: Hypothesis) -> Hypothesis:
-    """Return the set without named causes that are faint enough to fit only the initial error of a louder law."""
-    rough = [f for m, f in zip(best.members, best.log_factors, strict=True) if m.variant.nonlinear]
-    least = ROUGH**2 * max(rough, default=0.0)
-    faint = [m.name for m in best.members if m.cause.named and best.log_factor(m.name) < least]
-    return replace(best, members=best.without(*faint))
 
 
 def _with_rivals(settled: SettledCircles) -> list[tuple[Member, Member]]:

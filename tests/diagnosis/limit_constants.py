@@ -25,6 +25,7 @@ from dbbstation.tasks.load import load_sessions
 
 MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "IDLE": (explain, "IDLE", (0.7, 0.97), 4),
+    "ROUGH": (explain, "ROUGH", (0.05, 0.2), 32),
     "HALF": (shape_look, "HALF", (0.25, 1.0), 4),
     "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
     "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),

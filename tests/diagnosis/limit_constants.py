@@ -25,7 +25,7 @@ from dbbstation.tasks.load import load_sessions
 
 MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "IDLE": (explain, "IDLE", (0.7, 0.97), 4),
-    "ROUGH": (explain, "ROUGH", (0.05, 0.2), 32),
+    "ROUGH": (explain, "ROUGH", (0.03, 0.3), 92),
     "HALF": (shape_look, "HALF", (0.25, 1.0), 4),
     "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
     "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),
@@ -75,7 +75,7 @@ def main() -> None:
             sys.stderr.write(f"{key}: {columns[key]}\n")
     kept = {
         "question": "Do answers hang on the constants of the comparison?",
-        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48; usual values are 0.9, 0.5, 6, 0.04 mm, 5, 2, 0.5 to 2 and 0.3 ms.",
+        "data": "Five sessions of `python -m tests.plant.foreign`, seed 48, and one of seed 53 with `--wide` (92); usual values are 0.9, 0.1, 0.5, 6, 0.04 mm, 5, 2, 0.5 to 2 and 0.3 ms.",
         "command": "python -m tests.diagnosis.limit_constants FOLDER",
         "date": datetime.now(UTC).date().isoformat(),
         "seed": 48,

@@ -111,6 +111,7 @@ def installer() -> list[str | Path]:
 def test(rest: list[str]) -> int:
     """Run all checks, then the tests where they hold; further arguments go to pytest."""
     failed = 0
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each worker would compile all tests
     with ThreadPoolExecutor(2) as pool:
         for (name, _), done in zip(CHECKS, pool.map(check, CHECKS), strict=True):
             said = done.stdout.splitlines(keepends=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from dbbstation.cli.output import echo, log_said
 from dbbstation.cli.progress import COUNTED, ProgressBar
-from dbbstation.results.frame import of_facts
+from dbbstation.facts import of_facts
 from dbbstation.results.sessions import CompletedRun, MeasuredSession, RecordedRun
 from dbbstation.service.session_notes import shop_degc
 from dbbstation.station import events

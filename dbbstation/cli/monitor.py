@@ -13,6 +13,7 @@ from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE, ZERO_MM, LineOptions, Spy, spying
 from dbbstation.cli.output import echo, json_text, print_json
 from dbbstation.cli.provenance import provenance
+from dbbstation.facts import picked
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
@@ -66,10 +67,8 @@ def monitor(
 
 def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
     if as_json:
-        row: dict[str, object] = {"t_s": round(t_s, 6), "length_mm": reading.length_mm, "status": reading.status}
-        row |= {"lost": reading.lost, "counter": reading.counter, "said": reading.said}
-        row |= {"t_uncertainty_s": reading.t_uncertainty_s}
-        echo(json_text(row))
+        rest = picked(reading, "length_mm", "status", "lost", "counter", "said", "t_uncertainty_s")
+        echo(json_text({"t_s": round(t_s, 6), **rest}))
         return
     echo(f"{t_s:10.3f} s {_in_words(reading)}")
 
@@ -83,13 +82,7 @@ def _in_words(reading: Reading) -> str:
 
 def _conclude(tally: Tally, *, as_json: bool) -> None:
     if as_json:
-        totals: dict[str, object] = {
-            "readings": tally.readings,
-            "lost": tally.lost,
-            "doubtful": tally.doubtful,
-            "garbage_bytes": tally.garbage_bytes,
-        }
-        totals |= {"rejected": tally.rejected, "reconnected": tally.reconnected}
+        totals = picked(tally, "readings", "lost", "doubtful", "garbage_bytes", "rejected", "reconnected")
         echo(json_text({"totals": totals, "provenance": provenance().data()}))
         return
     text = f"{tally.readings} readings, {tally.lost} lost, {tally.doubtful} doubtful, {tally.garbage_bytes} bytes not understood"

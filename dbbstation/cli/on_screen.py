@@ -15,6 +15,7 @@ from dbbstation.cli.instrument_options import spying
 from dbbstation.cli.measure import say_sampling
 from dbbstation.cli.output import echo
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
+from dbbstation.facts import of_facts
 from dbbstation.files.places import SESSION_FILE, shipped_folder
 from dbbstation.system.ports import FASTEST, virtual_port
 from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered, ended_when_hung_up
@@ -154,17 +155,13 @@ def _given(asked: Asked) -> Choice:
     if lost:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in lost)
         raise click.UsageError(f"{names} goes with --plan, --machine, --instrument, --port and --out")
-    return Choice(
+    return of_facts(
+        Choice,
+        noted,
         line=Line(**asdict(line) | {"profile": line.profile or ""}),
-        bar=noted.bar,
         bar_waiver=noted.bar_waiver.strip(),
-        operator=noted.operator,
-        serial_number=noted.serial_number,
-        job=noted.job,
         order=Order(noted.order),
         gate=Gate(noted.gate),
-        ambient_temp_c=noted.ambient_temp_c,
-        programs=noted.programs,
     )
 
 

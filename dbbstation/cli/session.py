@@ -48,8 +48,8 @@ def list_runs(folder: _Folder) -> Answer:
       dbbstation session list 2026-11-20-hexapod-7
       dbbstation session list 2026-11-20-hexapod-7 --json
     """
+    from dbbstation.facts import of_facts
     from dbbstation.files.recordings.session import read_session
-    from dbbstation.results.frame import of_facts
     from dbbstation.results.sessions import ListedRun, ListedSession
 
     read = read_session(folder)

@@ -82,13 +82,8 @@ class SessionOptions:
     @property
     def of_bar(self) -> list[str]:
         """Return options of the bar given in addition to its file, without settings."""
-        given = {
-            "bar_serial_number": self.bar_serial_number,
-            "bar_length_mm": self.bar_length_mm,
-            "bar_uncertainty_um": self.bar_uncertainty_um,
-            "bar_temp_c": self.bar_temp_c,
-        }
-        return [name for name, value in given.items() if value not in {"", None} and not from_settings(name)]
+        names = ("bar_serial_number", "bar_length_mm", "bar_uncertainty_um", "bar_temp_c")
+        return [name for name in names if getattr(self, name) not in {"", None} and not from_settings(name)]
 
     def stated_length_mm(self) -> float | None:
         """Return the bar's length from its file or `--bar-length-mm` [mm], or None.

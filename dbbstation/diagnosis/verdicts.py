@@ -9,6 +9,7 @@ import numpy as np
 from dbbstation.diagnosis.findings import SourceFinding
 from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.diagnosis.parts import amplitudes
+from dbbstation.facts import of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.by_level import ambiguous, open_to, with_texts
 from dbbstation.inference.impossible import impossibly_negative
@@ -55,9 +56,9 @@ class _CircleJudge(CauseJudge):
         one, member = self.finding(cause), self._members.get(cause.name)
         shown = member or self._beside[cause.name][1]
         texts = self._circles.sources[cause.name, shown.variant.law].texts
-        return SourceFinding(
-            name=cause.name,
-            verdict=one.verdict,
+        return of_facts(
+            SourceFinding,
+            one,
             ambiguous_with=self._in_words(one.ambiguous_with),
             gain=one.log_bayes_factor,
             concealed=one.confounded,
@@ -65,13 +66,9 @@ class _CircleJudge(CauseJudge):
             unconcealed_rms_um=1e3 * one.rms,
             parameters=one.values,
             text=with_texts(one.verdict, one.text, texts),
-            probability=one.probability,
             equivalent=tuple(name for name in one.equivalent if name in self._named),
             log_evidence=one.log_bayes_factor,
-            acts=one.acts,
-            persists=one.persists,
             sigmas=0.0 if member is None else one.sigmas,
-            gains=one.gains,
         )
 
     def _in_words(self, names: Iterable[str]) -> tuple[str, ...]:

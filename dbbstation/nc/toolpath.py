@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from dbbstation.facts import of_facts
 from dbbstation.machine.rotation import Frames
 from dbbstation.nc.spilled import Spilled, forget
 
@@ -473,19 +474,14 @@ class ToolpathBuilder:
                 poses[block] = going_on(poses[block], before)
             before = poses[block][-1]
             forget(poses)
-        return Toolpath(
-            name=self.name,
+        return of_facts(
+            Toolpath,
+            self,
             rows=self._rows.values,
             offsets=np.array(list(self._offsets)),
             arcs=self._arcs.values,
             text=MappingProxyType(dict(self._text)),
             start=self._start,
-            holds=self.holds,
-            ending=self.ending,
-            units_said=self.units_said,
-            notes=self.notes,
-            files=self.files,
-            numbers=self.numbers,
         )
 
     def __len__(self) -> int:

@@ -12,12 +12,13 @@ from dbbstation.circles.budget import Budget, budget_of, budgets, pair_budgets, 
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.quick_look import Symptom, quick_look
 from dbbstation.circles.reversals import Harmonic, ReversalStep
+from dbbstation.facts import of_facts
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.quality.finding import Finding
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
-from dbbstation.results.frame import Framed, of_facts
+from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis

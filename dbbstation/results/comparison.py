@@ -12,13 +12,14 @@ from pydantic import Field
 from dbbstation.diagnosis.compare.findings import DirectionHalves, LargestEffect, RunDifference
 from dbbstation.diagnosis.compare.pairs import NotComparable
 from dbbstation.diagnosis.compare.words import organised_text, residual_text, verdict_text
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import Span
 from dbbstation.inference.verdict import Gains, Verdict
 from dbbstation.results.diagnosis import BeforeAfter
-from dbbstation.results.frame import Framed, of_facts, picked
+from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:

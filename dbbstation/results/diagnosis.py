@@ -12,6 +12,7 @@ from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.diagnosis.effects import CauseEffect
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError
+from dbbstation.facts import of_facts
 from dbbstation.facts.run import OfRun
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
@@ -20,7 +21,7 @@ from dbbstation.inference.limit_reached import LimitReached
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import WithModel
-from dbbstation.results.frame import ByName, Framed, of_facts
+from dbbstation.results.frame import ByName, Framed
 from dbbstation.results.levels_text import bars, level_sentences, short_sentences
 from dbbstation.trace.analysis import figures
 

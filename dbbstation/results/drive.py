@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.diagnosis.drive.findings import DriveFindings
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import Absent
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.recordings.drive_csv import compared_csv
-from dbbstation.results.frame import Framed, of_facts, picked
+from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from dbbstation.facts import picked
 from dbbstation.facts.serialise import Absent
-from dbbstation.results.frame import Framed, picked
+from dbbstation.results.frame import Framed
 
 State = Literal["done", "up-to-date", "failed"]
 """State of a session: computed now; known from an earlier call with the same inputs, options and program; failed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import html
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, SupportsIndex, TypeVar, get_args, overload
 
@@ -41,8 +41,6 @@ class OnePanel:
         panels[fits[0]](self.axes)
         return self.axes
 
-
-_Kind = TypeVar("_Kind")
 
 FORMATS = (".svg", ".png", ".pdf")
 """Formats of figures, by the ending of the file."""
@@ -170,18 +168,6 @@ class Framed:
         more = f"<p>and {len(rows) - MOST_SHOWN} more rows</p>" if len(rows) > MOST_SHOWN else ""
         said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in self.sentences() or [self.headline()])
         return f"{said}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
-
-
-def picked(one: object, *names: str) -> dict[str, object]:
-    """Return some fields of an object by name."""
-    return {name: getattr(one, name) for name in names}
-
-
-def of_facts(kind: type[_Kind], *facts: object, **further: object) -> _Kind:
-    """Return a dataclass whose fields are the facts' attributes of the same name, of the first fact with each, or given."""
-    names = [one.name for one in fields(kind) if one.name not in further]  # type: ignore[arg-type]
-    held = {name: fact for name in names for fact in reversed(facts) if hasattr(fact, name)}
-    return kind(**{name: getattr(fact, name) for name, fact in held.items()}, **further)
 
 
 def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field
 
+from dbbstation.facts import picked
 from dbbstation.facts.serialise import Kept
 from dbbstation.facts.value import finite
 from dbbstation.history.standardised import BASELINE
 from dbbstation.history.watch import DECIDED_BY, TrendEvent
 from dbbstation.quality.conformity import Size, conformity
-from dbbstation.results.frame import Framed, picked
+from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

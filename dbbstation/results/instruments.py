@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
+from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import Absent
-from dbbstation.results.frame import of_facts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

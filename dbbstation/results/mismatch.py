@@ -12,6 +12,7 @@ from pydantic import Field
 from dbbstation.diagnosis.table.mismatch import RefittedParameter
 from dbbstation.diagnosis.table.next_measurement import Next, next_measurements
 from dbbstation.diagnosis.table.words import sentence_of
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.provenance import Provenance, write_table
@@ -21,7 +22,7 @@ from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import CauseFinding
-from dbbstation.results.frame import Framed, of_facts, picked
+from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.files.atomic import streamed
 from dbbstation.files.provenance import Provenance
 from dbbstation.nc.remarks import said_acceleration
 from dbbstation.nc.spilled import LongText
-from dbbstation.results.frame import Framed, of_facts, picked
+from dbbstation.results.frame import Framed
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.diagnosis.effects import CauseEffect
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.held import ComparedTolerance, ReportVerdict, ToleranceOfTest
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Kept
 from dbbstation.plan.tolerance import OF_A_MODEL
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.evaluation import EvaluationResult
-from dbbstation.results.frame import Framed, picked
+from dbbstation.results.frame import Framed
 from dbbstation.results.tolerances import held_tolerance
 
 if TYPE_CHECKING:
@@ -139,9 +140,7 @@ def side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircl
     """Yield measured figures, each with the former figures of the same test, direction and repeat."""
     former = {one.key: _sizes(one) for one in before}
     for one in now:
-        yield MeasuredFigures(
-            one.session, one.test, one.direction, one.repeat, now=_sizes(one), before=former.get(one.key)
-        )
+        yield of_facts(MeasuredFigures, one, now=_sizes(one), before=former.get(one.key))
 
 
 def _sizes(one: ToleratedCircle) -> dict[str, MeasuredSize]:

@@ -11,6 +11,7 @@ from dbbstation.diagnosis.simulator.answer import RefittedOfSimulator
 from dbbstation.diagnosis.simulator.nodes import spread_of
 from dbbstation.diagnosis.simulator.separate import SeparatingInput
 from dbbstation.diagnosis.table.words import CONFOUNDED
+from dbbstation.facts import of_facts, picked
 from dbbstation.facts.serialise import Absent, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.atomic import write_text
@@ -18,7 +19,7 @@ from dbbstation.files.provenance import Provenance
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Gains, Verdict
-from dbbstation.results.frame import Framed, of_facts, picked
+from dbbstation.results.frame import Framed
 from dbbstation.results.levels_text import level_sentences
 
 if TYPE_CHECKING:

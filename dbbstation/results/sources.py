@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from dbbstation.calibration.fit.calibrate import default_sources
+from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import Absent
 from dbbstation.machine.geometry import Machine
-from dbbstation.results.frame import of_facts
 from dbbstation.sources.contract import ErrorSource
 
 

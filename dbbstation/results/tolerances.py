@@ -12,6 +12,7 @@ from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.extremes import without_noise
 from dbbstation.circles.path import TOLERATED, Filter
+from dbbstation.facts import of_facts
 from dbbstation.facts.held import HeldTolerance, WorstCircle
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
@@ -63,13 +64,13 @@ def tolerated_circles(
         and (one.figure not in OF_A_MODEL or (one.figure in FILTERED and one.upr != TOLERATED))
     ]
     return tuple(
-        ToleratedCircle(
-            one.session,
-            one.entry.test,
-            str(one.entry.direction),
-            one.entry.repeat,
-            sizes_of(refiltered(one.analysis, TOLERATED), one.known),
-            {key: _size_of(one.analysis, one.known, *key) for key in dict.fromkeys(wanted)},
+        of_facts(
+            ToleratedCircle,
+            one,
+            one.entry,
+            direction=str(one.entry.direction),
+            sizes=sizes_of(refiltered(one.analysis, TOLERATED), one.known),
+            others={key: _size_of(one.analysis, one.known, *key) for key in dict.fromkeys(wanted)},
         )
         for one in circles
         if one.analysis is not None
@@ -80,15 +81,9 @@ def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Toleranc
     """Return the figures with tolerances that combine both directions."""
     wanted = dict.fromkeys((one.figure, one.upr) for one in tolerances if one.figure in OF_BOTH_DIRECTIONS)
     return tuple(
-        ToleratedCircle(
-            pair.one.session,
-            pair.one.entry.test,
-            "both",
-            pair.one.entry.repeat,
-            {},
-            {key: _size_of_pair(pair, *key) for key in wanted},
-        )
+        of_facts(ToleratedCircle, pair.one, pair.one.entry, direction="both", sizes={}, others=sizes)
         for pair in (pairs if wanted else ())
+        for sizes in [{key: _size_of_pair(pair, *key) for key in wanted}]
     )
 
 

@@ -13,6 +13,7 @@ from dbbstation.control.commands import correction_of
 from dbbstation.control.kinematics import HELD_BY_BACKLASH, component, settings
 from dbbstation.control.parameters import FITTED, TRIED, SourceLeft, drawn_poses, hal_lines, home_mm, refitted, tables
 from dbbstation.errors import ModelError, StationError
+from dbbstation.facts import of_facts
 from dbbstation.files.atomic import refuse_outputs, write_folder, write_text
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import read_model
@@ -23,7 +24,6 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.travel import check_travel
 from dbbstation.results.control import KinematicsResult, ParametersResult
-from dbbstation.results.frame import of_facts
 from dbbstation.results.model_warnings import model_warnings
 from dbbstation.tasks.programs import program_text, sha256_of
 

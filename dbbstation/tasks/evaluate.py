@@ -68,10 +68,10 @@ def evaluate(
         plane_uncertainty_um,
     )
     from dbbstation.calibration.reporting.prediction import predicted_circles
+    from dbbstation.facts import of_facts
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.results.evaluation import EvaluationResult
-    from dbbstation.results.frame import of_facts
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.tasks.load import loaded
     from dbbstation.tasks.models import model_of

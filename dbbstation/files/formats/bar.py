@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dbbstation.errors import Problem
+from dbbstation.facts import of_facts
 from dbbstation.facts.quantities import BarMm, ExpansionUmMK, FormUm, Quantity, TemperatureDegc, Text
 from dbbstation.facts.record import Day, Moment
 from dbbstation.files.atomic import write_text
@@ -98,21 +99,17 @@ class BarFile(Schema):
         Args:
             stroke_mm: travel of its gauge by the instrument file; None if not stated.
         """
-        return Bar(
-            serial_number=self.serial_number,
+        return of_facts(
+            Bar,
+            self,
             calibrated_length_mm=self.length_mm,
             calibrator_uncertainty_mm=self.uncertainty_mm,
-            calibrated=self.calibrated,
-            temp_c=self.temp_c,
-            expansion_um_m_k=self.expansion_um_m_k,
             stroke_mm=stroke_mm,
             reading_mm=self.readings.mean_mm,
-            temp_uncertainty_k=self.temp_uncertainty_k,
             calibrator_serial_number=self.calibrator.serial_number,
             calibrator_certificate=self.calibrator.certificate or None,
             calibrator_certified=self.calibrator.certified,
             calibrator_valid_until=self.calibrator.valid_until,
-            ball_form_um=self.ball_form_um,
         )
 
 

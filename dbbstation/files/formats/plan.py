@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import Problem
+from dbbstation.facts import of_facts
 from dbbstation.facts.quantities import BarMm, Quantity, Text, twice
 from dbbstation.files.formats.jig import (
     BY_CMM,
@@ -167,16 +168,14 @@ def _planned(test: TestSchema, ball: Ball, general: PathSchema) -> PlannedTest:
     path = general.model_copy(update=override)
     directions = tuple(Direction(direction) for direction in path.directions)
     x, y, z = ball.centre_mm
-    circle = Circle(
+    circle = of_facts(
+        Circle,
+        path,
+        test,
         ball_mm=ball.centre_mm,
         centre_mm=(x, y, z + path.radius_mm * math.sin(math.radians(test.elevation_deg))),
         bar_mm=path.radius_mm,
         tilt_deg=(test.a_deg, test.b_deg, test.c_deg),
-        feed_mm_min=path.feed_mm_min,
-        start_deg=path.start_deg,
-        overshoot_deg=path.overshoot_deg,
-        feed_in_mm=path.feed_in_mm,
-        elevation_deg=test.elevation_deg,
         direction=directions[0],
     )
     return PlannedTest(test.name, ball, circle, directions)

@@ -34,6 +34,9 @@ NOISE_ALONE = 0.5
 FORM_DECADES = 6.0
 """Decades of the uniform prior of a form's log power."""
 
+OF_A_LINE = 2.0
+"""Degrees of freedom of a line: cosine and sine."""
+
 NOTHING_UM2 = 1e-24
 """Least noise power [µm²], below the rounding of any length, 3e-11 µm at 150 mm. Computed paths and differences of
 equal paths have less."""
@@ -75,26 +78,25 @@ class ContinuedNoise:
         return np.asarray(self.powers[which] * strength[:, None])
 
 
-def continued_noise(below: Floats, above: Floats, freedom: float = 2.0) -> ContinuedNoise:
+def continued_noise(below: Floats, above: Floats) -> ContinuedNoise:
     """Extrapolate one turn's noise to lines 0, 1, ... low.
 
     Args:
         below: power at these lines, form included, shape (low + 1,) [µm²].
         above: noise power at the lines above, shape (h,) [µm²].
-        freedom: degrees of freedom of each line.
     """
     low = len(below) - 1
-    found = continuations(freedom * above, low, freedom, _processes)
+    found = continuations(OF_A_LINE * above, low, OF_A_LINE, _processes)
     if found is None:
         white = np.full((1, low + 1), max(float(above.mean()), NOTHING_UM2))
-        return ContinuedNoise(white, np.ones(1), np.array([freedom * len(above)]))
+        return ContinuedNoise(white, np.ones(1), np.array([OF_A_LINE * len(above)]))
     powers = np.maximum(found.powers, NOTHING_UM2)
     ratio = np.maximum(below[FIRST_FORM:], NOTHING_UM2) / powers[:, FIRST_FORM:]
     alone = NOISE_ALONE * ratio * np.exp(-np.minimum(ratio, 700.0))  # both are densities of the logarithm of the power
     with_form = (1.0 - NOISE_ALONE) * -np.expm1(-ratio) / (FORM_DECADES * np.log(10.0))
     likely = found.likely - _ALIKE + np.log(alone + with_form + np.finfo(float).tiny).sum(axis=1)
     weights = np.exp(likely - likely.max())
-    least = 2.0 / (freedom * len(above))
+    least = 2.0 / (OF_A_LINE * len(above))
     return ContinuedNoise(powers, weights / weights.sum(), 2.0 / np.clip(found.variances, least, 1.0))
 
 

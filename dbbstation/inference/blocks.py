@@ -72,20 +72,6 @@ def spread_over(blocks: Sequence[Block], columns: Integers) -> Floats:
     return narrow
 
 
-def joined(blocks: Sequence[Block], columns: int) -> Block:
-    """Join blocks with equal noise to one block over all columns."""
-    if any(block.noise is not None for block in blocks):
-        raise ValueError("blocks with a noise of their own cannot be joined with others")
-    triangle = triangle_of(spread(blocks, columns))
-    return Block(
-        columns=np.arange(columns),
-        triangle=triangle[:, :-1],
-        target=triangle[:, -1],
-        count=sum(block.count for block in blocks),
-        square=sum(block.square for block in blocks),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Columns:
     """Prior knowledge of columns.

@@ -51,7 +51,6 @@ class Misfit:
     probability: float
     noise: float
     rms: float
-    ratio: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,13 +199,13 @@ def misfit(
     freedom = max(float(counts.sum()) - freedom_used, 1.0)
     measured = np.r_[mean, by_harmonic[:low]]
     if not np.all(noise.power > 0.0):
-        return Misfit(1.0, 0.0, 0.0, 1.0)
+        return Misfit(1.0, 0.0, 0.0)
     ratio = float(np.sum(measured / noise.power)) / freedom
     expected = float(counts @ noise.power) * freedom / max(float(counts.sum()), 1.0)
     samples = np.mean([len(residual) for residual in residuals])
     excess = max(float(measured.sum()) - expected, 0.0) / len(residuals) / samples
     probability = float(fdtrc(freedom, noise.freedom, ratio))
-    return Misfit(probability, float(np.sqrt(noise.power[0])), float(np.sqrt(excess)), ratio)
+    return Misfit(probability, float(np.sqrt(noise.power[0])), float(np.sqrt(excess)))
 
 
 def centred_coefficients(

@@ -103,7 +103,6 @@ class Solution:
 
     x: Floats
     spreads: Spreads
-    directions: Directions
     held: Floats
     chi2: float
     stated_chi2: float
@@ -137,7 +136,6 @@ def solve(
     inner, cross = root[:m, :m], root[:m, m:]
     scale = known.scale[fitted]
     seen = root[m:, m:] * scale
-    directions = directions_of(seen)
     held = np.zeros((0, len(fitted))) if held is None else held
     free = complement(held)
     u, s, vt = np.linalg.svd(seen @ free.T, full_matrices=False)
@@ -173,7 +171,6 @@ def solve(
     return Solution(
         x=x,
         spreads=spreads,
-        directions=directions,
         held=held,
         chi2=arrow.floor + float(remaining @ remaining),
         stated_chi2=stated_chi2,

@@ -40,32 +40,31 @@ class Garbage:
 Heard: TypeAlias = Piece | Garbage
 
 
-def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, status: Status = "ok") -> bytes:
+def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0) -> bytes:
     """Return the bytes of one sample.
 
     Args:
-        length_mm: None: no length, reported as `fault` unless `status` is given.
+        length_mm: None: no length, reported as `fault`. A length that does not fit becomes `overrange`, or `fault` if the
+            device has no such status.
         counter: taken modulo the wire's modulus.
-        status: a length that does not fit becomes `overrange`, or `fault` if the device has no such status.
 
     Raises:
         InstrumentError: the protocol cannot express it.
     """
-    if length_mm is None and status == "ok":
-        status = "fault"
     length, features = protocol.length, protocol.features
-    value = 0.0 if length_mm is None else (length_mm - length.zero_mm) / length.mm_per_unit()
-    if status == "ok":
+    told: tuple[Status, ...] = ("fault",)
+    if length_mm is not None:
+        value = (length_mm - length.zero_mm) / length.mm_per_unit()
         try:
             return protocol.frames[0].write(Content(value, counter, features=features))
         except NotRepresentable:
-            status, value = "overrange", 0.0
-    for wanted in ("overrange", "fault") if status == "overrange" else ("fault",):
+            told = ("overrange", "fault")
+    for wanted in told:
         voice = protocol.voice(wanted)
         if voice is not None:
-            return _told(voice[0], Content(value, counter, voice[1], features))
+            return _told(voice[0], Content(0.0, counter, voice[1], features))
     raise InstrumentError(
-        f"its protocol cannot express {status!r}",
+        f"its protocol cannot express {told[0]!r}",
         where=protocol.name,
         remedy="give this status to a code, a special or a message frame of the protocol file",
     )

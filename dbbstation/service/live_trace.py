@@ -161,11 +161,6 @@ class Derived:
         return self.measured.run
 
     @property
-    def circle(self) -> Circle:
-        """Return the commanded circle."""
-        return self.measured.circle
-
-    @property
     def theta_deg(self) -> Floats:
         """Return angles from +X towards +Y, shape (n,) [deg]."""
         return self.measured.theta_deg[: len(self)]

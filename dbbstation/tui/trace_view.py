@@ -77,11 +77,6 @@ class TraceView(Widget):
         self._members: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
         self._captioned = ""
 
-    @property
-    def scale_um(self) -> float:
-        """Return the deviation at the outer ring [µm]."""
-        return self._scale_um
-
     def show(
         self,
         circle: Circle | None,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.inference.blocks import Columns, compress, joined, spread
+from dbbstation.inference.blocks import Columns, compress, spread
 from dbbstation.inference.noise import noise_of
 from dbbstation.inference.square_root import lost_directions, solve, unseen_combinations
 
@@ -174,13 +174,6 @@ def test_blocks_spread_over_all_columns_say_the_same(problem):
         expected += whole.T @ whole
     np.testing.assert_allclose(wide.T @ wide, expected, rtol=1e-10, atol=1e-10)
     assert spread([], size).shape == (0, size + 1)
-
-
-def test_a_block_of_its_own_noise_cannot_be_joined(problem):
-    jacobians, columns, targets, known, _ = problem
-    blocks = blocks_of(jacobians, columns, targets)
-    with pytest.raises(ValueError, match="noise of their own"):
-        joined([blocks[0], replace(blocks[1], noise=0.1)], len(known.prior))
 
 
 @pytest.mark.parametrize("held", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, -0.6, 0.0]])

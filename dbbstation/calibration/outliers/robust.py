@@ -23,18 +23,15 @@ def calibrate_robust(
     observations: Sequence[Observation],
     *,
     balls: bool = True,
-    begun: tuple[Calibration, tuple[Outlier, ...]] | None = None,
 ) -> tuple[Calibration, tuple[Outlier, ...]]:
     """Fit, and refit after each detected outlier.
-
-    Args:
-        begun: earlier result, before balls were freed, to continue from.
 
     Raises:
         CalibrationError: as raised by `fit`.
     """
-    calibration, before = begun or (fit(list(observations)), ())
-    runs, found = list(calibration.observations), list(before)
+    calibration = fit(list(observations))
+    runs = list(calibration.observations)
+    found: list[Outlier] = []
     while len(found) < MOST:
         step = _next(fit, calibration, runs, balls=balls)
         if step is None:

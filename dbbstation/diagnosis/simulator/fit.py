@@ -40,15 +40,11 @@ class SimulatorFit:
 
     Attributes:
         columns: derivatives by fitted parameters, shape (n, m).
-        curved: relative difference between responses to two doses, shape (m,).
     """
 
     state: FittedState
     residual: Floats
     columns: Floats
-    curved: Floats
-    squares: float
-    starts: tuple[float, ...] = ()
 
 
 def plain(rows: Floats) -> Floats:
@@ -107,12 +103,9 @@ def fit(
     starts = [start, *(_elsewhere(work, start, partial(_squares, work, weigh, sigma)) if several else ())]
     ended = [_from(work, one, weigh, sigma, most_steps) for one in starts]
     squares = [float(np.sum(_weighed(work, state, residual, weigh, sigma) ** 2)) for state, residual in ended]
-    best = int(np.argmin(squares))
-    state, residual = ended[best]
+    state, residual = ended[int(np.argmin(squares))]
     answers = work.answers(state, directions_of(work, state), rms(residual))
-    return SimulatorFit(
-        state, residual, answers.columns, answers.curved, squares[best], tuple(np.delete(squares, best).tolist())
-    )
+    return SimulatorFit(state, residual, answers.columns)
 
 
 def _from(

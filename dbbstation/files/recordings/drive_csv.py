@@ -35,14 +35,12 @@ class DriveFile:
 
     Attributes:
         numbers: known columns by name, each of shape (n,), in the unit of the name.
-        others: texts of further columns by name.
         warnings: findings that do not invalidate it.
     """
 
     file: str
     line: int
     numbers: dict[str, Floats]
-    others: dict[str, tuple[str, ...]]
     warnings: tuple[Problem, ...]
 
     def recording(self, force_per_ampere_n: float | None = None) -> DriveRecording:
@@ -122,10 +120,10 @@ def _checked(table: TableFile, warnings: Faults) -> DriveFile:
     if not faults:
         _check_values(numbers, table.lines.tolist(), faults)
     refuse(faults[:MOST_FAULTS])
-    others = {name: table.cells[name] for name in names if name not in LARGEST}
-    for name in others:
-        warnings.add(f"the column `{name}` is not known; it is kept and not used", line=header)
-    return DriveFile(file, header, numbers, others, tuple(warnings))
+    for name in names:
+        if name not in LARGEST:
+            warnings.add(f"the column `{name}` is not known; it is kept and not used", line=header)
+    return DriveFile(file, header, numbers, tuple(warnings))
 
 
 def _check_names(names: list[str], line: int, faults: Faults) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -151,7 +151,6 @@ class RunFile:
     header: Mapping[str, str] = field(default_factory=dict)
     unknown_columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
-    sha256: str = ""
     status: tuple[str, ...] = ()
 
 
@@ -184,7 +183,7 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
         raise InputError([changed(str(path))])
     if isinstance(run, InputError):
         raise run
-    return replace(run, sha256=digest.hexdigest())
+    return run
 
 
 def _hashed(blocks: Iterable[bytes], digest: hashlib._Hash) -> Iterator[bytes]:

@@ -47,7 +47,6 @@ class Lines:
         ended: whether the last row ends with a line end.
     """
 
-    file: str
     header: dict[str, str]
     header_line: int
     columns: tuple[str, ...]
@@ -156,7 +155,7 @@ def split_pieces(blocks: Iterable[bytes], faults: Faults) -> Iterator[Lines]:
             names = _names(lines[at], above + 1, faults)
             if names is None:
                 return
-            top = Lines(faults.file, header, above + 1, names, [], range(0), ended)
+            top = Lines(header, above + 1, names, [], range(0), ended)
             above += 1
             lines = lines[at + 1 :]  # noqa: PLW2901 (the rest of them)
         rows = [*foot, *lines]

@@ -19,7 +19,6 @@ def test_a_recording_with_comments_and_further_columns():
     assert recording.t_s.tolist() == [0.0, 0.001]
     assert recording.position_mm.tolist() == [1.0, 1.5]
     assert recording.force_n.tolist() == [2.0, -3.0]
-    assert file.others == {"temperature": ("20.1", "20.2")}
     assert [str(w) for w in file.warnings] == [
         "x.csv:3: the column `temperature` is not known; it is kept and not used"
     ]

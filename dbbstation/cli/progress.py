@@ -10,7 +10,7 @@ import os
 import sys
 from contextlib import contextmanager
 from time import monotonic as now_s
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from rich.progress import Progress
+
+    from dbbstation.tasks.telling import Progress as Tell
 
 _LOG = logging.getLogger(__name__)
 
@@ -43,13 +45,6 @@ _DUMB = {"dumb", "unknown"}
 
 COUNTED, SHARE, ENDLESS = "{task.completed:.0f} of {task.total:.0f}{task.fields[unit]}", "{task.percentage:3.0f}%", ""
 """Forms of a bar: done and total; per cent; elapsed time if the end is unknown."""
-
-
-class Tell(Protocol):
-    """Receives the progress of work."""
-
-    def __call__(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Receive the name of a stage and, if countable, its completed part."""
 
 
 class ProgressBar:

@@ -114,7 +114,7 @@ class AcceptanceScreen(RowScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         ("h", "former", "Session before"),
         ("k", "cancel", "End"),
-        ("escape,q", "back", "Back"),
+        ("escape,q", "dismiss", "Back"),
     ]
 
     def __init__(self, after: After, search: Callable[[Path], BeforeAndNow] = before_and_now) -> None:
@@ -159,9 +159,6 @@ class AcceptanceScreen(RowScreen):
 
     def action_cancel(self) -> None:
         self._after.cancel()
-
-    def action_back(self) -> None:
-        self.dismiss()
 
     def _offered(self) -> list[str]:
         formers = self._found.formers if self._found is not None else ()

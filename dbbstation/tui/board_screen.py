@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 from dbbstation.quality.answer import Advice
 from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
 
     from dbbstation.plan.plan import PlannedTest
-    from dbbstation.service.board import Board
+    from dbbstation.tui.app import StationApp
 
 
 @dataclass(frozen=True)
@@ -48,22 +48,10 @@ _GIVES_UP = {"repeat": "Repeat", "reject": "Reject"}
 """Commands that end a running circle, after a question."""
 
 
-class Desk(Protocol):
-    """Methods of `StationApp` that a screen needs."""
-
-    board: Board
-
-    def send(self, command: Command) -> None:
-        """Pass a command on to the sequence."""
-
-    def draw(self) -> None:
-        """Draw the screen on top."""
-
-
 class BoardScreen(ExplainedScreen):
     """A screen whose parts show the board."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: StationApp) -> None:
         super().__init__()
         self.desk = desk
         self._keys: object = None
@@ -98,7 +86,7 @@ class RunScreen(BoardScreen):
         ("p", "tell('resume')", "Go on"),
     ]
 
-    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, desk: StationApp, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(desk)
         self._show = shown
         self._clock = clock

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunCompleted
-    from dbbstation.tui.board_screen import Desk, Shown
+    from dbbstation.tui.app import StationApp
+    from dbbstation.tui.board_screen import Shown
 
 
 _NAME = 12
@@ -84,7 +85,7 @@ class MeasureScreen(RunScreen):
         ("g", "view", "View"),
     ]
 
-    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, desk: StationApp, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(desk, shown, clock=clock)
         self._view = View.MEASURED
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.held_line import ProbeOutcome
-    from dbbstation.tui.row_screen import StationDesk
+    from dbbstation.tui.app import StationApp
 
 _Kind = TypeVar("_Kind", Order, Gate)
 _Value = TypeVar("_Value")
@@ -44,19 +44,16 @@ class NewScreen(RowScreen):
         ("b", "begin", "Begin"),
         ("l", "probe", "Listen at the port"),
         ("delete", "empty", "Empty"),
-        ("escape,q", "back", "Back"),
+        ("escape,q", "dismiss", "Back"),
     ]
 
-    def __init__(self, reception: StationDesk, front: Front, choice: Choice) -> None:
+    def __init__(self, reception: StationApp, front: Front, choice: Choice) -> None:
         super().__init__()
         self.choice = choice
         self._reception, self._front = reception, front
 
     def on_mount(self) -> None:
         self._show()
-
-    def action_back(self) -> None:
-        self.dismiss()
 
     def action_begin(self) -> None:
         missing = self.choice.missing()

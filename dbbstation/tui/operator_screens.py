@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.operated import Answered, JobAnswer, Operated
-    from dbbstation.tui.row_screen import StationDesk
+    from dbbstation.tui.app import StationApp
 
 _NAME = 16
 
@@ -40,7 +40,7 @@ class JobScreen(RowScreen):
 
     help_name = "job"
 
-    def __init__(self, reception: StationDesk, front: Front, operated: Operated) -> None:
+    def __init__(self, reception: StationApp, front: Front, operated: Operated) -> None:
         super().__init__()
         self._reception, self._front, self._operated = reception, front, operated
         self._choice: Choice | None = None

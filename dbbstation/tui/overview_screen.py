@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
 
     from dbbstation.station.events import RunCompleted
-    from dbbstation.tui.board_screen import Desk, Shown
+    from dbbstation.tui.app import StationApp
+    from dbbstation.tui.board_screen import Shown
 
-_VERDICT_BEFORE = {"take_back": RunDecision.ACCEPTED, "accept_again": RunDecision.REJECTED}
-"""Verdict that each key takes back."""
+_VERDICT_BEFORE = {False: RunDecision.ACCEPTED, True: RunDecision.REJECTED}
+"""Verdict that a key takes back, by whether the run counts then."""
 
 
 class OverviewScreen(BoardScreen):
@@ -41,12 +42,12 @@ class OverviewScreen(BoardScreen):
         Binding("right", "turn(1)", "Second direction", show=False),
         ("enter", "go_to", "Go to"),
         ("h", "earlier", "Earlier run"),
-        ("x", "take_back", "Does not count"),
-        ("a", "accept_again", "Counts again"),
-        ("o,escape", "back", "Back"),
+        ("x", "judge(False)", "Does not count"),
+        ("a", "judge(True)", "Counts again"),
+        ("o,escape", "dismiss", "Back"),
     ]
 
-    def __init__(self, desk: Desk, shown: Shown, *, judging: bool = True) -> None:
+    def __init__(self, desk: StationApp, shown: Shown, *, judging: bool = True) -> None:
         super().__init__(desk)
         self._judging = judging
         self._show = shown
@@ -77,15 +78,14 @@ class OverviewScreen(BoardScreen):
             return GoTo in board.allowed and bool(self.choice.tests)
         if action == "earlier":
             return len(self._runs()) > 1
-        if action in _VERDICT_BEFORE and not self._judging:
-            return False
-        if action in _VERDICT_BEFORE:
-            run = self._run()
+        if action == "judge":
+            run, accepted = self._run(), bool(parameters[0])
             return (
-                (Judge in board.allowed or board.state is State.FINISHED)
+                self._judging
+                and (Judge in board.allowed or board.state is State.FINISHED)
                 and run is not None
-                and (run.figures is not None or action == "take_back")
-                and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[action]
+                and (run.figures is not None or not accepted)
+                and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[accepted]
             )
         return super().check_action(action, parameters)
 
@@ -104,39 +104,22 @@ class OverviewScreen(BoardScreen):
 
     def action_go_to(self) -> None:
         self.desk.send(GoTo(self.choice.test, self.choice.direction(self._show)))
-        self.action_back()
-
-    def action_take_back(self) -> None:
-        completed = self._run()
-        if completed is None:
-            return
-
-        def answered(reason: str | None) -> None:
-            if reason:
-                self._judge(completed, accepted=False, reason=reason)
-
-        self.app.push_screen(ReasonQuestion(completed.run.label), answered)
-
-    def action_accept_again(self) -> None:
-        completed = self._run()
-        if completed is None:
-            return
-        if completed.answer.word is not Advice.REPEAT:
-            self._judge(completed, accepted=True, reason="")
-            return
-
-        def answered(reason: str | None) -> None:
-            if reason:
-                self._judge(completed, accepted=True, reason=reason)
-
-        self.app.push_screen(ReasonQuestion(completed.run.label, counts=True), answered)
-
-    def action_back(self) -> None:
         self.dismiss()
 
-    def _judge(self, completed: RunCompleted, *, accepted: bool, reason: str) -> None:
+    def action_judge(self, accepted: bool) -> None:  # noqa: FBT001 - as the key has it
+        completed = self._run()
+        if completed is None:
+            return
         run = completed.run
-        self.desk.send(Judge(run.test, run.direction, run.repeat, accepted, reason))
+
+        def answered(reason: str | None) -> None:
+            if reason is not None:
+                self.desk.send(Judge(run.test, run.direction, run.repeat, accepted, reason))
+
+        if accepted and completed.answer.word is not Advice.REPEAT:
+            answered("")
+        else:
+            self.app.push_screen(ReasonQuestion(run.label, counts=accepted), answered)
 
     def _runs(self) -> tuple[RunCompleted, ...]:
         return self.choice.runs(self.desk.board, self._show)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.held_line import HeldLine
-    from dbbstation.tui.row_screen import StationDesk
+    from dbbstation.tui.app import StationApp
 
 _GOOD, _OPEN, _NOTE = "✓", "!", "·"
 """Signs: checked and good; unknown; note."""
@@ -44,12 +44,12 @@ class PrepareScreen(RowScreen):
         ("y", "all", "Confirm all"),
         ("t", "temperature", "Temperature"),
         ("w", "programs", "NC programs"),
-        ("escape,q", "back", "Back"),
+        ("escape,q", "dismiss", "Back"),
     ]
 
     def __init__(
         self,
-        reception: StationDesk,
+        reception: StationApp,
         front: Front,
         choice: Choice,
         prepared: Prepared,
@@ -112,9 +112,6 @@ class PrepareScreen(RowScreen):
             return
         self.say(texts.START_OPENS.format(folder=self._prepared.job.folder.name))
         self._reception.open(self._choice, self._prepared, self.failed)
-
-    def action_back(self) -> None:
-        self.dismiss()
 
     @property
     def _list(self) -> Mapping[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.containers import VerticalScroll
 from textual.content import Content
@@ -14,33 +14,9 @@ from dbbstation.tui.help_screen import HELP
 from dbbstation.tui.now_line import banner
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
+    from collections.abc import Sequence
 
     from textual.app import ComposeResult
-
-    from dbbstation.service.choice import Choice, Prepared
-
-
-_Outcome = TypeVar("_Outcome")
-
-
-class StationDesk(Protocol):
-    """Interface that works in the background, opens jobs and shows results, such as `StationApp`."""
-
-    def do(
-        self,
-        work: Callable[[], _Outcome],
-        then: Callable[[_Outcome], None],
-        failed: Callable[[Exception], None],
-    ) -> None:
-        """Do work of some seconds; `then` receives its outcome, `failed` a StationError."""
-
-    def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
-        """Open a job and show its screen."""
-
-    def show_results(self, folder: Path) -> None:
-        """Show the possible tasks on a measured session."""
 
 
 class ExplainedScreen(Screen[None]):

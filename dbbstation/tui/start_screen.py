@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.session_list import SessionLine
-    from dbbstation.tui.row_screen import StationDesk
+    from dbbstation.tui.app import StationApp
 
 _NAME = 22
 
@@ -37,7 +37,7 @@ class StartScreen(RowScreen):
         ("e", "results", "Results"),
     ]
 
-    def __init__(self, reception: StationDesk, front: Front) -> None:
+    def __init__(self, reception: StationApp, front: Front) -> None:
         super().__init__()
         self._reception, self._front = reception, front
         self._sessions: tuple[SessionLine, ...] = ()

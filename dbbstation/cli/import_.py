@@ -20,18 +20,16 @@ from dbbstation.tasks.declare import Option
 from dbbstation.text.written import printable, repeats_in_order
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from dbbstation.cli.asking import Asker
     from dbbstation.files.formats.mapping import MappingFile
-    from dbbstation.files.formats.plan import PlanFile
-    from dbbstation.files.formats.session import SessionDetails
     from dbbstation.files.recordings.foreign_csv import ForeignTable
-    from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Plan
     from dbbstation.results.exchange import ImportResult
     from dbbstation.tasks.importing.names import RunName
     from dbbstation.tasks.importing.runs import ImportedRun, Reader
+    from dbbstation.tasks.importing.session import ImportedSession
 
 CONDITIONS = ("temperature", "operator", "job", "bar")
 """Conditions that a session notes and tables lack."""
@@ -108,8 +106,7 @@ def import_(
     asker = Asker()
     told = _Told(runs, started, frozenset(trust), not_known)
     found = _read(asker, files, of_mapping, (plan, machine), told, noted)
-    writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
-    with staged(*writes, dry=dry_run) as put:
+    with staged(out, found, dry=dry_run) as put:
         if not as_json:
             _show(found)
         if not dry_run:
@@ -134,17 +131,6 @@ class _Told:
     not_known: Sequence[str]
 
 
-@dataclass(frozen=True)
-class _Import:
-    mapping: MappingFile
-    plan: PlanFile
-    machine: Machine
-    runs: Sequence[ImportedRun]
-    details: SessionDetails
-    statements: Sequence[str]
-    more: Mapping[str, str | bytes]
-
-
 def _read(
     asker: Asker,
     files: Sequence[Path],
@@ -152,12 +138,12 @@ def _read(
     paths: tuple[Path | None, Path | None],
     said: _Told,
     noted: SessionOptions,
-) -> _Import:
+) -> ImportedSession:
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.formats.session import Note
     from dbbstation.tasks.importing.runs import Reader
-    from dbbstation.tasks.importing.session import originals
+    from dbbstation.tasks.importing.session import ImportedSession, originals
 
     tables = read_tables(files, of_mapping)
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
@@ -185,7 +171,7 @@ def _read(
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(noted.details(), notes=notes)
     more = originals({path: table.data for path, table in tables.items()}, mapping, provenance(), statements)
-    return _Import(mapping, inline, nominal, runs, details, statements, more)
+    return ImportedSession(mapping, inline, nominal, runs, details, statements, more)
 
 
 def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
@@ -195,7 +181,7 @@ def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
         click.confirm(printable(question), abort=True, err=True)
 
 
-def _result(found: _Import, out: Path, *, written: bool) -> ImportResult:
+def _result(found: ImportedSession, out: Path, *, written: bool) -> ImportResult:
     from dbbstation.results.exchange import ImportResult, TakenRun
 
     runs = tuple(
@@ -368,7 +354,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequ
     return [*found, *(f"not stated: {one}" for one in unknown)]
 
 
-def _show(found: _Import) -> None:
+def _show(found: ImportedSession) -> None:
     from dbbstation.trace.columns import LENGTH, TIME
 
     print_table(

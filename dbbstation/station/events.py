@@ -65,7 +65,14 @@ class StateChanged:
 
 
 @dataclass(frozen=True)
-class RunAnnounced:
+class OfTheRun:
+    """An event of a run."""
+
+    run: RunId
+
+
+@dataclass(frozen=True)
+class RunAnnounced(OfTheRun):
     """The next run and its set-up.
 
     Attributes:
@@ -73,7 +80,6 @@ class RunAnnounced:
         sampling: what the instrument sees at this feed; None if its rate is not known.
     """
 
-    run: RunId
     ball: Ball
     circle: Circle
     put_up: bool
@@ -92,40 +98,34 @@ class ReadingsSeen:
 
 
 @dataclass(frozen=True)
-class RunStarted:
+class RunStarted(OfTheRun):
     """The bar is outside the circle. All following samples belong to the run."""
 
-    run: RunId
     program: str
 
 
 @dataclass(frozen=True)
-class SamplesRecorded:
+class SamplesRecorded(OfTheRun):
     """Samples of the current run, in time order."""
 
-    run: RunId
     samples: tuple[Sample, ...]
 
 
 @dataclass(frozen=True)
-class FeedInSeen:
+class FeedInSeen(OfTheRun):
     """The bar has entered the circle."""
-
-    run: RunId
-    t_s: float
 
 
 @dataclass(frozen=True)
-class RunProgress:
+class RunProgress(OfTheRun):
     """Progress of the run, at most once per degree."""
 
-    run: RunId
     swept_deg: float
     of_deg: float
 
 
 @dataclass(frozen=True)
-class RunCompleted:
+class RunCompleted(OfTheRun):
     """The recording has ended.
 
     Attributes:
@@ -135,7 +135,6 @@ class RunCompleted:
         counts_beside: another accepted run of the same test and direction, which counts too; or None.
     """
 
-    run: RunId
     samples: int
     lost: int
     figures: CircleFigures | None
@@ -157,26 +156,23 @@ class RunCompleted:
 
 
 @dataclass(frozen=True)
-class RunDoubted:
+class RunDoubted(OfTheRun):
     """The circle just completed shows that an accepted run contradicts the others."""
 
-    run: RunId
     finding: Finding
 
 
 @dataclass(frozen=True)
-class RunRestored:
+class RunRestored(OfTheRun):
     """An older run still awaits its verdict."""
 
-    run: RunId
     samples: tuple[Sample, ...]
 
 
 @dataclass(frozen=True)
-class FeedInMissed:
+class FeedInMissed(OfTheRun):
     """The machine is on the circle, but no run is being recorded."""
 
-    run: RunId
     problem: str
 
 
@@ -189,31 +185,28 @@ class Noted:
 
 
 @dataclass(frozen=True)
-class RunAccepted:
+class RunAccepted(OfTheRun):
     """The run counts.
 
     Attributes:
         beside: an accepted run of the same test and direction that counts too.
     """
 
-    run: RunId
     reason: str = ""
     beside: RunId | None = None
 
 
 @dataclass(frozen=True)
-class RunRejected:
+class RunRejected(OfTheRun):
     """The run does not count; its recording is kept."""
 
-    run: RunId
     reason: str
 
 
 @dataclass(frozen=True)
-class RunLate:
+class RunLate(OfTheRun):
     """The machine did not start; the run is announced again."""
 
-    run: RunId
     problem: str
 
 
@@ -221,8 +214,6 @@ class RunLate:
 class CommandRefused:
     """The present state does not allow a command; it had no effect."""
 
-    command: Command
-    state: State
     why: str
 
 

@@ -183,7 +183,7 @@ class Sequencer:
         """Execute a command, or refuse it in this state."""
         cause = COMMAND_CAUSES[type(command)]
         if cause not in TRANSITIONS[self.state]:
-            self._out.append(events.CommandRefused(command, self.state, self._why_not(cause)))
+            self._out.append(events.CommandRefused(self._why_not(cause)))
             return self._told()
         match command:
             case Start():
@@ -326,7 +326,7 @@ class Sequencer:
                 self._judge(command)
         except KeyError as error:
             what = "the plan has no test" if isinstance(command, GoTo) else "no complete recording is called"
-            self._out.append(events.CommandRefused(command, self.state, f"{what} {error.args[0]}"))
+            self._out.append(events.CommandRefused(f"{what} {error.args[0]}"))
             return
         self._to_next(COMMAND_CAUSES[type(command)])
 
@@ -413,7 +413,7 @@ class Sequencer:
         self._flush()
         record.fed_in_s = t_s
         self._waiting_since_s, self._told_deg = now_s, 0.0
-        self._out.append(events.FeedInSeen(record.run, t_s))
+        self._out.append(events.FeedInSeen(record.run))
         self._move(Trigger.FED_IN)
 
     def _tell_progress(self) -> None:

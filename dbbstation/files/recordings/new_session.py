@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.facts import of_facts
 from dbbstation.files.atomic import write_folder
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
@@ -69,50 +70,10 @@ def write_session(
     more: Mapping[str, str | bytes] | None = None,
     at: datetime | None = None,
 ) -> None:
-    """Write a complete session or nothing; `at` as for `make_session_folder`.
-
-    Raises:
-        OutputError: the folder exists, lies in another session, or cannot be written.
-    """
-    files: dict[str, str | bytes] = dict(more or {})
-    entries = []
-    for run in runs:
-        name = f"{RUNS}/{run_name(run.test, run.direction, run.repeat)}"
-        files[name] = data = _run_bytes(run)
-        program = None
-        if run.program is not None:
-            path = f"{PROGRAMS}/{run.program[0]}"
-            files[path] = run.program[1]
-            program = CommandedProgram(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
-        entry = RunEntry(
-            test=run.test,
-            direction=run.direction,
-            repeat=run.repeat,
-            mounting=run.mounting,
-            state=run.state,
-            reason=run.reason,
-            started=run.started,
-            path=folder / name,
-            sha256=hashlib.sha256(data).hexdigest(),
-            program=program,
-        )
-        entries.append(entry)
-    make_session_folder(folder, machine, plan, details or SessionDetails(), entries, files, at)
-
-
-def make_session_folder(
-    folder: Path,
-    machine: Machine,
-    plan: PlanFile,
-    details: SessionDetails,
-    entries: Sequence[RunEntry],
-    files: Mapping[str, str | bytes],
-    at: datetime | None = None,
-) -> None:
     """Make a sealed session folder with its event log, completely or not at all.
 
     Args:
-        files: content by relative path, besides machine, plan and session file.
+        more: content by relative path, besides runs, machine, plan and session file.
         at: for the log; None for a computed session, which then always has the same bytes.
 
     Raises:
@@ -122,18 +83,29 @@ def make_session_folder(
     refuse_recorded(folder)
     if folder.exists():
         raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
-    whole: dict[str, str | bytes] = {f"{RUNS}/": "", f"{PROGRAMS}/": "", **files}
-    whole[MACHINE_FILE], whole[PLAN_FILE] = machine_text(machine), plan_text(plan)
-    sealed = {name: str(whole[name]).encode() for name in (MACHINE_FILE, PLAN_FILE)}
+    files: dict[str, str | bytes] = {f"{RUNS}/": "", f"{PROGRAMS}/": "", **(more or {})}
+    entries = []
+    for run in runs:
+        name = f"{RUNS}/{run_name(run.test, run.direction, run.repeat)}"
+        files[name] = data = _run_bytes(run)
+        program = None
+        if run.program is not None:
+            path = f"{PROGRAMS}/{run.program[0]}"
+            files[path] = run.program[1]
+            program = CommandedProgram(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
+        digest = hashlib.sha256(data).hexdigest()
+        entries.append(of_facts(RunEntry, run, path=folder / name, sha256=digest, program=program))
+    files[MACHINE_FILE], files[PLAN_FILE] = machine_text(machine), plan_text(plan)
+    sealed = {name: str(files[name]).encode() for name in (MACHINE_FILE, PLAN_FILE)}
     now = {name: hashlib.sha256(content).hexdigest() for name, content in sealed.items()}
-    whole |= {copy_name(name, now[name]): content for name, content in sealed.items()}
-    runs = chained(entries)
-    noted = replace(details, seal=sealed_over(now, runs))
-    said = session_data(folder, (MACHINE_FILE, PLAN_FILE), noted, runs)
+    files |= {copy_name(name, now[name]): content for name, content in sealed.items()}
+    chain = chained(entries)
+    noted = replace(details or SessionDetails(), seal=sealed_over(now, chain))
+    said = session_data(folder, (MACHINE_FILE, PLAN_FILE), noted, chain)
     _check_details(text_of(said), folder, plan)
-    whole[EVENTS_FILE], marked = first_log(said, at)
-    whole[SESSION_FILE] = text_of(marked)
-    write_folder(folder, whole, read_only=lambda name: is_copy(name) or name.startswith(f"{RUNS}/"))
+    files[EVENTS_FILE], marked = first_log(said, at)
+    files[SESSION_FILE] = text_of(marked)
+    write_folder(folder, files, read_only=lambda name: is_copy(name) or name.startswith(f"{RUNS}/"))
 
 
 def _check_details(text: str, folder: Path, plan: PlanFile) -> None:

@@ -157,25 +157,15 @@ class SessionStore:
         Raises:
             OutputError: the file has changed since it was read, or the disk refuses; both are restored.
         """
-        state = session_state(data)
-        if not self.log.events and "seal" in state:
-            self._write_both(data, state, SEALED, change({}, state), text)
-        elif members := change(self.state, state):
-            self._write_both(data, state, what, members, text)
-
-    def _write_both(
-        self,
-        data: Mapping[str, Any],
-        state: dict[str, object],
-        what: str,
-        members: Mapping[str, Any],
-        text: Callable[[Mapping[str, Any]], str],
-    ) -> None:
+        state, before = session_state(data), self.log
+        first = not before.events and "seal" in state
+        members = change({} if first else self.state, state)
+        if not (first or members):
+            return
         if self.changed_meanwhile() is not None:
             raise self._another("")
-        before = self.log
         if "seal" in state:
-            self.log = appended(before, what, self._clock(), members)
+            self.log = appended(before, SEALED if first else what, self._clock(), members)
         said = text({**data, **({"seal": marked(state, self.log)["seal"]} if "seal" in state else {})})
         try:
             self._put(said)

@@ -13,7 +13,7 @@ from dbbstation.files.places import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.journal import RunWriter, run_name
 from dbbstation.files.recordings.lock import SessionLock
-from dbbstation.files.recordings.new_session import make_session_folder
+from dbbstation.files.recordings.new_session import write_session
 from dbbstation.files.recordings.run_csv import sha256_of
 from dbbstation.files.recordings.seal import chained, hashes, keep_copies, sealed_names, sealed_over
 from dbbstation.files.recordings.session import no_session, part_entry, read_session
@@ -50,11 +50,6 @@ class SessionWriter(Closing):
         """Unlock the session for others; may be called twice."""
         self._lock.close()
 
-    @property
-    def locked(self) -> bool:
-        """Return whether the session is locked for others; False on a file system without locks."""
-        return self._lock.held
-
     @classmethod
     def create(
         cls,
@@ -70,7 +65,7 @@ class SessionWriter(Closing):
             InputError: a value that a session must not contain.
             OutputError: the folder exists, lies in another session, or cannot be written.
         """
-        make_session_folder(folder, machine, plan, details or SessionDetails(), (), {}, clock())
+        write_session(folder, machine, plan, (), details, at=clock())
         return cls._locked(folder, 0.0, clock)
 
     @classmethod

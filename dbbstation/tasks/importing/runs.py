@@ -30,7 +30,7 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import impossible_day
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.run_csv import count_in
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.circle import Direction
 from dbbstation.tasks.importing.moments import UnclearMomentError, moment_of
 from dbbstation.tasks.importing.names import WORDS, RunName, named_by, run_name
 from dbbstation.tasks.importing.plausible import centre_mm, chance_of_centres, check_units
@@ -66,7 +66,6 @@ class ImportedRun:
 
     file: str
     run: FinishedRun
-    circle: Circle
     computed: tuple[str, ...]
 
     @property
@@ -259,7 +258,7 @@ class Reader:
             texts=texts,
             exact=True,
         )
-        return ImportedRun(file, run, circle, (*computed, *travelled.computed))
+        return ImportedRun(file, run, (*computed, *travelled.computed))
 
     def _values(self, table: ForeignTable, rows: Integers) -> tuple[dict[str, Floats], tuple[str, ...]]:
         found, said = {}, list[str]()

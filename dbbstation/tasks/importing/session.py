@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,17 +49,21 @@ def originals(
     return kept
 
 
+@dataclass(frozen=True)
+class ImportedSession:
+    """All that a session is written from, with the statements about it and further files."""
+
+    mapping: MappingFile
+    plan: PlanFile
+    machine: Machine
+    runs: Sequence[ImportedRun]
+    details: SessionDetails
+    statements: Sequence[str]
+    more: Mapping[str, str | bytes]
+
+
 @contextmanager
-def staged(
-    folder: Path,
-    machine: Machine,
-    plan: PlanFile,
-    runs: Sequence[ImportedRun],
-    details: SessionDetails,
-    more: Mapping[str, str | bytes],
-    *,
-    dry: bool,
-) -> Iterator[Callable[[], None]]:
+def staged(folder: Path, found: ImportedSession, *, dry: bool) -> Iterator[Callable[[], None]]:
     """Write a session into a temporary folder, read it and cut every accepted run. Yield a function that moves it to its place; otherwise it is removed.
 
     Args:
@@ -81,8 +85,9 @@ def staged(
         raise OutputError(f"cannot be written: {error.strerror}", where=str(folder), remedy="check the disk") from error
     try:
         written = made / folder.name
-        write_session(written, machine, plan, [one.run for one in runs], details, more, datetime.now(UTC))
-        _try_out(written, runs)
+        runs = [one.run for one in found.runs]
+        write_session(written, found.machine, found.plan, runs, found.details, found.more, datetime.now(UTC))
+        _try_out(written, found.runs)
 
         def put() -> None:
             rename(written, folder)

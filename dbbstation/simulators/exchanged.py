@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,11 +28,17 @@ RUNS_AWAY = 1e12
 """Factor of growth of a port input over its first value beyond which the iteration diverges."""
 
 
+@dataclass(frozen=True, eq=False)
 class ExchangedSimulator(Simulator):
-    """A simulator with the terms as inputs at its ports."""
+    """A simulator with the terms as inputs at its ports.
 
-    def __init__(self, ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...]) -> None:
-        self._ports, self._outputs = dict(ports), outputs
+    Attributes:
+        ports: names of the signals by port.
+    """
+
+    ports: Mapping[str, tuple[str, ...]]
+    outputs: tuple[str, ...]
+    limit_s: float
 
     @property
     @abstractmethod
@@ -39,31 +46,26 @@ class ExchangedSimulator(Simulator):
         """Return its name for error messages."""
 
     @abstractmethod
-    def simulate_once(
-        self,
-        inputs: Mapping[str, Floats],
-        parameters: Mapping[str, float],
-        acting: Mapping[str, Floats],
-    ) -> Mapping[str, Floats]:
-        """Return outputs by name, and signals as `port.signal`, shape (n,), for inputs at the ports, shape (n,)."""
+    def simulate_once(self, columns: Mapping[str, Floats], parameters: Mapping[str, float]) -> Mapping[str, Floats]:
+        """Return outputs by name, and signals as `port.signal`, shape (n,), for inputs, also at the ports, shape (n,)."""
 
     def simulate(
         self, inputs: Mapping[str, Floats], parameters: Mapping[str, float], ports: Ports
     ) -> Mapping[str, Floats]:
         """Simulate until port inputs and signals agree."""
         t = inputs["t"]
-        acting = {name: np.zeros(len(t)) for name in self._ports}
+        acting = {name: np.zeros(len(t)) for name in self.ports}
         first = 0.0
         for _ in range(MOST_EXCHANGES):
-            found = self.simulate_once(inputs, parameters, acting)
-            after = {name: self._acts(name, t, found, ports) for name in self._ports}
+            found = self.simulate_once({**inputs, **acting}, parameters)
+            after = {name: self._acts(name, t, found, ports) for name in self.ports}
             size = max((float(np.abs(values).max(initial=0.0)) for values in after.values()), default=0.0)
             change = max((float(np.abs(after[name] - acting[name]).max(initial=0.0)) for name in after), default=0.0)
             first = first or size
             if change <= SETTLED * size:
-                return {name: found[name] for name in self._outputs if name in found}
+                return {name: found[name] for name in self.outputs if name in found}
             if not np.isfinite(change) or size > RUNS_AWAY * first:
-                return {name: np.full(len(t), np.nan) for name in self._outputs}
+                return {name: np.full(len(t), np.nan) for name in self.outputs}
             acting = after
         what = f"what acts at the ports and the signals there do not agree after {MOST_EXCHANGES} rounds"
         raise SimulationFault(f"{what}; record fewer rows at a time, or write the simulator as a Python class")
@@ -71,7 +73,7 @@ class ExchangedSimulator(Simulator):
     def _acts(self, name: str, t: Floats, found: Mapping[str, Floats], ports: Ports) -> Floats:
         """Return the input of a port for these signals, shape (n,)."""
         signals = {}
-        for signal in self._ports[name]:
+        for signal in self.ports[name]:
             values = found.get(f"{name}.{signal}")
             if values is None or values.shape != t.shape:
                 raise SimulationFault(f"its result has no `{name}.{signal}` with {len(t)} rows")

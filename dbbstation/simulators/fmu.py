@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,36 +47,23 @@ def fault_of_fmu(path: Path) -> str:
     return f"holds {len(sizes):,} files, at most {MOST_FILES:,} are unpacked" if len(sizes) > MOST_FILES else ""
 
 
+@dataclass(frozen=True, eq=False)
 class FmuSimulator(ExchangedSimulator):
     """An FMU with outputs at equal steps, interpolated linearly.
 
-    Args:
+    Attributes:
         variables: FMU's names by the program's names; signals are `port.signal` or `signal`.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        variables: Mapping[str, str],
-        ports: Mapping[str, tuple[str, ...]],
-        outputs: tuple[str, ...],
-        limit_s: float,
-    ) -> None:
-        super().__init__(ports, outputs)
-        self._path, self._variables, self._limit_s = path, dict(variables), limit_s
-        self._signals = {f"{port}.{signal}": signal for port, signals in ports.items() for signal in signals}
+    path: Path
+    variables: Mapping[str, str]
 
     @property
     def said(self) -> str:
         """Return its path."""
-        return str(self._path)
+        return str(self.path)
 
-    def simulate_once(
-        self,
-        inputs: Mapping[str, Floats],
-        parameters: Mapping[str, float],
-        acting: Mapping[str, Floats],
-    ) -> Mapping[str, Floats]:
+    def simulate_once(self, columns: Mapping[str, Floats], parameters: Mapping[str, float]) -> Mapping[str, Floats]:
         """Simulate the FMU once.
 
         Raises:
@@ -85,20 +73,22 @@ class FmuSimulator(ExchangedSimulator):
             import fmpy  # noqa: PLC0415 - an extra
         except ImportError:
             raise SimulationFault("FMPy is not installed; `pip install 'dbbstation[fmu]'`") from None
-        t = inputs["t"]
-        driven = {self._of(name): values for name, values in {**inputs, **acting}.items() if name != "t"}
+        t = columns["t"]
+        driven = {self._of(name): values for name, values in columns.items() if name != "t"}
         table = np.zeros(len(t), dtype=[("time", np.float64), *((name, np.float64) for name in driven)])
         table["time"] = t
         for name, values in driven.items():
             table[name] = values
-        wanted = {name: self._of(name) for name in self._outputs} | {
-            name: self._variables.get(name, self._of(signal)) for name, signal in self._signals.items()
+        wanted = {name: self._of(name) for name in self.outputs} | {
+            f"{port}.{signal}": self.variables.get(f"{port}.{signal}", self._of(signal))
+            for port, signals in self.ports.items()
+            for signal in signals
         }
         try:
             # FMPy leaves a file open whose description it cannot read, so it gets the content.
-            description = fmpy.read_model_description(io.BytesIO(content_of(self._path)))
+            description = fmpy.read_model_description(io.BytesIO(content_of(self.path)))
             found = fmpy.simulate_fmu(
-                str(self._path),
+                str(self.path),
                 model_description=description,
                 start_time=float(t[0]),
                 stop_time=float(t[-1]),
@@ -106,13 +96,13 @@ class FmuSimulator(ExchangedSimulator):
                 start_values={self._of(name): value for name, value in parameters.items()},
                 input=table if driven else None,
                 output=list(dict.fromkeys(wanted.values())),
-                timeout=self._limit_s,
+                timeout=self.limit_s,
             )
         except FOREIGN as error:
-            raise SimulationFault(f"{self._path.name}: {error}") from error
+            raise SimulationFault(f"{self.path.name}: {error}") from error
         if float(found["time"][-1]) < float(t[-1]) - 1e-6 * float(t[-1] - t[0]):
-            raise SimulationFault(f"{self._path.name} takes longer than {self._limit_s:g} s; raise `time_limit_s`")
+            raise SimulationFault(f"{self.path.name} takes longer than {self.limit_s:g} s; raise `time_limit_s`")
         return {name: np.interp(t, found["time"], found[variable]) for name, variable in wanted.items()}
 
     def _of(self, name: str) -> str:
-        return self._variables.get(name, name)
+        return self.variables.get(name, name)

@@ -50,7 +50,6 @@ class LoadedSimulator:
     source: Path | ExchangedSimulator
     file: SimulatorFile
     model: Model
-    tables: tuple[TableFile, ...]
     own: tuple[PortSource, ...]
     own_files: tuple[Path, ...]
 
@@ -98,19 +97,19 @@ def load_simulator(
         tuple(Output(name, one.unit, one.filter_s or 0.0) for name, one in file.outputs.items()),
         tuple(_recorded(file, table) for table in tables),
     )
-    return LoadedSimulator(path, source, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
+    return LoadedSimulator(path, source, file, model, tuple(_own(own_files, file)), tuple(own_files))
 
 
 def _source(path: Path, file: SimulatorFile) -> Path | ExchangedSimulator:
     ports = {name: tuple(port.signals) for name, port in file.ports.items()}
     if file.program is not None:
         command = whole_command(file.program, path.parent)
-        return ProgramSimulator(command, ports, tuple(file.outputs), file.time_limit_s)
+        return ProgramSimulator(ports, tuple(file.outputs), file.time_limit_s, command)
     if file.fmu is not None:
         fmu = (path.parent / file.fmu).absolute()
         if fault := fault_of_fmu(fmu):
             raise InputError.of(path.parent / file.fmu, fault, "name another FMU")
-        return FmuSimulator(fmu, file.variables, ports, tuple(file.outputs), file.time_limit_s)
+        return FmuSimulator(ports, tuple(file.outputs), file.time_limit_s, fmu, file.variables)
     python = path.parent / str(file.python)
     simulator_of(python)
     return python

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,30 +35,22 @@ LINES_TOLD = 3
 """Number of last lines on standard error that are reported if the program fails."""
 
 
+@dataclass(frozen=True, eq=False)
 class ProgramSimulator(ExchangedSimulator):
     """A program that runs once per simulation, in an empty folder.
 
-    Args:
+    Attributes:
         command: with whole paths of files beside the model file.
     """
 
-    def __init__(
-        self, command: tuple[str, ...], ports: Mapping[str, tuple[str, ...]], outputs: tuple[str, ...], limit_s: float
-    ) -> None:
-        super().__init__(ports, outputs)
-        self._command, self._limit_s = command, limit_s
+    command: tuple[str, ...]
 
     @property
     def said(self) -> str:
         """Return its command."""
-        return " ".join(self._command)
+        return " ".join(self.command)
 
-    def simulate_once(
-        self,
-        inputs: Mapping[str, Floats],
-        parameters: Mapping[str, float],
-        acting: Mapping[str, Floats],
-    ) -> Mapping[str, Floats]:
+    def simulate_once(self, columns: Mapping[str, Floats], parameters: Mapping[str, float]) -> Mapping[str, Floats]:
         """Run the program once.
 
         Raises:
@@ -65,7 +58,6 @@ class ProgramSimulator(ExchangedSimulator):
         """
         with tempfile.TemporaryDirectory(prefix="dbbstation-") as name:
             folder = Path(name)
-            columns = {**inputs, **acting}
             with (folder / INPUTS).open("w", encoding="utf-8", newline="") as file:
                 writer = csv.writer(file, lineterminator="\n")
                 writer.writerow(columns)
@@ -77,7 +69,7 @@ class ProgramSimulator(ExchangedSimulator):
     def _run(self, folder: Path) -> None:
         said = f"`{self.said}`"
         try:
-            done = run_bounded(self._command, folder, ProgramBounds(self._limit_s, MOST_MEMORY_MB, MOST_OUTPUT_MB))
+            done = run_bounded(self.command, folder, ProgramBounds(self.limit_s, MOST_MEMORY_MB, MOST_OUTPUT_MB))
         except BoundExceededError as error:
             remedy = "; raise `time_limit_s`" if error.of_time else ""
             raise SimulationFault(f"{said} {error}{remedy}") from None

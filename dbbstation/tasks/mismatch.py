@@ -197,22 +197,15 @@ def mismatch(
     numbers = number_language(decimal, separator)
     if simulator is not None:
         from dbbstation.simulators.allowed import require_allowed, simulator_file
+        from dbbstation.simulators.loading import load_simulator
         from dbbstation.tasks.mismatch_simulator import with_simulator
 
         simulator = simulator_file(str(simulator))
         if allowed is not None:
             telling.note(*filter(None, [require_allowed(simulator, allowed, allow=allow)]))
-        return with_simulator(
-            simulator,
-            data,
-            source_files,
-            numbers,
-            telling,
-            matters=matters,
-            most=most_runs,
-            hold_out=held_out,
-            keeps=not anew,
-        )
+        files: tuple[Any, Any] = data, source_files  # paths, which were checked
+        loaded = load_simulator(simulator, *files, numbers)
+        return with_simulator(loaded, telling, matters=matters, most=most_runs, hold_out=held_out, keeps=not anew)
     if measured is None or simulated is None:
         name = "measured" if measured is None else "simulated"
         raise ArgumentError(name, "give `measured` and `simulated`, columns of the table, or `simulator`")

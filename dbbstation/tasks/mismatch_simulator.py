@@ -3,38 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.simulator.answer import find
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.results.simulator import SimulationsRun, simulator_result
 from dbbstation.simulators.code import missing_code
-from dbbstation.simulators.loading import load_simulator
 from dbbstation.simulators.running import MOST_SECONDS, Runs
 from dbbstation.tasks.drawing import drawing
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison
-    from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.results.simulator import SimulatorResult
+    from dbbstation.simulators.loading import LoadedSimulator
     from dbbstation.tasks.telling import Telling
 
 
 def with_simulator(
-    simulator: Any,  # noqa: ANN401 - a path that was checked
-    recordings: Any,  # noqa: ANN401 - the same
-    own_files: Any,  # noqa: ANN401 - the same
-    numbers: NumberLanguage | None,
-    telling: Telling,
-    *,
-    matters: float | None,
-    most: int | None,
-    hold_out: bool,
-    keeps: bool,
+    loaded: LoadedSimulator, telling: Telling, *, matters: float | None, most: int | None, hold_out: bool, keeps: bool
 ) -> SimulatorResult:
-    """Compare a simulator with recordings."""
-    loaded = load_simulator(simulator, recordings, own_files, numbers)
+    """Compare a simulator with its recordings."""
     model = loaded.model
     with Runs(loaded, most=most, keeps=keeps) as runs:
         values = [parameter.value for parameter in model.parameters]

@@ -7,9 +7,9 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from dbbstation.cli.declared import made
+from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.figures import G_LOW_PASSED
-from dbbstation.cli.output import echo, print_json, print_table, say
+from dbbstation.cli.output import echo, print_table, say
 from dbbstation.cli.progress import COUNTED, ENDLESS, ProgressBar
 from dbbstation.errors import OutputError
 from dbbstation.files.places import unused_path
@@ -29,8 +29,7 @@ def demo(
     seed: o.Seed = 3,
     quick: Annotated[bool, Option("Three tests instead of fifteen, in both directions.")] = False,
     control: Annotated[Literal["linuxcnc"] | None, Option("Compare four corrections in this control.")] = None,
-    as_json: o.Json = False,
-) -> None:
+) -> Answer:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
 
     Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand. The commands are shown as they run. Their files stay in the folder.
@@ -46,6 +45,7 @@ def demo(
       dbbstation demo --out try-it --seed 7
       sudo dbbstation demo --quick --control linuxcnc   (needs LinuxCNC; fifteen minutes)
     """
+    from dbbstation.demo.in_control import run_ways
     from dbbstation.demo.whole_job import QUICK, run_demo
 
     folder = out or unused_path(Path(), "dbbstation-demo")
@@ -53,27 +53,17 @@ def demo(
     if folder.exists() and control is None:
         raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
     shown = DemoShown()
-    if control is not None:
-        from dbbstation.demo.in_control import run_ways
-
-        try:
-            ways = run_ways(folder, seed, shown.tell, shown.progress, tests)
-        finally:
-            shown.bar.end()
-        if as_json:
-            print_json({"folder": str(folder), "ways": [asdict(way) for way in ways]})
-        else:
-            _print_ways(ways)
-        return
     try:
+        if control is not None:
+            ways = run_ways(folder, seed, shown.tell, shown.progress, tests)
+            told = {"folder": str(folder), "ways": [asdict(way) for way in ways]}
+            return Answer(told, lambda: _print_ways(ways))
         result = run_demo(folder, seed, shown.tell, shown.progress, tests)
     finally:
         shown.bar.end()
-    if as_json:
-        printed = {name: json.loads(text) for name, text in result.printed.items()}
-        print_json({"folder": str(folder), "runs": [asdict(run) for run in result.runs], **printed})
-    else:
-        _print(result)
+    printed = {name: json.loads(text) for name, text in result.printed.items()}
+    told = {"folder": str(folder), "runs": [asdict(run) for run in result.runs], **printed}
+    return Answer(told, lambda: _print(result))
 
 
 class DemoShown:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -60,35 +60,27 @@ class LineClosedError(InstrumentError):
     """The system closed the line, as after unplugging."""
 
 
+@dataclass(frozen=True, eq=False)
 class Link:
     """An open line to an instrument."""
 
-    def __init__(
-        self,
-        port: Port,
-        *,
-        name: str,
-        owned: bool,
-        log: ByteLog | None = None,
-        marks: Marks | None = None,
-        has_bits: bool = True,
-    ) -> None:
-        self._port = port
-        self._owned = owned
-        self._log = log
-        self._marks = marks
-        self._has_bits = has_bits
-        self.name = name
+    port: Port
+    _: KW_ONLY
+    name: str
+    owned: bool
+    log: ByteLog | None = None
+    marks: Marks | None = None
+    has_bits: bool = True
 
     @property
     def sees_damage(self) -> bool:
         """Return whether wrong parity or stop bits are detected."""
-        return self._marks is not None
+        return self.marks is not None
 
     @property
     def eighth_bit_marks(self) -> bool:
         """Return whether the eighth bit of a seven-bit character can only mark wrong parity."""
-        return self._marks is not None and self._has_bits
+        return self.marks is not None and self.has_bits
 
     def read(self) -> bytes:
         """Return the bytes that arrive within a short wait; may be empty.
@@ -97,28 +89,28 @@ class Link:
             LineClosedError: the line is closed.
         """
         try:
-            raw = self._port.read(1)
+            raw = self.port.read(1)
             if raw:
                 raw += self._rest()
         except _ERRORS as error:
             raise self._gone(error) from None
-        if self._marks is not None:
-            raw = self._marks.taken_out(raw)
-        if raw and self._log is not None:
-            self._log.note("<", raw)
+        if self.marks is not None:
+            raw = self.marks.taken_out(raw)
+        if raw and self.log is not None:
+            self.log.note("<", raw)
         return raw
 
     def _rest(self) -> bytes:
         with suppress(*_ERRORS):
             # What is wrong with the line comes up again with the next read; what was read is not thrown away for it.
-            if isinstance(self._port, SocketPort):
+            if isinstance(self.port, SocketPort):
                 # A socket does not tell how much has come; without patience it gives all of it.
-                self._port.timeout = 0
-                rest = self._port.read(_MOST)
-                self._port.timeout = _TICK_S
+                self.port.timeout = 0
+                rest = self.port.read(_MOST)
+                self.port.timeout = _TICK_S
                 return rest
-            waiting = self._port.in_waiting
-            return self._port.read(waiting) if waiting else b""
+            waiting = self.port.in_waiting
+            return self.port.read(waiting) if waiting else b""
         return b""
 
     def write(self, raw: bytes) -> None:
@@ -127,17 +119,17 @@ class Link:
         Raises:
             LineClosedError: the line is closed.
         """
-        if self._log is not None:
-            self._log.note(">", raw)
+        if self.log is not None:
+            self.log.note(">", raw)
         try:
-            self._port.write(raw)
+            self.port.write(raw)
         except _ERRORS as error:
             raise self._gone(error) from None
 
     def close(self) -> None:
         """Close the port if this link opened it."""
-        if self._owned:
-            _close_quietly(self._port)
+        if self.owned:
+            _close_quietly(self.port)
 
     def _gone(self, error: Exception) -> LineClosedError:
         return LineClosedError(
@@ -258,12 +250,6 @@ class Adapter:
     product: int
     serial_number: str
     socket: str
-
-    @property
-    def text(self) -> str:
-        """Return the identity in words: vendor:product and serial number or socket."""
-        own = self.serial_number or f"in USB socket {self.socket}"
-        return f"{self.vendor:04x}:{self.product:04x} {own}".strip()
 
 
 def adapter_of(port: str) -> Adapter | None:

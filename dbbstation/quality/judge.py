@@ -177,22 +177,16 @@ class SessionRuns:
             every=tuple(other for other in self._runs if other is not one),
         )
 
-    def _opposite(self, one: Seen) -> Seen | None:
-        found = [
-            other
-            for other in self._of_test.get(one.run.test, ())
-            if other.run.circle.direction is not one.run.circle.direction
-        ]
+    def _alike(self, one: Seen, *, turned: bool) -> list[Seen]:
+        way = one.run.circle.direction
+        return [o for o in self._of_test.get(one.run.test, ()) if (o.run.circle.direction is not way) is turned]
 
+    def _opposite(self, one: Seen) -> Seen | None:
         def nearness(other: Seen) -> tuple[bool, bool, int]:
             return other.run.mounting == one.run.mounting, other.run.repeat == one.run.repeat, other.run.repeat
 
-        return max(found, key=nearness, default=None)
+        return max(self._alike(one, turned=True), key=nearness, default=None)
 
     def _earlier(self, one: Seen) -> Seen | None:
-        earlier = [
-            other
-            for other in self._of_test.get(one.run.test, ())
-            if other.run.circle.direction is one.run.circle.direction and other.run.repeat < one.run.repeat
-        ]
+        earlier = [other for other in self._alike(one, turned=False) if other.run.repeat < one.run.repeat]
         return max(earlier, key=lambda other: other.run.repeat, default=None)

@@ -69,7 +69,7 @@ def export(
     from dbbstation.files.recordings.session import read_session
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.exchange import ExportResult
-    from dbbstation.tasks.exporting import exporting, write_csv, write_parquet
+    from dbbstation.tasks.exporting import blocks, exporting, write_csv, write_parquet
 
     path = Path(out)
     if path.suffix.lower() not in FORMATS:
@@ -84,5 +84,6 @@ def export(
     what = exporting(runs)
     telling = Telling(progress, stop, say)
     write = write_csv if is_csv else write_parquet
-    rows = write(path, what, provenance or from_python, telling.counted("export"), telling.note, force=force)
+    read = blocks(what, telling.counted("export"), telling.note)
+    rows = write(path, what, read, provenance or from_python, force=force)
     return ExportResult(str(path), len(runs), rows, what.names)

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.recording import Recording
 
+    Blocks = Iterator[Mapping[str, Floats | list[str]]]
+    """Columns of each run."""
+
 OF_RUN = ("session", "test", "direction", "repeat", "mounting", "state", "started")
 """Columns that are the same in all rows of a run."""
 
@@ -152,15 +155,7 @@ def blocks(
     progress(len(what.runs), len(what.runs))
 
 
-def write_csv(
-    path: Path,
-    what: Exporting,
-    provenance: Callable[[], Provenance],
-    progress: Callable[[int, int], None],
-    say: Callable[[str], None],
-    *,
-    force: bool,
-) -> int:
+def write_csv(path: Path, what: Exporting, read: Blocks, provenance: Callable[[], Provenance], *, force: bool) -> int:
     """Write the table as CSV with its provenance file; return the number of rows.
 
     Raises:
@@ -170,7 +165,7 @@ def write_csv(
     rows = 0
     with streamed(path, force=force) as file:
         file.write(csv_text([what.names]).encode())
-        for block in blocks(what, progress, say):
+        for block in read:
             cells = [_cells(block[name], whole=name in _WHOLE) for name in what.names]
             file.write(csv_text(zip(*cells, strict=True), exact=True).encode())
             rows += len(cells[0])
@@ -197,13 +192,7 @@ def pyarrow_for(path: Path) -> tuple[Any, Any]:
 
 
 def write_parquet(
-    path: Path,
-    what: Exporting,
-    provenance: Callable[[], Provenance],
-    progress: Callable[[int, int], None],
-    say: Callable[[str], None],
-    *,
-    force: bool,
+    path: Path, what: Exporting, read: Blocks, provenance: Callable[[], Provenance], *, force: bool
 ) -> int:
     """Write the table as Parquet with one row group per run, provenance and meanings; return the number of rows.
 
@@ -222,7 +211,7 @@ def write_parquet(
     schema = pa.schema([pa.field(name, kind(name), metadata={"meaning": meanings[name]}) for name in what.names])
     rows = 0
     with streamed(path, force=force) as file, parquet.ParquetWriter(file, schema) as writer:
-        for block in blocks(what, progress, say):
+        for block in read:
             arrays = [pa.array(block[name], from_pandas=True, safe=False).cast(kind(name)) for name in what.names]
             table = pa.Table.from_arrays(arrays, schema=schema)
             writer.write_table(table, row_group_size=max(len(table), 1))

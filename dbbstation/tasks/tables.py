@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -176,7 +177,7 @@ def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table
         read_table(one, needed, asked.numbers) if isinstance(one, Path) else given_table(one, needed) for one in tables
     ]
     reader = _Reader(files, asked, like.unit)
-    values = {name: np.concatenate([file.values[name] for file in files]) for name in reader.names}
+    values = reader.values
     rows, blocks, names = reader.order(values, [name for name in needed if name != asked.run], clock)
     if not len(rows):
         raise InputError.of(files[0].file, "no row has all values", "fill them in", line=files[0].header)
@@ -194,13 +195,7 @@ def load_rows(tables: Sequence[Path | Columns], asked: TableOptions, like: Table
         clock=next((v for v in variables if v.name == clock), None),
         like=like,
     )
-    texts = {name: [cell for file in files for cell in file.cells[name]] for name in reader.names}
-    return Tabulated(
-        table,
-        tuple(reader.names),
-        {name: tuple(column[k] for k in rows.tolist()) for name, column in texts.items()},
-        tuple(reader.notes),
-    )
+    return reader.tabulated(table, rows)
 
 
 LARGEST_SIZE = 1e60
@@ -251,10 +246,20 @@ class _Reader:
         if elsewhere:
             self.notes.append(f"not in every file and left out: {', '.join(elsewhere)}")
 
+    @cached_property
+    def values(self) -> dict[str, Floats]:
+        """Return the columns that all files have, by name."""
+        return {name: np.concatenate([file.values[name] for file in self._files]) for name in self.names}
+
+    def tabulated(self, table: Table, rows: Integers) -> Tabulated:
+        """Return a table with the texts of its rows, and the notes."""
+        cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self.names}
+        texts = {name: tuple(column[k] for k in rows.tolist()) for name, column in cells.items()}
+        return Tabulated(table, tuple(self.names), texts, tuple(self.notes))
+
     def read(self) -> Tabulated:
         """Return the table."""
-        asked = self._asked
-        values = {name: np.concatenate([file.values[name] for file in self._files]) for name in self.names}
+        asked, values = self._asked, self.values
         chosen, derivatives = self._chosen(values), self._derivatives(values)
         clock = self._clock(chosen)
         used = [asked.measured, asked.simulated, *chosen, *derivatives, *([clock] if clock else [])]
@@ -270,7 +275,6 @@ class _Reader:
         at = self._variable(clock, kept[clock], quiet=True) if clock else None
         self._note_order(clock, at, blocks)
         others = self._once([v for v in varying if clock is None or v.name != clock])
-        cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self.names}
         table = Table(
             measured=kept[asked.measured],
             simulated=kept[asked.simulated],
@@ -288,8 +292,7 @@ class _Reader:
             has_offset=asked.has_offset,
         )
         self._refuse_unknown(table)
-        texts = {name: tuple(column[k] for k in rows.tolist()) for name, column in cells.items()}
-        return Tabulated(table, tuple(self.names), texts, tuple(self.notes))
+        return self.tabulated(table, rows)
 
     def _note_order(self, clock: str | None, at: Variable | None, blocks: Sequence[slice]) -> None:
         if clock is not None and at is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -31,7 +32,7 @@ from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.verdict import OUT, Verdict, is_worse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.table.data import Table
@@ -181,61 +182,55 @@ def find_mismatch(
     Raises:
         CalibrationError: the difference is so large that rounding hides its variables.
     """
+    with _precise(table):
+        channel = table.channel(sources)
+        channel = replace(channel, static=static_patterns(channel))
+        settled = settle(channel, most_work=BOUNDS.work, progress=progress)
+        chosen, held_out, residual = list[WithoutPart](), None, channel.residual
+
+        def as_simulated(rows: Flags) -> Floats:
+            return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
+
+        if hold_out:
+            again = partial(chosen_again, beginning=settled.beginning)
+            chosen = selections_without(channel, again, progress, alike=settled.noise.correlation_samples)
+            held_out = held_out_error(channel, chosen, as_simulated)
+        refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
+        is_worse_here = is_worse(rms(settled.left), rms(residual - as_simulated(channel.kept)))
+        left = left_over(settled)
+        parts = ChosenWithoutParts(chosen) if hold_out else None
+        reference = None if held_out is None else held_out.as_simulated
+        levels = levels_of(settled, left, parts, held_out, matters, reference=reference, worse=is_worse_here)
+        if held_out is not None and parts is not None and settled.best.members:
+            held_out = held_out.corrected(parts.errors_with(levels.corrects))
+        values = [values_of_members(one.settled, one.settled.best.members) for one in chosen]
+        findings = read_off(settled, Trial(held_out, refits, values), levels)
+        return Mismatch(
+            table=table,
+            settled=settled,
+            findings=findings,
+            fitted=_fitted(settled, table, refits),
+            left=left,
+            is_worse_here=is_worse_here,
+            levels=levels,
+            held_out=held_out,
+            lacking=lacking or {},
+            texts={source.name: source.texts for source in sources},
+            cancelling=cancelling_of(settled, table.unit),
+        )
+
+
+@contextmanager
+def _precise(table: Table) -> Iterator[None]:
     try:
         with np.errstate(over="raise"):
-            return _found(table, sources, lacking or {}, progress, hold_out=hold_out, matters=matters)
+            yield
     except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = "the difference is so much larger than its noise that rounding hides what it follows"
         remedy = "check that measured and simulated values are of one quantity in the same unit"
         raise CalibrationError(
             what, where=f"{table.simulated_name} beside the measured values", remedy=remedy
         ) from error
-
-
-def _found(
-    table: Table,
-    sources: Sequence[TableSource],
-    lacking: dict[str, str],
-    progress: Callable[..., None],
-    *,
-    hold_out: bool,
-    matters: float | None,
-) -> Mismatch:
-    channel = table.channel(sources)
-    channel = replace(channel, static=static_patterns(channel))
-    settled = settle(channel, most_work=BOUNDS.work, progress=progress)
-    chosen, held_out, residual = list[WithoutPart](), None, channel.residual
-
-    def as_simulated(rows: Flags) -> Floats:
-        return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
-
-    if hold_out:
-        again = partial(chosen_again, beginning=settled.beginning)
-        chosen = selections_without(channel, again, progress, alike=settled.noise.correlation_samples)
-        held_out = held_out_error(channel, chosen, as_simulated)
-    refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
-    is_worse_here = is_worse(rms(settled.left), rms(residual - as_simulated(channel.kept)))
-    left = left_over(settled)
-    parts = ChosenWithoutParts(chosen) if hold_out else None
-    reference = None if held_out is None else held_out.as_simulated
-    levels = levels_of(settled, left, parts, held_out, matters, reference=reference, worse=is_worse_here)
-    if held_out is not None and parts is not None and settled.best.members:
-        held_out = held_out.corrected(parts.errors_with(levels.corrects))
-    values = [values_of_members(one.settled, one.settled.best.members) for one in chosen]
-    findings = read_off(settled, Trial(held_out, refits, values), levels)
-    return Mismatch(
-        table=table,
-        settled=settled,
-        findings=findings,
-        fitted=_fitted(settled, table, refits),
-        left=left,
-        is_worse_here=is_worse_here,
-        levels=levels,
-        held_out=held_out,
-        lacking=lacking,
-        texts={source.name: source.texts for source in sources},
-        cancelling=cancelling_of(settled, table.unit),
-    )
 
 
 @with_one_thread

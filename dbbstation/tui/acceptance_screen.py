@@ -123,7 +123,6 @@ class AcceptanceScreen(RowScreen):
         self._searching: Background[BeforeAndNow] | None = None
         self._found: BeforeAndNow | None = None
         self._failure = ""
-        self._seen: object = None
 
     def on_mount(self) -> None:
         self._searching = Background(lambda: self._search(self._after.session))
@@ -195,9 +194,7 @@ class AcceptanceScreen(RowScreen):
         else:
             self.put([Content.styled(HEADING, "dim"), *(test_line(one) for one in tests)])
             self.about(lines(*self._notes(answer)))
-        if self._seen != (self._after.busy, self._found, self._after.former):
-            self._seen = self._after.busy, self._found, self._after.former
-            self.refresh_bindings()
+        self.keys_by((self._after.busy, self._found, self._after.former))
 
     def _sentence(self) -> tuple[str, bool]:
         result = self._after.results[SessionTask.ACCEPTANCE]

@@ -296,21 +296,25 @@ class StationApp(App[None]):
             self._runner.send(command)
 
     def _judge_afterwards(self, command: Judge) -> None:
-        runner, folder = self._runner, Path(self.board.session)
-        if runner is None:
-            return
-
-        def write() -> None:
-            runner.wait()
-            give_verdict(folder, command)
-
-        def written(_: None) -> None:
+        def written(runner: Runner) -> None:
             word = "accepted" if command.accepted else "rejected"
             why = f": {command.reason}" if command.reason else ""
             self.board.messages.append(Message(Weight.NOTE, f"{command.label} {word}{why}"))
             runner.start()
 
-        self.do(write, written, self._note_fault)
+        self._write_afterwards(lambda folder: give_verdict(folder, command), written)
+
+    def _write_afterwards(self, write: Callable[[Path], object], written: Callable[[Runner], None]) -> None:
+        runner, folder = self._runner, Path(self.board.session)
+        if runner is None:
+            return
+
+        def work() -> Runner:
+            runner.wait()
+            write(folder)
+            return runner
+
+        self.do(work, written, self._note_fault)
 
     def _drop_stale_question(self) -> None:
         question = self.screen_stack[-1] if self.screen_stack else None  # none: the last look may come while it closes
@@ -426,21 +430,16 @@ class StationApp(App[None]):
 
     def _note(self, text: str, degc: float | None, then: Callable[[], None]) -> None:
         """Note a text or a temperature [degC] through the sequence, or in the file after the sequence's end."""
-        runner, folder = self._runner, Path(self.board.session)
-        if runner is None or AddNote in self.board.allowed:
+        if self._runner is None or AddNote in self.board.allowed:
             self.send(AddNote(text, degc))
             then()
             return
 
-        def write() -> None:
-            runner.wait()
-            add_note(folder, text, degc)
-
-        def written(_: None) -> None:
+        def written(_: Runner) -> None:
             self.board.take(Noted(text, degc))
             then()
 
-        self.do(write, written, self._note_fault)
+        self._write_afterwards(lambda folder: add_note(folder, text, degc), written)
 
     def close_down(self) -> None:
         self._wholly = True

@@ -54,15 +54,11 @@ class BoardScreen(ExplainedScreen):
     def __init__(self, desk: StationApp) -> None:
         super().__init__()
         self.desk = desk
-        self._keys: object = None
 
     def draw(self) -> None:
         for panel in self.query(Panel):
             panel.show(self.desk.board)
-        keys = self.keys()
-        if keys != self._keys:
-            self._keys = keys
-            self.refresh_bindings()
+        self.keys_by(self.keys())
 
     def keys(self) -> object:
         board = self.desk.board

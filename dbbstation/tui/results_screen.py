@@ -137,7 +137,6 @@ class ResultsScreen(RowScreen):
     def __init__(self, after: After) -> None:
         super().__init__()
         self._after = after
-        self._seen: object = None
 
     def on_mount(self) -> None:
         self._draw()
@@ -211,9 +210,7 @@ class ResultsScreen(RowScreen):
             self.say(texts.RESULTS_BUSY)
         else:
             self.say(texts.RESULTS_IDLE.format(folder=after.folder))
-        if self._seen != (after.busy, after.model):
-            self._seen = after.busy, after.model
-            self.refresh_bindings()
+        self.keys_by((after.busy, after.model))
 
     def _found(self, step: SessionTask) -> Content:
         result = self._after.results[step]

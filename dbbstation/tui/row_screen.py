@@ -25,6 +25,14 @@ class ExplainedScreen(Screen[None]):
     help_name: ClassVar[str] = ""
     """Name of its text in the help."""
 
+    _keys_by: object = None
+
+    def keys_by(self, now: object) -> None:
+        """Show the keys again if what they depend on has changed."""
+        if now != self._keys_by:
+            self._keys_by = now
+            self.refresh_bindings()
+
     def look(self) -> None:
         """Show changes from other parts of the program."""
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.diagnosis.findings import CurvePoint
-from dbbstation.diagnosis.refit import refitted
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.facts.serialise import plain
@@ -91,8 +91,12 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> JointFitWithCur
     machine = after.layout.machine
     to_all = _to_all(len(source.parameters(machine)) // STRUTS, curve.strut)
     part = _part(source, to_all, curve.strut)
-    begin = {} if curve.period_mm is None else {source.name: _wave(curve, machine)}
-    fit = refitted(after, after.observations, [part], begin)
+    terms = after.layout.terms
+    sources = {term.source.name: term.source for term in terms}.values()
+    begin = {t.source.name: after.x[t.columns] for t in terms if any(parameter.grid for parameter in t.parameters)}
+    if curve.period_mm is not None:
+        begin[source.name] = _wave(curve, machine)
+    fit = calibrate(machine, after.observations, [*sources, part], begin)
     return JointFitWithCurve(source, fit, to_all, curve)
 
 

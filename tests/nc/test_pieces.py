@@ -16,8 +16,8 @@ from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.curve import felt_mm
 from dbbstation.nc.dialects.linuxcnc import LinuxCNC
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
-from dbbstation.nc.pieces import longest
 from dbbstation.nc.planner import LookAhead, Planner
+from dbbstation.nc.splitting import longest
 from dbbstation.nc.toolpath import RowKind
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from tests.nc.test_compensate_any import Wound

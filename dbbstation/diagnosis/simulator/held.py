@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.density import log_density
 from dbbstation.diagnosis.simulator.fit import near
 from dbbstation.diagnosis.simulator.nodes import noise_of
+from dbbstation.diagnosis.simulator.noise_left import noise_left
 from dbbstation.diagnosis.simulator.search import compared_quickly, search
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import KnownGains
 from dbbstation.inference.folds import Fold, HeldOutError, beside, part_numbers
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, followed_by
 from dbbstation.inference.triangle import rms
+from dbbstation.inference.uneven import log_student
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    from dbbstation.computing.arrays import Flags
+    from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.search import SearchOutcome
     from dbbstation.diagnosis.simulator.work import FittedState, SimulationRuns
@@ -138,3 +139,41 @@ def predicted_parts(
 def _without(channel: Channel, out: Flags, found: SearchOutcome) -> Settled:
     """Return the comparison without rows, shape (n,)."""
     return compared_quickly(channel.without(out).thinned(BOUNDS.fold_rows), found.settled.beginning)
+
+
+def log_density(
+    work: SimulationRuns,
+    channel: Channel,
+    rows: Flags,
+    residual: Floats,
+    columns: Floats,
+) -> float:
+    """Return the log density of rows for a refit to other rows [Good 1952]; Student's t for long tails.
+
+    Args:
+        rows: predicted rows, shape (n,).
+        columns: derivatives by fitted parameters, shape (n, m).
+    """
+    bank = noise_left(work, residual, columns, rows=channel)
+    noise, kinds = bank.noise, work.output[channel.kept]
+    sizes = np.array([float(np.mean(bank.spread[kinds == k])) for k in range(len(work.model.outputs))])
+    spread = sizes[work.output[rows]]
+    whitening = noise.whitening(replace(channel, kept=rows, apart=1).stretches)
+
+    def white(values: Floats) -> Floats:
+        even = (values[rows].T / spread).T
+        return (even if whitening is None else whitening @ even) / noise.innovation
+
+    level = 0.0 if whitening is None else float(np.log(whitening.diagonal()).sum())
+    level -= float(np.log(np.sqrt(2.0 * np.pi) * noise.innovation * spread).sum())
+    left = white(residual)
+    if np.isfinite(bank.tails):
+        return level + float(np.sum(log_student(left, bank.tails)))
+    own = bank.whitened(columns) / noise.innovation
+    open_, norm = work.model.inverse_information(own, 1e-10)
+    there = white(columns) / norm
+    # The rows' covariance is one plus there @ open_ @ there.T; Woodbury's formula gives inverse and determinant.
+    inner = np.eye(len(open_)) + open_ @ (there.T @ there)
+    towards = there.T @ left
+    squares = float(left @ left - towards @ np.linalg.solve(inner, open_ @ towards))
+    return level - 0.5 * (squares + float(np.linalg.slogdet(inner)[1]))

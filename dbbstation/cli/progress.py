@@ -155,12 +155,21 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
 
     The bar appears with the first stage.
     """
-    bar = _Stages(ProgressBar(label, SHARE), stages)
+    bar, reached, told = ProgressBar(label, SHARE), 0.0, ""
+
+    def tell(text: str, done: int = 0, of: int = 0) -> None:
+        nonlocal reached, told
+        new, told = text != told, text
+        if new:
+            _LOG.info("... %s", text)
+        reached = max(reached, 1.0, _reached(text, stages, done / of if of else None, reached))
+        bar.show(reached, 100.0, f"{text} {done} of {of}" if of else text, at_once=new)
+
     try:
-        yield bar.tell
-        bar.bar.end(done=True)
+        yield tell
+        bar.end(done=True)
     finally:
-        bar.bar.end()
+        bar.end()
 
 
 @contextmanager
@@ -179,25 +188,6 @@ def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
         yield tell
 
 
-class _Stages:
-    def __init__(self, bar: ProgressBar, stages: Mapping[str, int]) -> None:
-        self.bar = bar
-        self._stages = stages
-        self._reached = 0.0
-        self._told = ""
-
-    def tell(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Move the bar to a stage, or forward within the stage."""
-        new = text != self._told
-        if new:
-            _LOG.info("... %s", text)
-        self._told = text
-        before = self._reached
-        now = _reached_within(text, self._stages, done / of) if of else _reached(text, self._stages, before)
-        self._reached = max(before, 1.0, now)
-        self.bar.show(self._reached, 100.0, f"{text} {done} of {of}" if of else text, at_once=new)
-
-
 def time_left(share: float, passed_s: float) -> str:
     """Return the remaining time, such as `20 s left, `; empty if too early."""
     least_s, least = _TRUSTED
@@ -213,23 +203,12 @@ def _shown() -> bool:
     return sys.stderr.isatty() and not verbose
 
 
-def _stage_of(text: str, stages: Mapping[str, int]) -> tuple[float, float] | None:
-    names = list(stages)
-    here = next((k for k, name in enumerate(names) if text.startswith(name)), None)
+def _reached(text: str, stages: Mapping[str, int], share: float | None, before: float) -> float:
+    """Return the progress [%], at a stage's begin without a share. A repeated stage advances by a quarter of the remaining way."""
+    here = next((k for k, name in enumerate(stages) if text.startswith(name)), None)
     if here is None:
-        return None
-    return stages[names[here]], 100 if here + 1 == len(names) else stages[names[here + 1]]
-
-
-def _reached_within(text: str, stages: Mapping[str, int], share: float) -> float:
-    begins, following = _stage_of(text, stages) or (0.0, 0.0)
-    return begins + share * (following - begins)
-
-
-def _reached(text: str, stages: Mapping[str, int], before: float) -> float:
-    """Return the progress at a stage's begin [%]. A repeated stage advances by a quarter of the remaining way."""
-    stage = _stage_of(text, stages)
-    if stage is None:
         return before
-    begins, following = stage
+    begins, following = (*stages.values(), 100)[here : here + 2]
+    if share is not None:
+        return begins + share * (following - begins)
     return begins if before < begins else before + max(following - before, 0.0) / 4.0

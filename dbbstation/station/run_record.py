@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,17 +27,6 @@ if TYPE_CHECKING:
 
 _STEP_S = 2e-6
 """Least time between two samples [s]: run files have microseconds, and two times must not round to the same value."""
-
-
-class RunRecall(Protocol):
-    """A function that returns the recording of the current run."""
-
-    def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:
-        """Return the whole run.
-
-        Raises:
-            StationError: it cannot be read.
-        """
 
 
 def recording_of(run: RunId, samples: Sequence[Sample]) -> Recording:

@@ -51,7 +51,6 @@ if TYPE_CHECKING:
     from dbbstation.plan.sampling import Sampling
     from dbbstation.quality.finding import Finding
     from dbbstation.station.events import Event, RunId, Sample
-    from dbbstation.station.run_record import RunRecall
     from dbbstation.station.schedule import Schedule
     from dbbstation.trace.analysis import CircleFigures
     from dbbstation.trace.recording import Recording
@@ -132,6 +131,7 @@ class Sequencer:
     """Runs a plan by the table of states in `states.py`.
 
     Args:
+        recorded: returns the recording of the current run; it raises StationError if it cannot be read.
         waiting: recorded runs without verdict, oldest first; judged before measuring.
         doubted: accepted runs that the run just judged puts in doubt.
     """
@@ -140,7 +140,7 @@ class Sequencer:
         self,
         plan: Plan,
         schedule: Schedule,
-        recorded: RunRecall,
+        recorded: Callable[[RunId, Sequence[Sample]], Recording],
         *,
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,

@@ -141,16 +141,19 @@ class PlaneFigures:
 
 
 @with_one_thread
-def plane_figures(model: MachineModel, height_mm: float) -> PlaneFigures:
+def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel | None = None) -> PlaneFigures:
     """Return flatness over eight points of X, Y = ±190 mm, and parallelism of a move along X.
 
     Only pose-dependent sources count.
 
+    Args:
+        corrected: calibrated model that the control corrects; the figures then describe its residual error.
+
     Raises:
         KinematicsError: the plane is outside the workspace.
     """
-    heights = _error_mm(model, _RING, height_mm)[:, 2]
-    sideways = _error_mm(model, _ALONG, height_mm)[:, 1]
+    heights = _error_mm(model, _RING, height_mm, corrected)[:, 2]
+    sideways = _error_mm(model, _ALONG, height_mm, corrected)[:, 1]
     return PlaneFigures(1e3 * float(np.ptp(heights)), 1e3 * float(np.ptp(sideways)))
 
 
@@ -172,9 +175,12 @@ def _level(xy_mm: Floats, height_mm: float) -> Floats:
     return poses
 
 
-def _error_mm(model: MachineModel, xy_mm: Floats, height_mm: float) -> Floats:
+def _error_mm(model: MachineModel, xy_mm: Floats, height_mm: float, corrected: MachineModel | None) -> Floats:
     poses = _level(xy_mm, height_mm)
-    return (model.anywhere().actual_poses(Motion(poses)) - poses)[:, :3]
+    motion = Motion(poses)
+    actual = model.anywhere().actual_poses(motion)
+    believed = poses if corrected is None else corrected.anywhere().actual_poses(motion)
+    return actual[:, :3] - believed[:, :3]
 
 
 def _figures_of(observation: Observation, residual_mm: Floats) -> CircleFigures:

@@ -51,3 +51,5 @@ def test_a_base_that_is_turned_makes_the_plane_slope(reference):
         figures = plane_figures(model, -1008.0)
         assert figures.flatness_um == pytest.approx(1e3 * flatness, abs=0.1)
         assert figures.parallelism_um == pytest.approx(1e3 * parallelism, abs=0.1)
+        cured = plane_figures(model, -1008.0, corrected=model)
+        assert cured.flatness_um == pytest.approx(0.0, abs=1e-6)

@@ -8,7 +8,7 @@ from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal, norm
 from scipy.stats import t as student
 
-from dbbstation.diagnosis.simulator import density
+from dbbstation.diagnosis.simulator import held as held_parts
 from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter
 from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.coloured import Coloured
@@ -30,7 +30,7 @@ def stood_for(monkeypatch, noise, tails, spread, known=None):
         return rows if whitening is None else whitening @ rows
 
     bank = SimpleNamespace(noise=noise, tails=tails, spread=spread[outputs[~held]], whitened=whitened)
-    monkeypatch.setattr(density, "noise_left", lambda *_args, **_named: bank)
+    monkeypatch.setattr(held_parts, "noise_left", lambda *_args, **_named: bank)
     parameters = SimulatorParameter("a", "a", 0.0, uncertainty=known), SimulatorParameter("b", "b", 0.0)
     work = SimpleNamespace(output=outputs, model=Model("", parameters, (), (Output("x", "m"), Output("y", "m")), ()))
     return work, channel, held, outputs
@@ -52,7 +52,7 @@ def test_a_part_is_as_probable_as_its_whole_covariance_says(monkeypatch, decay, 
     open_ = np.linalg.inv(fitted.T @ said @ fitted + prior)
     covariance = whole[np.ix_(held, held)] + columns[held] @ open_ @ columns[held].T
     expected = multivariate_normal.logpdf(residual[held], cov=covariance)
-    found = density.log_density(work, channel, held, residual, columns)
+    found = held_parts.log_density(work, channel, held, residual, columns)
     # White noise on top of a process is one of an order at which the next correlation would be less than a thousandth.
     assert found == pytest.approx(expected, abs=0.02 if decay else 1e-9)
 
@@ -61,10 +61,12 @@ def test_rows_with_long_tails_count_by_students_t(monkeypatch):
     rng, spread = np.random.default_rng(4), np.ones(2)
     work, channel, held, _ = stood_for(monkeypatch, Coloured(0.1), 4.0, spread)
     residual = 0.1 * rng.standard_t(4.0, size=ROWS)
-    found = [density.log_density(work, channel, held, rows, np.ones((ROWS, 2))) for rows in (residual, 0.5 * residual)]
+    found = [
+        held_parts.log_density(work, channel, held, rows, np.ones((ROWS, 2))) for rows in (residual, 0.5 * residual)
+    ]
     expected = [np.sum(student.logpdf(rows[held], 4.0, scale=0.1)) for rows in (residual, 0.5 * residual)]
     # What is given is over the height of the normal density, the same for all predictions.
     assert found[1] - found[0] == pytest.approx(expected[1] - expected[0])
     residual[-1] = 5.0  # an outlier of fifty standard deviations hardly counts, as it would under the normal density
-    lost = found[0] - density.log_density(work, channel, held, residual, np.ones((ROWS, 2)))
+    lost = found[0] - held_parts.log_density(work, channel, held, residual, np.ones((ROWS, 2)))
     assert lost < 0.05 * -norm.logpdf(50.0)

@@ -23,7 +23,7 @@ from dbbstation.tasks.fleet import fleet
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record
-from tests.tasks.fleet_sessions import squared
+from tests.tasks.pieces import squared
 from tests.tasks.test_executors import Cluster
 
 SEED = 100

@@ -17,22 +17,39 @@ CASES, PARTS = 500, 4
 """Cases of a part: 2,000 in all, within a minute of both cores of CI."""
 
 
-def worked(folder: Path, cases: int, seed: int) -> dict[int, dict]:
-    worker = folder / "worker-0"
-    worker.mkdir(exist_ok=True)
+WORK = """
+import sys
+from pathlib import Path
+from tests.fuzz.worker import main
+
+for part in sys.argv[1:]:
+    folder, *numbers = part.split("|")
+    if not main(Path(folder), *map(int, numbers)):
+        break
+"""
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory):
+    """Cases of each part; one process begins the next part where the one before ends, as long as it is small."""
+    folders = [tmp_path_factory.mktemp("part") for _ in range(PARTS)]
     while True:
-        done = cases_of(folder)
-        first = max(done, default=-1) + 1
-        if first >= cases:
+        done = [cases_of(folder) for folder in folders]
+        left = []
+        for number, (folder, found) in enumerate(zip(folders, done, strict=True)):
+            (folder / "worker-0").mkdir(exist_ok=True)
+            first = max(found, default=-1) + 1
+            if first < CASES:
+                left.append(f"{folder / 'worker-0'}|{1 + number}|{first}|1|{CASES}")
+        if not left:
             return done
-        command = [sys.executable, "-m", "tests.fuzz.worker", str(worker), *map(str, (seed, first, 1, cases))]
-        subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
+        subprocess.run([sys.executable, "-c", WORK, *left], check=True, cwd=Path(__file__).parents[2])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(PARTS))
-def test_no_spoilt_file_is_a_fault_of_the_program(tmp_path, capsys, part):
-    found = worked(tmp_path, CASES, 1 + part)
+def test_no_spoilt_file_is_a_fault_of_the_program(parts, capsys, part):
+    found = parts[part]
     assert len(found) == CASES
     assert sum(told["guided"] for told in found.values()) == CASES // 2
     assert report(found), capsys.readouterr().out

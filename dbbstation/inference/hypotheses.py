@@ -278,7 +278,7 @@ class _Search:
         for k in named[: BOUNDS.rivals]:
             instead = [*others, scan.best_of(k)]
             self.work.scan(self.causes.values())
-            beside = self.comparison.scan(instead, self.causes.values())
+            beside = self.comparison.around(instead, self.causes.values()).without(())[0]
             one = int(beside.log_odds.argmax())
             self._look_at([*instead, beside.best_of(one)])
 

@@ -146,6 +146,18 @@ def test_a_law_that_is_not_quite_followed_takes_the_place_of_an_unnamed_effect(r
     assert search(comparison, causes).best.names == max(full, key=full.get) == {"law", "wave"}
 
 
+def test_no_set_has_two_forms_of_one_cause(rng):
+    """Both forms of a law would explain what one form and a small wave explain."""
+    columns = rng.normal(size=(40, 8))
+    forms = [variant(0, log_weight=-np.log(2)), variant(1, log_weight=-np.log(2))]
+    law, wave = cause("law", *forms, odds=ODDS), cause("wave", variant(1), odds=ODDS - 3.0, named=False)
+    unnamed = cause("unnamed", variant(*range(8)), odds=ODDS, named=False)
+    problem = Dense(BASE, columns, columns[:, 0] + 0.2 * columns[:, 1] + rng.normal(0, 0.02, 40), 0.02)
+    posterior = search(problem.comparison(), [law, wave, unnamed])
+    assert posterior.best.names == {"law", "wave"}
+    assert all(len(one.members) == len(one.names) for one in posterior.hypotheses)
+
+
 def test_a_seed_is_looked_at_in_the_form_that_its_cause_has_now(rng):
     own = rng.normal(size=(40, 3))
     hidden = np.column_stack([own[:, 0] - own[:, 1], own[:, 1] - own[:, 2], own[:, 2] - own[:, 0]])

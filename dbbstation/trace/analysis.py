@@ -10,12 +10,12 @@ import numpy as np
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace.circle import CentredCircle, RawCircle
 from dbbstation.trace.cut import edges_of, progress_deg
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
-    from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.recording import Recording
 
 MOST_STEPS = 20
@@ -199,6 +199,16 @@ def _figures(raw: RawCircle, length_mm: Floats, centre_mm: Floats, deviation_mm:
         mean_radial_error_um=1e3 * float((length_mm - raw.circle.bar_mm).mean()),
         circularity_um=1e3 * float(np.ptp(deviation_mm)),
     )
+
+
+def centred(raw: RawCircle) -> CentredCircle:
+    """Remove the best-fit centre [CAL III-A step 4] at commanded angles [CAL eq 6].
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    _, radius, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, raw.length_mm))
+    return CentredCircle(raw.name, raw.circle, raw.theta_deg, deviation, float(radius))
 
 
 MARGIN_DEG = 5.0

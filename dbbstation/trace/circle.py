@@ -1,4 +1,4 @@
-"""Raw circles, cut from recordings."""
+"""Circles cut from recordings: raw circles can calibrate a machine, centred circles cannot."""
 
 from __future__ import annotations
 
@@ -43,6 +43,22 @@ class RawCircle(WithLogged):
     def theta_deg(self) -> Floats:
         """Return the angle from +X towards +Y, within 0 to 360 [deg]."""
         return np.mod(self.circle.theta_deg(self.phi_deg), 360.0)
+
+
+@dataclass(frozen=True, eq=False)
+class CentredCircle:
+    """A circle after removal of its centre [CAL eq 6].
+
+    Attributes:
+        theta_deg: from +X towards +Y, shape (n,).
+        deviation_mm: from the best-fit circle, shape (n,).
+    """
+
+    name: str
+    circle: Circle
+    theta_deg: Floats
+    deviation_mm: Floats
+    radius_mm: float
 
 
 def sector_of(raw: RawCircle, sectors: int) -> Integers:

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.analysis import _circles_about_ball, best_circle, figures, figures_of
+from dbbstation.trace.analysis import _circles_about_ball, best_circle, centred, figures, figures_of
 from dbbstation.trace.circle import RawCircle
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
@@ -88,6 +88,13 @@ def test_a_raised_bar_sees_the_horizontal_shift():
     horizontal = ball_beside(circle.radius_mm, 0.05, 0.02)
     found = figures(raw(np.hypot(horizontal, height), circle))
     assert found.centre_mm == pytest.approx((0.05, 0.02), abs=1e-9)
+
+
+def test_centring_removes_the_centre_and_keeps_the_shape():
+    shape = 0.01 * np.cos(3 * np.radians(THETA))
+    result = centred(raw(150 + shape + 0.2 * np.cos(np.radians(THETA))))
+    assert result.deviation_mm == pytest.approx(shape, abs=2e-4)
+    assert not hasattr(result, "length_mm")
 
 
 def test_a_point_is_no_circle():

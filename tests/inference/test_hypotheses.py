@@ -9,7 +9,16 @@ import pytest
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.hypotheses import CLOSE, FIT, LIKELY, NEGLIGIBLE, SCAN, SearchWork, search
-from dbbstation.inference.model_comparison import FLEXIBLE, Around, Cause, Member, Variant
+from dbbstation.inference.model_comparison import (
+    FLEXIBLE,
+    SCALES,
+    WIDE,
+    Around,
+    Cause,
+    Member,
+    ModelComparison,
+    Variant,
+)
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import inclusion, log_posteriors
 
@@ -144,6 +153,19 @@ def test_a_law_that_is_not_quite_followed_takes_the_place_of_an_unnamed_effect(r
     assert comparison.scan([], causes).log_factor.argmax() == 2
     full = log_posteriors(problem, causes)
     assert search(comparison, causes).best.names == max(full, key=full.get) == {"law", "wave"}
+
+
+@pytest.mark.parametrize("amplitudes", [30, WIDE + 1])
+def test_factors_of_every_size_are_those_of_the_normal_density(rng, amplitudes):
+    """However wide a form is: log N(target; 0, I + s² C C') - log N(target; 0, I), beside an empty base."""
+    columns = rng.normal(size=(250, amplitudes))
+    target = columns @ rng.normal(0, 0.2, amplitudes) + rng.normal(size=250)
+    comparison = ModelComparison(columns.T @ columns, columns.T @ target)
+    found = comparison.scan((), [cause("wide", variant(*range(amplitudes)))]).factors[0]
+    for size, factor in zip(SCALES, found, strict=True):
+        covariance = np.eye(250) + size**2 * columns @ columns.T
+        explained = target @ target - target @ np.linalg.solve(covariance, target)
+        assert factor == pytest.approx(0.5 * explained - 0.5 * np.linalg.slogdet(covariance)[1], abs=1e-7)
 
 
 def test_no_set_has_two_forms_of_one_cause(rng):

@@ -167,7 +167,7 @@ def content(folder: Path, text: str) -> str:
     faults: list[Problem] = []
     file = parse_simulator(path, faults)
     assert file is not None, faults
-    return LoadedSimulator(path, path, file, None, (), (), ()).content  # type: ignore[arg-type]  # nothing is simulated
+    return LoadedSimulator(path, path, file, None, (), ()).content  # type: ignore[arg-type]  # nothing is simulated
 
 
 def test_a_simulation_is_of_the_arguments_of_its_program(simulator):

@@ -89,6 +89,11 @@ class PlannerRun:
         """Return the time from the first motion to the last, with dwells and stops [s]."""
         return float(self.time_s[-1] - self.time_s[0])
 
+    @property
+    def moving_s(self) -> float:
+        """Return the time in motion [s], without dwells and stops, because their length depends on the load of the computer."""
+        return float(np.diff(self.time_s)[np.any(np.diff(self.poses, axis=0) != 0.0, axis=1)].sum())
+
 
 @dataclass(frozen=True, eq=False)
 class ControlKins:

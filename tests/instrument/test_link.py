@@ -84,7 +84,7 @@ def test_nobody_at_the_other_end_of_a_socket() -> None:
 
 def test_the_settings_of_the_line_reach_the_port(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial.Serial, "open", lambda _: None)
-    port = open_link("/dev/ttyUSB0", ND.line)._port
+    port = open_link("/dev/ttyUSB0", ND.line).port
     assert isinstance(port, serial.Serial)
     assert (port.baudrate, port.bytesize, port.parity, port.stopbits) == (9600, 7, "E", 2)
     assert (port.rtscts, port.xonxoff, port.exclusive) == (False, False, True)

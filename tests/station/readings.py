@@ -12,11 +12,10 @@ from dbbstation.station.run_record import recording_of
 from dbbstation.virtual.path import circle_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from dbbstation.plan.circle import Circle
     from dbbstation.station.events import Event, RunId, Sample
-    from dbbstation.station.run_record import RunRecall
     from dbbstation.trace.recording import Recording
 
 RATE_HZ = 20.0
@@ -30,7 +29,7 @@ def run_readings(circle: Circle, begin_s: float = 0.0, rate_hz: float = RATE_HZ)
     return [Reading(begin_s + float(t), float(value)) for t, value in zip(t_s, length, strict=True)]
 
 
-def told_and_untold(told: Sequence[Event]) -> RunRecall:
+def told_and_untold(told: Sequence[Event]) -> Callable[[RunId, Sequence[Sample]], Recording]:
     def recorded(run: RunId, behind: Sequence[Sample]) -> Recording:
         batches = [event.samples for event in told if isinstance(event, SamplesRecorded) and event.run == run]
         return recording_of(run, [*(sample for batch in batches for sample in batch), *behind])

@@ -429,8 +429,9 @@ class ModelComparison:
             member, first = members[k], places[k].start
             own = inverse[first:, first : first + member.width]
             variance, axes = np.linalg.eigh(own.T @ own)
-            # Rounding can make the smallest variances negative.
-            information = 1.0 / np.maximum(variance, np.finfo(float).eps * variance[-1])
+            if variance[0] <= 0.0:
+                raise np.linalg.LinAlgError("rounding hides the smallest variance")
+            information = 1.0 / variance
             along = np.square(information * (axes.T @ (own.T @ z[first:]))) / member.scale**2
             seen = np.maximum(information - 1.0, 0.0) / member.scale**2
             factors = _log_factors(seen[None], along[None])[0]

@@ -45,7 +45,6 @@ def demo(
       dbbstation demo --out try-it --seed 7
       sudo dbbstation demo --quick --control linuxcnc   (needs LinuxCNC; fifteen minutes)
     """
-    from dbbstation.demo.in_control import run_ways
     from dbbstation.demo.whole_job import QUICK, run_demo
 
     folder = out or unused_path(Path(), "dbbstation-demo")
@@ -55,6 +54,8 @@ def demo(
     shown = DemoShown()
     try:
         if control is not None:
+            from dbbstation.demo.in_control import run_ways
+
             ways = run_ways(folder, seed, shown.tell, shown.progress, tests)
             told = {"folder": str(folder), "ways": [asdict(way) for way in ways]}
             return Answer(told, lambda: _print_ways(ways))

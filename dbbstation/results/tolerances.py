@@ -81,9 +81,15 @@ def tolerated_pairs(pairs: Iterable[MeasuredPair], tolerances: Sequence[Toleranc
     """Return the figures with tolerances that combine both directions."""
     wanted = dict.fromkeys((one.figure, one.upr) for one in tolerances if one.figure in OF_BOTH_DIRECTIONS)
     return tuple(
-        of_facts(ToleratedCircle, pair.one, pair.one.entry, direction="both", sizes={}, others=sizes)
+        of_facts(
+            ToleratedCircle,
+            pair.one,
+            pair.one.entry,
+            direction="both",
+            sizes={},
+            others={key: _size_of_pair(pair, *key) for key in wanted},
+        )
         for pair in (pairs if wanted else ())
-        for sizes in [{key: _size_of_pair(pair, *key) for key in wanted}]
     )
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections import deque
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.virtual.wire import VirtualInstrument
@@ -12,7 +14,11 @@ if TYPE_CHECKING:
 
 
 class FaultyInstrument(VirtualInstrument):
-    """The same, until a fault is asked for."""
+    """The same, until a fault is asked for.
+
+    A pseudo-terminal has a name of its own, which ends with it: the system gives `/dev/pts/N` to whoever asks next, and
+    a program that connects again would read the instrument of another test.
+    """
 
     def __init__(self, *args, **more) -> None:
         super().__init__(*args, **more)
@@ -23,6 +29,21 @@ class FaultyInstrument(VirtualInstrument):
         self._silent_after_cut = False
         self._to_drop = 0
         self._damage: Callable[[bytes], bytes] | None = None
+        self._named: Path | None = None
+
+    def start(self) -> None:
+        super().start()
+        if self.port.startswith("/dev/"):
+            self._named = Path(tempfile.mkdtemp()) / "instrument"
+            self._named.symlink_to(self.port)
+            self.port = str(self._named)
+
+    def stop(self) -> None:
+        if self._named is not None:
+            self._named.unlink()
+            self._named.parent.rmdir()
+            self._named = None
+        super().stop()
 
     def go_silent(self) -> None:
         """Send nothing after the current frame, as if switched off."""

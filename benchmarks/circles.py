@@ -20,7 +20,7 @@ from dbbstation.circles.analysis import analyse
 from dbbstation.circles.quick_look import quick_look
 from dbbstation.inference.harmonics import HIGH, LOW, basis, coefficients, smooth
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 if TYPE_CHECKING:
     from collections.abc import Callable

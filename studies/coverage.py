@@ -11,8 +11,8 @@ from scipy.special import ndtri
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.figures import identified_model
+from dbbstation.model.identified import position_uncertainty_mm
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.virtual.truth import random_kinematics
 from studies.random_machines import over_machines

@@ -17,7 +17,7 @@ from dbbstation.calibration.reporting.evaluation import plane_figures, plane_unc
 from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.model import read_model, write_model
-from dbbstation.model.uncertainty import predicted_poses
+from dbbstation.model.identified import predicted_poses
 from dbbstation.plan.bar import EXPANSION_UNCERTAINTY
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.load import load_sessions

@@ -19,7 +19,7 @@ from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.results.tolerances import sizes_of
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from studies.coverage_rows import LEAST, MOST
 from studies.kept_draws import drawn
 from tests.plant.noise import Noise

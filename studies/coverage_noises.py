@@ -12,7 +12,7 @@ from dbbstation.circles.analysis import analyse, analyse_pair
 from dbbstation.circles.budget import SetUpKnowledge, budgets, pair_budgets
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from studies.coverage_rows import row_of
 from studies.kept_draws import drawn
 from tests.plant.other_noise import KINDS, STEP

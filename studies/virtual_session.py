@@ -12,7 +12,7 @@ from dbbstation.model.observation import Observation
 from dbbstation.model.simulation import setup_of, simulate_circle
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from dbbstation.virtual.truth import SET_UP_MM, SetUp, put_up
 
 if TYPE_CHECKING:

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.trace.analysis import Passes
-    from dbbstation.trace.circle import RawCircle
-    from dbbstation.trace.recording import Recording
+    from dbbstation.trace.recording import RawCircle, Recording
 
 EDITION = "ISO 230-4:2005"
 """Edition whose terms the figures use. docs/circles.md defines them; the text of the standard was not available."""

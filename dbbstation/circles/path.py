@@ -16,7 +16,7 @@ from dbbstation.trace.minimum_zone import MinimumZone, minimum_zone
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 
 class Filter(IntEnum):

@@ -16,7 +16,7 @@ from dbbstation.circles.signatures import Signature, SignatureColumn, cyclic_sha
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.serialise import OrNull
 from dbbstation.inference.harmonics import LOW, basis, misfit
-from dbbstation.trace.circle import means, sector_of
+from dbbstation.trace.recording import means, sector_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

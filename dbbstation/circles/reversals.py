@@ -13,7 +13,7 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 if TYPE_CHECKING:
     from dbbstation.circles.path import CirclePath
     from dbbstation.computing.arrays import Floats
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 AXES_DEG = (0.0, 90.0, 180.0, 270.0)
 """Angles at which the machine's X and Y reverse."""

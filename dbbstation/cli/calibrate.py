@@ -13,7 +13,7 @@ from dbbstation.text.written import decimals_of, to_its_place
 
 if TYPE_CHECKING:
     from dbbstation.calibration.checks.scatter import ScatterCheck
-    from dbbstation.calibration.reporting.motors import CurrentsFigures
+    from dbbstation.calibration.reporting.figures import CurrentsFigures
     from dbbstation.facts.value import Value
     from dbbstation.results.calibration import CalibrationResult
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.calibration.reporting.evaluation import EvaluatedRun
-    from dbbstation.results.evaluation import EvaluationResult
+    from dbbstation.results.calibration import EvaluationResult
 
 
 def show(result: EvaluationResult) -> None:

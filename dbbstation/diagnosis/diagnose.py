@@ -30,7 +30,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.settle import BETTER
 from dbbstation.inference.verdict import SURE
-from dbbstation.sources.laws.by_temperature import not_given
+from dbbstation.sources.laws.temperature import not_given
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

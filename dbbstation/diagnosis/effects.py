@@ -19,7 +19,7 @@ from dbbstation.model.identified import known_u
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion, Need, Owner
 from dbbstation.trace.analysis import figures, figures_of
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

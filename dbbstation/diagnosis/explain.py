@@ -12,8 +12,7 @@ from scipy.special import chdtri
 from dbbstation.calibration.checks.missing_physics import misfit_of
 from dbbstation.calibration.checks.scatter import seats_of
 from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default_sources
-from dbbstation.calibration.outliers.robust import MOST, calibrate_robust
-from dbbstation.calibration.outliers.strange_runs import in_place_after_all
+from dbbstation.calibration.outliers.robust import MOST, calibrate_robust, in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.explained import Explained, SettledCircles

@@ -9,7 +9,7 @@ from dbbstation.calibration.reporting.residual_map import names_of_tests
 from dbbstation.diagnosis.drawn import GainOfTest, Trace
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.circle import by_angle
+from dbbstation.trace.recording import by_angle
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration

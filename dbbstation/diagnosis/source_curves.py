@@ -14,7 +14,7 @@ from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.laws.by_temperature import FollowsTemperature
+from dbbstation.sources.laws.temperature import FollowsTemperature
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.trace.circle import averaged, means, sector_of
+from dbbstation.trace.recording import averaged, means, sector_of
 
 if TYPE_CHECKING:
     from dbbstation.model.observation import Observation

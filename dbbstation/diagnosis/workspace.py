@@ -11,7 +11,7 @@ from dbbstation.calibration.reporting.figures import identified_model
 from dbbstation.facts.value import finite
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.travel import is_within_travel
-from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length
+from dbbstation.model.identified import position_uncertainty_mm, rms_length
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from dbbstation.machine.rotation import Frames
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.quality.knowledge import COEFFICIENTS, HIGHER, Expected, form_columns, local_columns
 from dbbstation.sources.contract import Need, Owner
-from dbbstation.trace.circle import averaged
+from dbbstation.trace.recording import averaged
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

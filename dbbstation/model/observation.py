@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 STANDING = 3
 """Samples of a resting machine: the fewest from which a speed is computed."""

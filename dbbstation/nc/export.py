@@ -10,9 +10,9 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import StationError
-from dbbstation.machine.difference import check_model_is_of
+from dbbstation.machine.geometry import check_model_is_of
 from dbbstation.machine.regularity import check_joints
-from dbbstation.model.uncertainty import position_uncertainty_mm
+from dbbstation.model.identified import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import Compensation, Prefer, compensated_parts
 from dbbstation.nc.curve import felt_mm, rounding_mm

@@ -18,7 +18,7 @@ from dbbstation.quality.limits import SHARE, quantile
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Integers
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 SHORTEST_S = 1.0
 """Shorter standstills do not count [s]: a display polled faster than it is refreshed repeats readings; the slowest is

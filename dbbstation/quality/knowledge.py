@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.finding import Finding
-    from dbbstation.trace.circle import RawCircle
-    from dbbstation.trace.recording import Recording
+    from dbbstation.trace.recording import RawCircle, Recording
 
 HIGHEST_HARMONIC = 3
 """Highest undulations per revolution in comparisons of runs. A wrong ball, bar, tilt or direction changes mean, centre,

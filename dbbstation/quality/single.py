@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.quality.knowledge import Expected, Seen
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 
 HARMLESS = 0.19

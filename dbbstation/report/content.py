@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.circles.budget import BudgetTerm
 from dbbstation.facts.serialise import as_objects
-from dbbstation.machine.difference import differences, in_words
+from dbbstation.machine.geometry import differences, in_words
 from dbbstation.report.certificate import certified
 from dbbstation.report.conditions import conditions, identity, when_measured
 from dbbstation.report.plate_map import WIDTH, plate_map
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.report.certificate import Certified
+    from dbbstation.results.calibration import EvaluationResult
     from dbbstation.results.circles import Circled, CirclesResult
-    from dbbstation.results.evaluation import EvaluationResult
     from dbbstation.results.report_verdict import Ranked
 
 

@@ -13,7 +13,7 @@ from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, write_poses
 from dbbstation.files.provenance import Provenance
-from dbbstation.model.uncertainty import pose_errors
+from dbbstation.model.identified import pose_errors
 from dbbstation.results.frame import Framed
 from dbbstation.results.model_warnings import model_warnings, unknown_causes
 

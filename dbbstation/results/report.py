@@ -13,8 +13,8 @@ from dbbstation.facts.held import ComparedTolerance, ReportVerdict, ToleranceOfT
 from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Kept
 from dbbstation.plan.tolerance import OF_A_MODEL
+from dbbstation.results.calibration import EvaluationResult
 from dbbstation.results.circles import CirclesResult
-from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.frame import Framed
 from dbbstation.results.tolerances import held_tolerance
 

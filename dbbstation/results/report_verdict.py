@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.effects import CauseEffect
     from dbbstation.facts.held import HeldTolerance
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.results.calibration import EvaluationResult
     from dbbstation.results.circles import Circled, MeasuredCircle
-    from dbbstation.results.evaluation import EvaluationResult
 
 
 @dataclass(frozen=True, eq=False)

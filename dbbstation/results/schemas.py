@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from dbbstation.facts.serialise import schema_of
-from dbbstation.results.calibration import CalibrationResult
+from dbbstation.results.calibration import CalibrationResult, EvaluationResult
 from dbbstation.results.checked import CheckResult
 from dbbstation.results.circles import CirclesResult
 from dbbstation.results.comparison import ComparisonResult
 from dbbstation.results.control import KinematicsResult, ParametersResult
 from dbbstation.results.diagnosis import DiagnosisResult
 from dbbstation.results.drive import DriveResult
-from dbbstation.results.evaluation import EvaluationResult
 from dbbstation.results.exchange import ExportResult, ImportResult
 from dbbstation.results.fleet import FleetResult
 from dbbstation.results.history import HistoryResult

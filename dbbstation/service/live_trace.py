@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.station.events import Sample
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 _FIRST_ROOM = 4096
 

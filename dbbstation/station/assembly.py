@@ -11,7 +11,7 @@ from dbbstation.files.formats.session import ReadBy, RunState, SessionDetails
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_checks import unlike_bar
 from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.machine.difference import check_model_is_of
+from dbbstation.machine.geometry import check_model_is_of
 from dbbstation.plan.circle import circles_s
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
@@ -42,8 +42,7 @@ if TYPE_CHECKING:
     from dbbstation.quality.finding import Finding
     from dbbstation.station.engine import ReadingSource
     from dbbstation.station.programs import RunProgram
-    from dbbstation.trace.circle import RawCircle
-    from dbbstation.trace.recording import Recording
+    from dbbstation.trace.recording import RawCircle, Recording
 
 
 def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:

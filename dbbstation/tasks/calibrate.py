@@ -89,7 +89,7 @@ def calibrate(
     from dbbstation.calibration.reporting.evaluation import evaluate
     from dbbstation.calibration.reporting.figures import calibration_figures, covariance_of, identified_model, report_of
     from dbbstation.files.own_sources import every_source, sources_of
-    from dbbstation.model.uncertainty import greatest_u_um
+    from dbbstation.model.identified import greatest_u_um
     from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.registry import sources_named
     from dbbstation.tasks.load import loaded
@@ -148,7 +148,7 @@ def _following_thermometers(
     fitted: tuple[ErrorSource, ...], recorded: Recorded, telling: Telling
 ) -> tuple[ErrorSource, ...]:
     from dbbstation.model.observation import Motions
-    from dbbstation.sources.laws.by_temperature import following_thermometers
+    from dbbstation.sources.laws.temperature import following_thermometers
 
     forms = following_thermometers(fitted, Motions(recorded.observations))
     telling.note(

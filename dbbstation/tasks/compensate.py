@@ -153,7 +153,7 @@ def compensate(
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import from_python
-    from dbbstation.machine.difference import check_model_is_of
+    from dbbstation.machine.geometry import check_model_is_of
     from dbbstation.nc.export import compensated_program
     from dbbstation.nc.registry import dialect_of_file
     from dbbstation.results.model_warnings import model_warnings

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.plan.tolerance import Tolerance
-    from dbbstation.results.evaluation import EvaluationResult
+    from dbbstation.results.calibration import EvaluationResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.telling import Progress
 
@@ -70,8 +70,8 @@ def evaluate(
     from dbbstation.calibration.reporting.prediction import predicted_circles
     from dbbstation.facts import of_facts
     from dbbstation.files.own_sources import every_source
-    from dbbstation.machine.difference import check_model_is_of
-    from dbbstation.results.evaluation import EvaluationResult
+    from dbbstation.machine.geometry import check_model_is_of
+    from dbbstation.results.calibration import EvaluationResult
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.tasks.load import loaded
     from dbbstation.tasks.models import model_of

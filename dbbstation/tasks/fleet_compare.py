@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.difference import NOT_PREDICTED, differences, in_words
+from dbbstation.machine.geometry import NOT_PREDICTED, differences, in_words
 from dbbstation.results.fleet import FleetComparison, Scored, SharedCause
 from dbbstation.sisters.unlike import FEWEST, held_against_sisters
 from dbbstation.text.written import listed
@@ -16,8 +16,7 @@ from dbbstation.text.written import listed
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.machine.difference import Difference
-    from dbbstation.machine.geometry import Machine
+    from dbbstation.machine.geometry import Difference, Machine
     from dbbstation.results.fleet import FleetFound, FleetValue
 
 SCORED = ("kind", "quantity", "of", "unit", "value", "uncertainty")

@@ -15,14 +15,14 @@ from dbbstation.errors import InputError, Problem, StationError, refuse
 from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.files.recordings.session import SessionFolder, opened
 from dbbstation.files.source_text import text_of
-from dbbstation.machine.difference import differences, in_words
+from dbbstation.machine.geometry import differences, in_words
 from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Thermometer
 from dbbstation.sources.registry import known_sources
 from dbbstation.tasks.declare import paths_of
 from dbbstation.tasks.telling import READING, Telling, never, silent
 from dbbstation.trace.cut import cut
-from dbbstation.trace.thermometers import logged_curve
+from dbbstation.trace.recording import logged_curve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.tasks.telling import Progress
-    from dbbstation.trace.circle import RawCircle
-    from dbbstation.trace.recording import Recording
+    from dbbstation.trace.recording import RawCircle, Recording
 
 
 @dataclass(frozen=True, eq=False)

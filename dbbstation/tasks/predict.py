@@ -84,7 +84,7 @@ def predict(
     from dbbstation.files.formats.number_language import PLAIN, number_language
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.travel import check_travel
-    from dbbstation.model.uncertainty import predicted_poses
+    from dbbstation.model.identified import predicted_poses
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.prediction import prediction_result
     from dbbstation.tasks.models import model_of

@@ -97,7 +97,7 @@ def report(
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import from_python
     from dbbstation.files.recordings.session import read_session
-    from dbbstation.machine.difference import check_model_is_of
+    from dbbstation.machine.geometry import check_model_is_of
     from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
     from dbbstation.report.html import chromium, printed, report_html
     from dbbstation.tasks.circle_runs import load_circles

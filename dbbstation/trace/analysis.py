@@ -10,8 +10,8 @@ import numpy as np
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.trace.circle import CentredCircle, RawCircle
 from dbbstation.trace.cut import edges_of, progress_deg
+from dbbstation.trace.recording import CentredCircle, RawCircle
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -10,9 +10,8 @@ import numpy as np
 from dbbstation.computing.kept import once_for_each
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
-from dbbstation.trace.circle import RawCircle, means
 from dbbstation.trace.columns import each
-from dbbstation.trace.recording import AFTER_LOSS, lost_samples, share_lost
+from dbbstation.trace.recording import AFTER_LOSS, RawCircle, lost_samples, means, share_lost
 
 if TYPE_CHECKING:
     from collections.abc import Callable

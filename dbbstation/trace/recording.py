@@ -1,17 +1,24 @@
-"""A run as recorded, and the samples that it lacks."""
+"""Runs as recorded, the circles cut from them, and the session's temperature.
+
+Raw circles can calibrate a machine, centred circles cannot.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace.columns import WithLogged, each
 
 if TYPE_CHECKING:
-    from dbbstation.computing.arrays import Flags, Floats
+    from collections.abc import Sequence
+
+    from dbbstation.computing.arrays import Flags, Floats, Integers
+    from dbbstation.plan.circle import Circle
     from dbbstation.trace.columns import Logged
 
 
@@ -120,3 +127,120 @@ AFTER_LOSS = "look after the cable and after programs that keep the computer bus
 
 _FEWEST = 10
 """Fewest samples that determine the rate."""
+
+
+@dataclass(frozen=True, eq=False)
+class RawCircle(WithLogged):
+    """One full turn of raw lengths in time order, shapes (n,).
+
+    Attributes:
+        t_s: since the recording's first sample.
+        phi_deg: along the turn, 0 to 360.
+        start_uncertainty_deg: standard uncertainty of the turn's start; zero with recorded angles.
+    """
+
+    name: str
+    circle: Circle
+    t_s: Floats
+    phi_deg: Floats
+    length_mm: Floats
+    logged: Logged = field(default_factory=dict)
+    start_uncertainty_deg: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    @property
+    def theta_deg(self) -> Floats:
+        """Return the angle from +X towards +Y, within 0 to 360 [deg]."""
+        return np.mod(self.circle.theta_deg(self.phi_deg), 360.0)
+
+
+@dataclass(frozen=True, eq=False)
+class CentredCircle:
+    """A circle after removal of its centre [CAL eq 6].
+
+    Attributes:
+        theta_deg: from +X towards +Y, shape (n,).
+        deviation_mm: from the best-fit circle, shape (n,).
+    """
+
+    name: str
+    circle: Circle
+    theta_deg: Floats
+    deviation_mm: Floats
+    radius_mm: float
+
+
+def sector_of(raw: RawCircle, sectors: int) -> Integers:
+    """Return every sample's sector, from 0 without gaps, shape (n,)."""
+    sector = np.minimum((raw.phi_deg * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
+    _, counted = np.unique(sector, return_inverse=True)
+    return counted.astype(np.int64)
+
+
+def averaged(raw: RawCircle, sectors: int) -> RawCircle:
+    """Return a raw circle with one mean sample per sector."""
+    sector = sector_of(raw, sectors)
+    return replace(
+        raw,
+        t_s=means(raw.t_s, sector),
+        phi_deg=means(raw.phi_deg, sector),
+        length_mm=means(raw.length_mm, sector),
+        logged=each(raw.logged, lambda values: means(values, sector)),
+    )
+
+
+def means(values: Floats, group: Integers) -> Floats:
+    """Return the mean row of each group, shape (groups, ...); groups are numbered from 0 without gaps."""
+    count = np.bincount(group)
+    if values.ndim == 1:
+        return np.bincount(group, values) / count
+    return np.column_stack([np.bincount(group, column) / count for column in values.T])
+
+
+def by_angle(raw: RawCircle, curves: Sequence[Floats], sectors: int) -> tuple[Floats, list[Floats]]:
+    """Return rising angles from +X towards +Y [deg] and sector means of curves, shape (s,) each, for drawing."""
+    sector = sector_of(raw, sectors)
+    theta = np.mod(raw.circle.theta_deg(means(raw.phi_deg, sector)), FULL_TURN_DEG)
+    order = np.argsort(theta)
+    return theta[order], [means(curve, sector)[order] for curve in curves]
+
+
+def logged_curve(
+    runs: Sequence[tuple[Floats, Floats]],
+) -> tuple[Floats, Floats]:
+    """Return a session's temperature curve: rising times [s] and temperatures [degC], two points per run, shape (q,) each.
+
+    Among all curves within half a display step of each half run's mean, the least bent is chosen. Changes within half a
+    run are lost.
+    """
+    halves = [half for run in runs for half in zip(*(np.array_split(one, 2) for one in run), strict=True)]
+    means = {float(one.mean()): float(degc.mean()) for one, degc in halves if len(one)}
+    # Runs whose clock was set back in between overlap.
+    time_s = np.array(sorted(means))
+    shown = np.array([means[moment] for moment in time_s])
+    half_step = 0.5 * _resolution(np.concatenate([degc for _, degc in runs]))
+    gaps = np.diff(time_s)
+    if len(time_s) < _BENDS or half_step < SHOWN_K:
+        return time_s, shown
+    slope = np.diff(np.eye(len(time_s)), axis=0) / gaps[:, None]
+    bending = np.diff(slope, axis=0) / np.sqrt(0.5 * (gaps[1:] + gaps[:-1]))[:, None]
+    # In units of half a display step about the displayed value, so bounds are plus and minus one.
+    from scipy.optimize import lsq_linear  # noqa: PLC0415 - takes a fifth of a second; few sessions need it
+
+    found = lsq_linear(bending * half_step, -bending @ shown, bounds=(-1.0, 1.0))
+    return time_s, shown + half_step * np.asarray(found.x, dtype=np.float64)
+
+
+_BENDS = 3
+"""Fewest points of a curve that can be bent."""
+
+SHOWN_K = 1e-3
+"""Finest display step of a thermometer, as in recordings [K]."""
+
+
+def _resolution(degc: Floats) -> float:
+    """Return the greatest common divisor of displayed differences [K]; zero for one value."""
+    steps = np.diff(np.unique(np.round(degc / SHOWN_K).astype(np.int64)))
+    return SHOWN_K * float(np.gcd.reduce(steps)) if len(steps) else 0.0

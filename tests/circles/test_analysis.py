@@ -11,9 +11,8 @@ from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.path import Filter
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.analysis import figures, passes_of
-from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import SMALLEST_SHAPE_MM
-from dbbstation.trace.recording import Recording
+from dbbstation.trace.recording import RawCircle, Recording
 
 CCW = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
 CW = replace(CCW, direction=Direction.CW)

@@ -8,7 +8,7 @@ import pytest
 from dbbstation.circles.analysis import analyse
 from dbbstation.circles.quick_look import _turn, quick_look
 from dbbstation.circles.signatures import ENDS, Signature, SignatureColumn, shapes_of
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from tests.circles.test_analysis import CCW, CW, PHI
 
 NOISE_UM = 0.2

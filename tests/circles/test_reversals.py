@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.circles.reversals import FAR_DEG, step_at
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
 PHI = np.arange(0.0, 360.0, 0.125)

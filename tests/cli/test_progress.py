@@ -21,7 +21,7 @@ from dbbstation.cli.output import say
 from dbbstation.cli.progress import count_bar, stage_bar, time_left
 from dbbstation.errors import KinematicsError
 from dbbstation.files.places import shipped_folder
-from dbbstation.model import uncertainty
+from dbbstation.model import identified as uncertainty
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion

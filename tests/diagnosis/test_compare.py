@@ -18,7 +18,7 @@ from dbbstation.inference.verdict import Verdict
 from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from tests.plant.plan import EIGHT
 
 NOISE_MM, MOUNTING_MM, BALL_MM, BAR_MM = 0.0004, 0.001, 0.0005, 0.0005

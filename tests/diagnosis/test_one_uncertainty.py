@@ -15,8 +15,8 @@ from dbbstation.diagnosis.workspace import workspace
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
+from dbbstation.model.identified import pose_errors, position_uncertainty_mm, predicted_poses
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import pose_errors, position_uncertainty_mm, predicted_poses
 from dbbstation.report.content import parameters
 from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Fitted, Motion

@@ -16,7 +16,7 @@ from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.inference.verdict import Verdict
 from dbbstation.model.compensation import compensated
-from dbbstation.model.uncertainty import position_uncertainty_mm
+from dbbstation.model.identified import position_uncertainty_mm
 from dbbstation.results.diagnosis import diagnosis_figures
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import known_sources, sources_named

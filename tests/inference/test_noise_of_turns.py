@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dbbstation.inference.harmonics import misfit
-from dbbstation.inference.noise import noise_of_turns
+from dbbstation.inference.harmonics import misfit, noise_of_turns
 
 TURNS, LEVEL = 40, 0.5
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.blocks import Columns, compress, spread
-from dbbstation.inference.noise import noise_of
+from dbbstation.inference.harmonics import noise_of
 from dbbstation.inference.square_root import lost_directions, solve, unseen_combinations
 
 NOISE = 0.3

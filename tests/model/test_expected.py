@@ -15,7 +15,7 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.quality.knowledge import LOCAL_COEFFICIENTS
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Need, Owner, Parameter, Setup, Texts
 from dbbstation.sources.registry import known_sources
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 KNOWN = known_sources()
 

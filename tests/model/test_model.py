@@ -11,9 +11,8 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.compensation import compensated
-from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.identified import IdentifiedModel, position_uncertainty_mm
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources

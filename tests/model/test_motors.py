@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dbbstation.calibration.currents import motor_currents
 from dbbstation.machine.geometry import Compliance, StrutMasses
 from dbbstation.model.compensation import compensated
-from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.identified import IdentifiedModel, position_uncertainty_mm
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.motors import motor_currents
-from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.columns import currents

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.model.identified import IdentifiedModel
-from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import (
+from dbbstation.model.identified import (
+    IdentifiedModel,
     greatest_u_um,
     pose_errors,
     position_uncertainty_mm,
     predicted_poses,
     range_uncertainty_mm,
 )
+from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
 

@@ -14,7 +14,7 @@ from dbbstation.nc.commanded import commanded_poses, poses_at_progress
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.plan.circle import Circle
 from dbbstation.sources.contract import Motion, Setup
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 
 def observed(circle: Circle, samples: int = 1500) -> Observation:

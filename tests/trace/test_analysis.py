@@ -10,7 +10,7 @@ import pytest
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.analysis import _circles_about_ball, best_circle, centred, figures, figures_of
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
 THETA = np.arange(0, 360, 0.25)

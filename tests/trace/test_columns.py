@@ -14,9 +14,9 @@ from dbbstation.model.observation import Observation
 from dbbstation.model.simulation import setup_of
 from dbbstation.plan.circle import Direction
 from dbbstation.trace import columns
-from dbbstation.trace.circle import averaged
 from dbbstation.trace.columns import COLUMNS, Column, ColumnKind, currents, temperatures
 from dbbstation.trace.cut import cut
+from dbbstation.trace.recording import averaged
 
 SPEED = Column("spindle_speed_rpm", ColumnKind.OTHER, "rpm", "speed of the spindle", 1, 1e5)
 

@@ -10,7 +10,6 @@ import pytest
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.circle import means
 from dbbstation.trace.cut import (
     PIECES,
     SHAPE_ORDER,
@@ -21,7 +20,7 @@ from dbbstation.trace.cut import (
     overlap_feed,
     unusable_on_turn,
 )
-from dbbstation.trace.recording import Recording
+from dbbstation.trace.recording import Recording, means
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
 RATE_HZ = 100.0

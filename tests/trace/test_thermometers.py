@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.trace.thermometers import logged_curve
+from dbbstation.trace.recording import logged_curve
 
 BEGUN_S = np.cumsum(np.tile([130.0, 70.0, 400.0], 12))
 

@@ -15,7 +15,7 @@ from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from dbbstation.virtual.machine import Sizes, VirtualMachine
 from dbbstation.virtual.truth import SET_UP_MM, SetUp, random_kinematics
 from tests.virtual.brute_force import tool

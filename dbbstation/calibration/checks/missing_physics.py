@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.inference.harmonics import Misfit, misfit
 from dbbstation.inference.remainder import Remainder, remainder
-from dbbstation.trace.circle import means, sector_of
+from dbbstation.trace.recording import means, sector_of
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration

@@ -21,13 +21,13 @@ from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.blocks import Block, compress
-from dbbstation.inference.noise import Noise, noise_of_turns
+from dbbstation.inference.harmonics import Noise, noise_of_turns
 from dbbstation.inference.square_root import Solution, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

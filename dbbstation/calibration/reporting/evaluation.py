@@ -11,8 +11,8 @@ from dbbstation.calibration.fit.calibrate import of_residuals
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.facts.run import OfRun
 from dbbstation.facts.serialise import Absent
+from dbbstation.model.identified import range_uncertainty_mm
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import range_uncertainty_mm
 from dbbstation.plan.tolerance import OF_A_MODEL, USUAL_UPR, CircleFigure, worst
 from dbbstation.sources.contract import Motion
 from dbbstation.trace.analysis import CircleFigures, figures

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.model.observation import Observation
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 UNDULATIONS = 30
 """Highest undulations per revolution of form; otherwise the peak-to-valley noise of a bar would hide model errors."""

@@ -14,7 +14,7 @@ from dbbstation.inference.harmonics import smooth
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.circle import by_angle
+from dbbstation.trace.recording import by_angle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

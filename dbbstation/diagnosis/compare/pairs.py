@@ -12,7 +12,7 @@ from dbbstation.errors import TraceError
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, basis
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.trace.circle import means
+from dbbstation.trace.recording import means
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.model.observation import Observation
     from dbbstation.plan.circle import Circle, Direction
-    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import RawCircle
 
 
 SAME_PLACE_MM = 0.5

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.compare.pairs import Sectors
 from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.trace.circle import averaged
+from dbbstation.trace.recording import averaged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -18,11 +18,11 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling_of
 from dbbstation.inference.folds import held_out_error, parts_of, selections_without
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
+from dbbstation.inference.harmonics import noise_of
 from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.named_values import values_of_members
-from dbbstation.inference.noise import noise_of
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning

@@ -11,7 +11,7 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.gateway import head_of
 from dbbstation.files.places import SESSION_FILE, real_path, text_of_name
 from dbbstation.files.recordings.session import parse_session
-from dbbstation.machine.difference import differences
+from dbbstation.machine.geometry import differences
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -17,8 +17,8 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.quality.judge import Judgement, judge
 from dbbstation.quality.knowledge import Planned, Run
 from dbbstation.sources.registry import known_sources
-from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import cut
+from dbbstation.trace.recording import RawCircle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,8 +20,7 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.dahl import WoundState, wound, wound_up
-from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
+from dbbstation.sources.laws.presliding import PlayState, WoundState, followed, leaning, wound, wound_up
 from dbbstation.sources.laws.unlike_struts import of_several_lengths
 
 if TYPE_CHECKING:

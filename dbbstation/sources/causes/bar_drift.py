@@ -5,9 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.laws import by_temperature
-from dbbstation.sources.laws.by_temperature import FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.temperature import (
+    EQUATION,
+    LOGGED_EQUATION,
+    ORIGIN,
+    FollowsTemperature,
+    InTwoStages,
+    grown,
+    grown_by,
+    warm_up_parameters,
+)
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -34,7 +41,7 @@ class BarDrift(ErrorSource):
         "steel of 150 mm reads 1.6 µm more or less per kelvin.",
         cure="Lay bar and calibrator on the machine table an hour before; touch the bar with gloves only; put it on the "
         "calibrator between the tests.",
-        equation=f"reading = distance + g(t), g = {EQUATION}; {by_temperature.EQUATION}",
+        equation=f"reading = distance + g(t), g = {EQUATION}; {LOGGED_EQUATION}",
         origin=ORIGIN,
     )
 

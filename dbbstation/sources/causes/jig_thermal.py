@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import MM_PER_UM_M, Effect, LinearSource, Motion, Owner, Parameter, Texts
-from dbbstation.sources.laws.by_temperature import STEEL_UM_M_K
+from dbbstation.sources.laws.temperature import STEEL_UM_M_K
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -19,7 +19,7 @@ from dbbstation.sources.contract import (
     Texts,
     of_each_strut,
 )
-from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
+from dbbstation.sources.laws.presliding import PlayState, followed, leaning
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:

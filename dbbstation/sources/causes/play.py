@@ -31,7 +31,7 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.play_operator import PlayState, leaning
+from dbbstation.sources.laws.presliding import PlayState, leaning
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:

@@ -8,9 +8,17 @@ import numpy as np
 
 from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.laws import by_temperature
-from dbbstation.sources.laws.by_temperature import MACHINE, FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.temperature import (
+    EQUATION,
+    LOGGED_EQUATION,
+    MACHINE,
+    ORIGIN,
+    FollowsTemperature,
+    InTwoStages,
+    grown,
+    grown_by,
+    warm_up_parameters,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -47,7 +55,7 @@ class SpindleGrowth(ErrorSource):
         "time and speed as in the measurement.",
         cure="Measure with the spindle at rest and cool; else let it warm up at working speed first, or enter its growth "
         "as a tool length that follows the spindle's temperature.",
-        equation=f"tool tip moves along -z of the platform by g(t) + begun a, g(t) = {EQUATION}; {by_temperature.EQUATION}",
+        equation=f"tool tip moves along -z of the platform by g(t) + begun a, g(t) = {EQUATION}; {LOGGED_EQUATION}",
         origin=f"thermal distortion caused by a rotating spindle, ISO 230-3; {ORIGIN}",
     )
 

@@ -16,9 +16,18 @@ from dbbstation.sources.contract import (
     Parameter,
     Texts,
 )
-from dbbstation.sources.laws import by_temperature
-from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.temperature import (
+    EQUATION,
+    LOGGED_EQUATION,
+    MACHINE,
+    ORIGIN,
+    STEEL_UM_M_K,
+    FollowsTemperature,
+    InTwoStages,
+    grown,
+    grown_by,
+    warm_up_parameters,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -49,7 +58,7 @@ class ThermalFrame(ErrorSource):
         "half hour over a morning.",
         cure="Let machine and shop come to rest before measuring; keep the sun and warm air off the frame; repeat early "
         "tests at the end, so that the drift does not mix with the height of the ball.",
-        equation=f"dQ_i = Q_i g(t), g = {EQUATION}; {by_temperature.EQUATION}",
+        equation=f"dQ_i = Q_i g(t), g = {EQUATION}; {LOGGED_EQUATION}",
         origin=ORIGIN,
     )
 

@@ -17,9 +17,18 @@ from dbbstation.sources.contract import (
     Parameter,
     Texts,
 )
-from dbbstation.sources.laws import by_temperature
-from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
-from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, InTwoStages, grown, grown_by, warm_up_parameters
+from dbbstation.sources.laws.temperature import (
+    EQUATION,
+    LOGGED_EQUATION,
+    MACHINE,
+    ORIGIN,
+    STEEL_UM_M_K,
+    FollowsTemperature,
+    InTwoStages,
+    grown,
+    grown_by,
+    warm_up_parameters,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -50,7 +59,7 @@ class ThermalStruts(ErrorSource):
         "start. A thermometer on a strut shows about 1 K for each 11 µm/m of steel.",
         cure="Let the machine warm up with a movement like that of the measurement before it starts; repeat early "
         "tests at the end, so that the drift does not mix with the height of the ball.",
-        equation=f"actual minus driven length = L_i g(t), g = {EQUATION}; {by_temperature.EQUATION}",
+        equation=f"actual minus driven length = L_i g(t), g = {EQUATION}; {LOGGED_EQUATION}",
         origin=ORIGIN,
     )
 

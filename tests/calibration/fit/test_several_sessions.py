@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.checks.plan_check import gaps
+from dbbstation.calibration.checks.visibility import gaps
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.errors import InputError
 from dbbstation.tasks.load import load_sessions

@@ -14,8 +14,7 @@ import pytest
 from dbbstation.calibration.checks.scatter import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.calibration.outliers.outlier import Outlier, OutlierKind
-from dbbstation.calibration.outliers.robust import calibrate_robust
-from dbbstation.calibration.outliers.strange_runs import _step, in_place_after_all
+from dbbstation.calibration.outliers.robust import _step, calibrate_robust, in_place_after_all
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity

@@ -11,7 +11,7 @@ from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Fitted, Setup
 from dbbstation.sources.registry import known_sources
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 
 PHI = np.arange(0, 360, 1.0)
 

@@ -13,7 +13,7 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.circle import by_angle
+from dbbstation.trace.recording import by_angle
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 

@@ -14,7 +14,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
 from dbbstation.sources.contract import Fitted
-from dbbstation.sources.laws.play_operator import followed, leaning
+from dbbstation.sources.laws.presliding import followed, leaning
 from tests.sources.runs import concealed_share, jig_runs, random_run, run
 
 BACKLASH = Backlash()

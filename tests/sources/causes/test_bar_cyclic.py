@@ -14,7 +14,7 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.causes.bar_cyclic import BarCyclic
 from dbbstation.sources.causes.base_joints import BaseJoints
 from dbbstation.sources.contract import Fitted, Motion, Need
-from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.recording import RawCircle
 from tests.sources.runs import random_run, run
 
 CYCLIC = BarCyclic()

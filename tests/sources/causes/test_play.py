@@ -17,7 +17,7 @@ from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.gravity import Gravity
 from dbbstation.sources.causes.play import Play, settled
 from dbbstation.sources.contract import Fitted
-from dbbstation.sources.laws.play_operator import leaning
+from dbbstation.sources.laws.presliding import leaning
 from tests.sources.runs import BORES_MM, JIG_TESTS, LEVELS_MM, random_machine, random_run, run
 
 PLAY = Play()

@@ -11,7 +11,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Thermometer
-from dbbstation.sources.laws.by_temperature import following_thermometers
+from dbbstation.sources.laws.temperature import following_thermometers
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.columns import temperatures
 from tests.sources.runs import random_run

@@ -20,7 +20,7 @@ from dbbstation.sources.causes.spindle_growth import SpindleGrowth
 from dbbstation.sources.causes.thermal_frame import ThermalFrame
 from dbbstation.sources.causes.thermal_struts import ThermalStruts
 from dbbstation.sources.contract import Fitted, Motion, Setup
-from dbbstation.sources.laws.warm_up import PAUSE_S, TIME_CONSTANTS_S, grown, grown_by, pauses_s, warmed
+from dbbstation.sources.laws.temperature import PAUSE_S, TIME_CONSTANTS_S, grown, grown_by, pauses_s, warmed
 from tests.plant.mechanisms.warming import Warming
 from tests.sources.runs import concealed_share, jig_runs, random_run, run
 

@@ -1,4 +1,7 @@
-"""The play operator with memory, for several sources."""
+"""Motion before sliding, with memory: the play operator and Dahl's law.
+
+[Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1 (1968), eq 1 with exponent 1]
+"""
 
 from __future__ import annotations
 
@@ -82,3 +85,61 @@ def _follow(
             lag[k, i] = at - travel[k, i]
             by_width[k, i] = end
         place[i], side[i] = at, end
+
+
+@dataclass(frozen=True, eq=False)
+class WoundState:
+    """Wind-up of m columns.
+
+    Attributes:
+        travel: last position, in its unit, shape (m,); NaN before the first row.
+        side: wind-up over the whole width, -1/2 to 1/2, shape (m,).
+        by_length: derivative of `side` by length, shape (m,).
+    """
+
+    travel: Floats
+    side: Floats
+    by_length: Floats
+
+
+def wound(travel: Floats) -> WoundState:
+    """Return the initial state of a run that begins in motion."""
+    start = leaning(travel)
+    return WoundState(start.place, start.side, np.zeros_like(start.side))
+
+
+def wound_up(travel: Floats, length: Floats, state: WoundState) -> tuple[Floats, Floats, WoundState]:
+    """Return the wind-up z, with dz = -(s/2 + z) |dx| / l and s the sign of dx.
+
+    Returns:
+        z and its derivative by l, shapes (n, m), and the state after the last row.
+    """
+    side, by_length = np.empty_like(travel), np.empty_like(travel)
+    at, now, slope = state.travel.copy(), state.side.copy(), state.by_length.copy()
+    _wind(np.ascontiguousarray(travel), length, at, now, slope, side, by_length)
+    return side, by_length, WoundState(at, now, slope)
+
+
+@compiled
+def _wind(
+    travel: Floats,
+    length: Floats,
+    at: Floats,
+    now: Floats,
+    slope: Floats,
+    side: Floats,
+    by_length: Floats,
+) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        x, z, dz, own = at[i], now[i], slope[i], length[i]
+        for k in range(count):
+            way = 0.0 if np.isnan(x) else travel[k, i] - x
+            if way != 0.0:
+                end = -0.5 if way > 0.0 else 0.5
+                kept = np.exp(-abs(way) / own)
+                dz = kept * (dz + (z - end) * abs(way) / (own * own))
+                z = end + (z - end) * kept
+            x = travel[k, i]
+            side[k, i], by_length[k, i] = z, dz
+        at[i], now[i], slope[i] = x, z, dz

@@ -19,7 +19,7 @@ import numpy as np
 from dbbstation.circles.analysis import analyse
 from dbbstation.circles.quick_look import quick_look
 from dbbstation.inference.harmonics import HIGH, LOW, basis, coefficients, smooth
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.recording import RawCircle
 
 if TYPE_CHECKING:

@@ -24,8 +24,8 @@ from scipy.spatial.transform import Rotation
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.places import shipped_folder
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import forward, strut_lengths
-from dbbstation.machine.rotation import Frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable

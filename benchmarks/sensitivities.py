@@ -17,8 +17,8 @@ import numpy as np
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.places import shipped_folder
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import bar_sensitivity, inverse, strut_jacobian
-from dbbstation.machine.rotation import Frames
 
 POSES = 54_000
 SEED = 20261121

@@ -23,7 +23,7 @@ from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.conformity import Conformity
 from dbbstation.service.board import SequenceOpened
 from dbbstation.service.front import Front

@@ -16,7 +16,7 @@ from dbbstation.circles.path import Filter
 from dbbstation.circles.quick_look import quick_look
 from dbbstation.circles.signatures import Signature
 from dbbstation.plan.bar import Bar
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.results.tolerances import sizes_of
 from dbbstation.trace.recording import RawCircle

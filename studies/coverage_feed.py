@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse
 from dbbstation.errors import TraceError
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.cut import cut
 from dbbstation.trace.recording import Recording
 from studies.coverage_rows import row_of

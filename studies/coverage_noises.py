@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.circles.analysis import analyse, analyse_pair
 from dbbstation.circles.budget import SetUpKnowledge, budgets, pair_budgets
 from dbbstation.circles.estimates import BudgetQuantity
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.recording import RawCircle
 from studies.coverage_rows import row_of
 from studies.kept_draws import drawn

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.figures import known_format
+from dbbstation.cli.output import known_format
 
 if TYPE_CHECKING:
     from collections.abc import Callable

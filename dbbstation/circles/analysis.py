@@ -12,7 +12,7 @@ from dbbstation.circles.noise import noise_of
 from dbbstation.circles.path import CirclePath, Filter, both, path_of
 from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.analysis import figures, passes_of
 from dbbstation.trace.cut import edges_of, overlap_feed_under
 from dbbstation.trace.recording import lost_samples
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.noise import CircleNoise
     from dbbstation.circles.reversals import Harmonic, ReversalStep
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.trace.analysis import Passes
     from dbbstation.trace.recording import RawCircle, Recording
 

@@ -22,7 +22,7 @@ from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
 from dbbstation.circles.strip import strip_widths
 from dbbstation.computing.kept import once_for_each
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis

@@ -18,7 +18,7 @@ from scipy.special import chndtr, chndtrinc
 
 from dbbstation.circles.form import drawn_lines
 from dbbstation.machine.compiled import compiled
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.harmonics import amplitudes
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.circles.path import CirclePath

@@ -14,7 +14,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 
 class Signature(StrEnum):

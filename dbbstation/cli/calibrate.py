@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command, figure
-from dbbstation.cli.figures import print_runs
-from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_table
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, print_runs, print_table
 from dbbstation.results.words import fit_sentences, outlier_sentence, residual_lines, use_sentence, visibility_sentences
 from dbbstation.tasks.calibrate import calibrate as task
 from dbbstation.text.written import decimals_of, to_its_place

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import click
 
-from dbbstation.cli.figures import format_of, known_format
-from dbbstation.cli.output import echo, print_json, print_result, say
+from dbbstation.cli.output import echo, format_of, known_format, print_json, print_result, say
 from dbbstation.cli.progress import count_bar, task_bar
 from dbbstation.cli.provenance import provenance
 from dbbstation.cli.shop import ShopOption

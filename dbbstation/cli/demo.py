@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from dbbstation.cli.declared import Answer, made
-from dbbstation.cli.figures import G_LOW_PASSED
-from dbbstation.cli.output import echo, print_table, say
+from dbbstation.cli.output import G_LOW_PASSED, echo, print_table, say
 from dbbstation.cli.progress import COUNTED, ENDLESS, ProgressBar
 from dbbstation.errors import OutputError
 from dbbstation.files.places import unused_path

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import command
-from dbbstation.cli.figures import print_runs, print_tolerances
-from dbbstation.cli.output import echo, print_table
+from dbbstation.cli.output import echo, print_runs, print_table, print_tolerances
 from dbbstation.cli.shop import shop_settings
 from dbbstation.results.words import evaluated_sentence
 from dbbstation.tasks.evaluate import evaluate as task

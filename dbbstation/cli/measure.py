@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from dbbstation.cli.instrument_options import LineOptions
     from dbbstation.instrument.protocol import Protocol
-    from dbbstation.plan.circle import Direction
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Direction, Plan
     from dbbstation.station.assembly import Job, Workplace
     from dbbstation.station.engine import Station
     from dbbstation.system.signals import Signals

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import click
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.figures import which_circles
 from dbbstation.cli.lazy import made_ready
-from dbbstation.cli.output import echo, echo_line, print_result, print_table
+from dbbstation.cli.output import echo, echo_line, print_result, print_table, which_circles
 from dbbstation.cli.shop import shop_settings
 from dbbstation.files.places import shipped_folder
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM

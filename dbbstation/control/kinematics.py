@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import ModelError, StationError
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUTS, Rotation
 from dbbstation.machine.kinematics import inverse, strut_jacobian
-from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.statics import GRAVITY_M_S2
 from dbbstation.machine.travel import middle
-from dbbstation.sources.c_form import c_constant
-from dbbstation.sources.contract import Need
+from dbbstation.sources.contract import Need, c_constant
 from dbbstation.sources.laws.weights import masses_for_c, strut_compliance
 
 if TYPE_CHECKING:
@@ -25,8 +23,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.sources.c_form import CForm
-    from dbbstation.sources.contract import Fitted
+    from dbbstation.sources.contract import CForm, Fitted
 
 LONGEST_NAME = 20
 """HAL takes 47 characters for a pin with the component's name [HAL_NAME_LEN]; the longest pin name of a source takes 26."""

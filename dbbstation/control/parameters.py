@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUTS, Frames
 from dbbstation.machine.kinematics import Struts, forward, inverse, strut_jacobian
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.base_joints import BaseJoints

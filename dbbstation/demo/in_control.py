@@ -20,9 +20,8 @@ from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.source_text import text_of
-from dbbstation.machine.geometry import STRUTS, Hexapod
+from dbbstation.machine.geometry import STRUTS, Hexapod, Rotation
 from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Rotation
 from dbbstation.machine.travel import middle
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel

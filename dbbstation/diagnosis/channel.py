@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.missing_physics import misfit_of
-from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
+from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, misfit_of
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of, left_open_of, seen_of
 from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms, is_shape, parts_of

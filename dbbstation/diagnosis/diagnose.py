@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
+from dbbstation.calibration.checks.scatter import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.after_reversals import after_reversals

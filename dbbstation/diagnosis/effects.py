@@ -12,7 +12,7 @@ from dbbstation.calibration.reporting.prediction import smooth_circularities_um
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.errors import KinematicsError
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun
 from dbbstation.facts.serialise import Array, AsItIs, Kept
 from dbbstation.machine.kinematics import position_responses
 from dbbstation.model.identified import known_u

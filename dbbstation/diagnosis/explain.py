@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from dbbstation.calibration.checks.missing_physics import misfit_of
-from dbbstation.calibration.checks.scatter import seats_of
+from dbbstation.calibration.checks.scatter import misfit_of, seats_of
 from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default_sources
 from dbbstation.calibration.outliers.robust import MOST, calibrate_robust, in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.parts import by_amplitudes, by_terms
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.travel import is_within_travel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.sources.contract import Motion, Need, Setup
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.missing_physics import is_missing_physics, remainder_of
+from dbbstation.calibration.checks.scatter import is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.left_where import where_left
 from dbbstation.diagnosis.parts import SESSION_TIME, variable_of

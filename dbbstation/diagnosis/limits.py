@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.checks.missing_physics import remainder_of
+from dbbstation.calibration.checks.scatter import remainder_of
 from dbbstation.diagnosis.left_where import where_left
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.limit_reached import LimitReached

@@ -16,7 +16,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.verdict import Verdict
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Need
 
 if TYPE_CHECKING:

@@ -30,9 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.geometry import Machine
+    from dbbstation.machine.geometry import Frames, Machine
     from dbbstation.machine.kinematics import Struts
-    from dbbstation.machine.rotation import Frames
     from dbbstation.model.machine_model import BarReading
     from dbbstation.sources.contract import Motion
 

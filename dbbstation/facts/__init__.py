@@ -1,8 +1,8 @@
-"""Values with uncertainty, and their conversion to JSON."""
+"""Values with uncertainty, the run that a fact is about, and conversion to JSON."""
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import TypeVar
 
 _Kind = TypeVar("_Kind")
@@ -18,3 +18,32 @@ def of_facts(kind: type[_Kind], *facts: object, **further: object) -> _Kind:
 def picked(one: object, *names: str) -> dict[str, object]:
     """Return some fields of an object by name."""
     return {name: getattr(one, name) for name in names}
+
+
+@dataclass(frozen=True)
+class OfRun:
+    """A fact about one run."""
+
+    test: str
+    direction: str
+    repeat: int
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """Return what tells the run from the others of its session."""
+        return self.test, self.direction, self.repeat
+
+    @property
+    def label(self) -> str:
+        """Return the name for messages and file, such as `a-ccw-1`."""
+        return f"{self.test}-{self.direction}-{self.repeat}"
+
+
+@dataclass(frozen=True)
+class OfRunInSession:
+    """A fact about one run of one of several sessions."""
+
+    session: str
+    test: str
+    direction: str
+    repeat: int

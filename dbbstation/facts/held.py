@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from dbbstation.errors import Problem, refuse
 from dbbstation.files.own_classes import classes_in_files, module_name
 from dbbstation.laws.contract import MOVING, TableSource
 from dbbstation.sources.contract import ErrorSource
-from dbbstation.sources.of_struts import of_struts
 from dbbstation.sources.registry import known_sources, known_with
 
 if TYPE_CHECKING:
@@ -48,8 +47,11 @@ def _has_columns(found: FoundClass[ABC], faults: list[Problem]) -> bool:
 
 
 def _of_struts(found: FoundClass[ABC]) -> FoundClass[ErrorSource]:
-    kind = of_struts(found.kind) if issubclass(found.kind, TableSource) else cast("type[ErrorSource]", found.kind)
-    return FoundClass(kind, found.place)
+    if not issubclass(found.kind, TableSource):
+        return FoundClass(cast("type[ErrorSource]", found.kind), found.place)
+    from dbbstation.sources.of_struts import of_struts  # noqa: PLC0415 - few commands are given a law over columns
+
+    return FoundClass(of_struts(found.kind), found.place)
 
 
 def sources_of(files: Sequence[Path], known: Mapping[str, ErrorSource]) -> tuple[str, ...]:

@@ -10,8 +10,7 @@ import numpy as np
 from dbbstation.errors import KinematicsError
 from dbbstation.machine import kernels
 from dbbstation.machine.compiled import in_blocks
-from dbbstation.machine.geometry import STRUTS, Hexapod
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.geometry import STRUTS, Frames, Hexapod
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -19,9 +19,8 @@ from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.geometry import Compliance, Masses, StrutMasses
+    from dbbstation.machine.geometry import Compliance, Frames, Masses, StrutMasses
     from dbbstation.machine.kinematics import Struts
-    from dbbstation.machine.rotation import Frames
 
 GRAVITY_M_S2 = 9.81
 """Acceleration of gravity; it differs by up to 0.3 % between places on Earth [m/s²]."""

@@ -8,9 +8,8 @@ import numpy as np
 
 from dbbstation.errors import MachineError, TravelError
 from dbbstation.machine.compiled import compiled, inlined
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUTS, Frames, rotation_matrices
 from dbbstation.machine.kinematics import inverse, strut_jacobian
-from dbbstation.machine.rotation import Frames, rotation_matrices
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

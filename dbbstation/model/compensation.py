@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import forward, strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import Actual, MachineModel, actual_hexapod
 from dbbstation.model.root_search import MOST_MM, RootSearch
 from dbbstation.sources.contract import Effect

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.geometry import STRUTS, Frames
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.quality.knowledge import COEFFICIENTS, HIGHER, Expected, form_columns, local_columns
 from dbbstation.sources.contract import Need, Owner

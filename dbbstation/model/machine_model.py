@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import KinematicsError
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUTS, Frames
 from dbbstation.machine.kinematics import (
     BarSensitivity,
     Response,
@@ -19,7 +19,6 @@ from dbbstation.machine.kinematics import (
     position_responses,
     strut_lengths,
 )
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, Fitted, Motion, Need, Owner
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.model.observation import LEAD_IN_STEP_DEG
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.sources.contract import Motion, Setup
 
 if TYPE_CHECKING:
@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import PlannedTest
+    from dbbstation.plan.plan import Circle, PlannedTest
 
 
 @dataclass(frozen=True, eq=False)

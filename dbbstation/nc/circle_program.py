@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.nc.toolpath import IN_FORCE, RowKind, Toolpath, ToolpathBuilder
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 STEP_DEG = 0.1
 """Angle between programmed points: 3600 per turn [GRAV 4.1]."""

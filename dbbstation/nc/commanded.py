@@ -9,14 +9,14 @@ import numpy as np
 from dbbstation.errors import InputError
 from dbbstation.nc.registry import dialect_of_file
 from dbbstation.nc.toolpath import RowKind
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.rotation import Rotation
+    from dbbstation.machine.geometry import Rotation
     from dbbstation.model.observation import Observation
     from dbbstation.nc.toolpath import Toolpath
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 LARGEST_CORRECTION_MM = 5.0
 """A program that leaves the plan's circle by more than this belongs to another path."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.rotation import Rotation
+    from dbbstation.machine.geometry import Rotation
     from dbbstation.nc.planner import LookAhead
     from dbbstation.nc.setup import ControlSetup
     from dbbstation.nc.toolpath import Toolpath

@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.toolpath import Toolpath
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Circle, Plan
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from dbbstation.facts import of_facts
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.geometry import Frames
 from dbbstation.nc.spilled import Spilled, forget
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.machine.rotation import Rotation
+    from dbbstation.machine.geometry import Rotation
 
 DECIMALS = (6, 6, 6, 7, 7, 7)
 """Decimals of X, Y, Z [mm], A, B, C [deg] in programs: rounding shifts the tip, and a point a metre from it, by at most

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import Rotation
 from dbbstation.nc.mark import is_marked, marked
 from dbbstation.nc.toolpath import IN_FORCE, MESSAGE, Ending, RowKind, ToolpathBuilder
 from dbbstation.nc.words import WordDialect

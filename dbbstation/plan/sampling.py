@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Circle, Plan
 
 UNDULATIONS = 30
 """Highest undulations per revolution in a circle's figures."""

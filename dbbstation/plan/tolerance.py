@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 
 class CircleFigure(StrEnum):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.quality.forms import FormsBesides, RunForm
     from dbbstation.quality.knowledge import Seen
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.quality.forms import Forms, FormsBesides
     from dbbstation.quality.knowledge import Expected, Planned, Run, Seen
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.patches import Circle as Ring
 
 from dbbstation.circles.estimates import FIRST
-from dbbstation.plan.circle import FULL_TURN_DEG, Direction
+from dbbstation.plan.plan import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
 from dbbstation.report.polar import CIRCLE, REACH, SIZE, step_of, thinned
 from dbbstation.report.sheet import TEXT_PT, Box, line_in, place_labels, width_of_in, wrapped

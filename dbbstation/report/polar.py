@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.effects import CuredCircle
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.results.circles import MeasuredCircle
     from dbbstation.results.report_verdict import Ranked
 

@@ -12,8 +12,7 @@ from dbbstation.circles.budget import Budget, budget_of, budgets, pair_budgets, 
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.quick_look import Symptom, quick_look
 from dbbstation.circles.reversals import Harmonic, ReversalStep
-from dbbstation.facts import of_facts
-from dbbstation.facts.run import OfRunInSession
+from dbbstation.facts import OfRunInSession, of_facts
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.quality.finding import Finding

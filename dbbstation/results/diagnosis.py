@@ -12,8 +12,7 @@ from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.diagnosis.effects import CauseEffect
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError
-from dbbstation.facts import of_facts
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun, of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels

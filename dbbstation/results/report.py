@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.diagnosis.effects import CauseEffect
-from dbbstation.facts import of_facts, picked
+from dbbstation.facts import OfRunInSession, of_facts, picked
 from dbbstation.facts.held import ComparedTolerance, ReportVerdict, ToleranceOfTest
-from dbbstation.facts.run import OfRunInSession
 from dbbstation.facts.serialise import Kept
 from dbbstation.plan.tolerance import OF_A_MODEL
 from dbbstation.results.calibration import EvaluationResult

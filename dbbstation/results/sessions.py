@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.files.formats.session import Counts
 from dbbstation.files.provenance import Provenance

@@ -12,9 +12,8 @@ from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.extremes import without_noise
 from dbbstation.circles.path import TOLERATED, Filter
-from dbbstation.facts import of_facts
+from dbbstation.facts import OfRunInSession, of_facts
 from dbbstation.facts.held import HeldTolerance, WorstCircle
-from dbbstation.facts.run import OfRunInSession
 from dbbstation.plan.tolerance import FILTERED, OF_A_MODEL, OF_BOTH_DIRECTIONS, CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
 from dbbstation.text.written import expanded_uncertainty

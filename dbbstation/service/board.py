@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.held_line import ReadingRate
 from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.station import events
@@ -17,7 +17,7 @@ from dbbstation.station.states import RECORDING, State
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.service.live_trace import Derived
     from dbbstation.station.commands import Command
     from dbbstation.station.judging import JudgedRun

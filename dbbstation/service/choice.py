@@ -13,8 +13,8 @@ from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import ReadBy, SessionDetails
 from dbbstation.files.places import SESSION_FILE
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.circle import circles_s
 from dbbstation.plan.order import LARGEST_LEAK, against_drift, by_holder, height_and_drift, mountings
+from dbbstation.plan.plan import circles_s
 from dbbstation.service.memory import Line
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.plan import Circle, Direction
     from dbbstation.station.programs import RunProgram
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.plan import Circle, Direction
     from dbbstation.station.events import Sample
     from dbbstation.trace.recording import RawCircle
 

@@ -14,7 +14,7 @@ from dbbstation.files.gateway import head_of
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import dated_folders
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.circle import circles_s
+from dbbstation.plan.plan import circles_s
 from dbbstation.station.schedule import Schedule
 
 if TYPE_CHECKING:

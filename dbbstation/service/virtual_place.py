@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from dbbstation.instrument.protocol import Protocol
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
     from dbbstation.station.assembly import Job
     from dbbstation.station.programs import RunProgram
 

@@ -19,19 +19,49 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.laws.contract import Parameter as Parameter  # noqa: PLC0414 - part of the contract: sources take it from here
 from dbbstation.laws.contract import Texts as Texts  # noqa: PLC0414 - part of the interface: sources import it from here
-from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
+from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS, Frames
 from dbbstation.machine.kinematics import Struts, inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
+    from numpy.typing import ArrayLike
+
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.machine.geometry import Compliance, Hexapod, Machine
     from dbbstation.plan.plan import Plate
-    from dbbstation.sources.c_form import CForm
     from dbbstation.trace.columns import Logged
+
+
+@dataclass(frozen=True, eq=False)
+class CForm:
+    """Statements of C that add a source's effect at one pose.
+
+    They may use names of `control/kernel.c`: `at`, the source's struts; `e`, the sum of effects; `v`, the values;
+    `EACH`, a loop over struts i. The expression `warmer[thermometer[k]]` is thermometer k's excess over its zero [K].
+
+    Attributes:
+        by_pose: False if it uses only lengths of `at`, so the pose need not be computed.
+        constants: further numbers or arrays by name.
+        thermometers: columns without their unit.
+    """
+
+    body: str
+    by_pose: bool = True
+    constants: Mapping[str, ArrayLike] = field(default_factory=dict)
+    thermometers: tuple[str, ...] = ()
+
+
+def c_constant(name: str, value: ArrayLike) -> str:
+    """Return the C definition of a number or an array, exact to the last bit."""
+    array = np.asarray(value)
+    kind = "int" if np.issubdtype(array.dtype, np.integer) else "double"
+    shape = "".join(f"[{n}]" for n in array.shape)
+    return f"static const {kind} {name}{shape} = {str(array.tolist()).translate(_BRACES)};"
+
+
+_BRACES = str.maketrans("[]", "{}")
 
 
 Worked = TypeVar("Worked")

@@ -12,7 +12,7 @@ from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session_checks import unlike_bar
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.machine.geometry import check_model_is_of
-from dbbstation.plan.circle import circles_s
+from dbbstation.plan.plan import circles_s
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.events import RunCompleted, RunId, Sample
@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.circle import Direction
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Direction, Plan
     from dbbstation.quality.finding import Finding
     from dbbstation.station.engine import ReadingSource
     from dbbstation.station.programs import RunProgram

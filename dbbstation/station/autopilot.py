@@ -12,7 +12,7 @@ from dbbstation.station.states import State
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
     from dbbstation.station.commands import Command
 
 MOST_REPEATS = 2

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun
 
 if TYPE_CHECKING:
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.trace.cut import FEED_TOLERANCE
 
 if TYPE_CHECKING:
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 AGREEING = 3
 """Number of successive readings on one side before the side counts, so that one misread line is no movement."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun
 from dbbstation.quality.answer import answer
 
 if TYPE_CHECKING:
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
 
     from dbbstation.errors import StationError
     from dbbstation.instrument.reading import Status
-    from dbbstation.plan.circle import Circle, Direction
-    from dbbstation.plan.plan import Ball
+    from dbbstation.plan.plan import Ball, Circle, Direction
     from dbbstation.plan.sampling import Sampling
     from dbbstation.quality.answer import RunAssessment
     from dbbstation.quality.finding import Finding

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
     from dbbstation.quality.knowledge import Planned, Seen
     from dbbstation.quality.plan_effects import PlanEffects
     from dbbstation.station.events import Event

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import ReadBy, SessionDetails
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 
 def check_session(

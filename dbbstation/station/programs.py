@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.nc.toolpath import Toolpath
-    from dbbstation.plan.circle import Circle, Direction
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Circle, Direction, Plan
 
 _MODEL = re.compile(r"model file: .*\bsha256 ([0-9a-f]{64})")
 """Pattern of the model's name in the header of a compensated program."""

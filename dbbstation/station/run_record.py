@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.errors import TraceError
 from dbbstation.instrument.reading import DOUBTFUL, OK
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.quality.held import AFTER_HELD, SHORTEST_S, HeldLength
 from dbbstation.station.detector import DWELL_BEHIND_S, feed_out_due_s, live_phi_deg
 from dbbstation.station.events import Sample
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.instrument.reading import Reading
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.station.events import RunId
 
 _STEP_S = 2e-6

@@ -11,8 +11,7 @@ from dbbstation.station.events import RunId
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.plan.circle import Direction
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Direction, Plan
 
 
 @dataclass(frozen=True)

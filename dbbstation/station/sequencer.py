@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.instrument.reading import DOUBTFUL, OK
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
 from dbbstation.quality.finding import against_limit
 from dbbstation.quality.held import HeldLength
@@ -46,8 +46,7 @@ if TYPE_CHECKING:
 
     from dbbstation.errors import StationError
     from dbbstation.instrument.reading import Reading
-    from dbbstation.plan.circle import Circle, Direction
-    from dbbstation.plan.plan import Ball, Plan
+    from dbbstation.plan.plan import Ball, Circle, Direction, Plan
     from dbbstation.plan.sampling import Sampling
     from dbbstation.quality.finding import Finding
     from dbbstation.station.events import Event, RunId, Sample

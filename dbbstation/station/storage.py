@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import CommandedProgram, ReadBy, RunEntry
     from dbbstation.files.recordings.journal import RunWriter
     from dbbstation.files.recordings.session_writer import SessionWriter
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 COLUMNS = ("t_s", "length_mm", "status")
 """Columns that the station records for every instrument."""

@@ -1,4 +1,4 @@
-"""File systems: free space, kind, and names that every system accepts."""
+"""File systems: free space and kind."""
 
 from __future__ import annotations
 
@@ -28,13 +28,3 @@ def file_system(path: Path) -> str:
     mounts = [(Path(words[1].replace("\\040", " ")), words[2]) for words in map(str.split, lines) if len(words) > 2]  # noqa: PLR2004 - device, place, kind
     over = [(len(place.parts), kind) for place, kind in mounts if path.is_relative_to(place)]
     return max(over, default=(0, ""))[1]
-
-
-DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(1, 10))})
-"""Names that Windows reserves before the first point of a file name, in any case (Microsoft, "Naming Files, Paths, and
-Namespaces")."""
-
-
-def is_device(name: str) -> bool:
-    """Return whether Windows treats a name as a device."""
-    return name.partition(".")[0].lower() in DEVICES

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Names, Option, paths_of, task
-from dbbstation.tasks.drawing import drawing
+from dbbstation.tasks.declare import Names, Option, drawing, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Option, paths_of, task
-from dbbstation.tasks.drawing import drawing
+from dbbstation.tasks.declare import Option, drawing, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -126,7 +125,7 @@ def circle(
     from dbbstation.circles.budget import SetUpKnowledge
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.session import RunEntry, RunState
-    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.plan import Circle, Direction
     from dbbstation.results.circles import MeasuredCircle, circle_figures
     from dbbstation.trace.cut import cut
     from dbbstation.trace.recording import Recording

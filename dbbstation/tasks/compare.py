@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.errors import InputError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, task
-from dbbstation.tasks.drawing import drawing
+from dbbstation.tasks.declare import File, Option, drawing, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

@@ -19,8 +19,7 @@ from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import in_a_book
 from dbbstation.files.places import package_text
-from dbbstation.machine.geometry import STRUTS, differences, in_words
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import STRUTS, Rotation, differences, in_words
 from dbbstation.machine.travel import check_travel
 from dbbstation.results.control import KinematicsResult, ParametersResult
 from dbbstation.results.model_warnings import model_warnings

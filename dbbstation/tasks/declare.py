@@ -13,6 +13,8 @@ import math
 import re
 import sys
 from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
@@ -303,3 +305,19 @@ def _plain(kind: Any) -> Any:  # noqa: ANN401 - a type
         return kind
     others = [one for one in get_args(kind) if one is not NoneType]
     return _plain(others[0]) if len(others) == 1 else Any
+
+
+def drawing(figure: str, *given: object) -> Callable[[object], Any]:
+    """Return what draws a figure.
+
+    Args:
+        figure: name of the figure's module and function.
+        given: the figure's arguments before the wanted output.
+    """
+    return partial(_drawn, figure, given)
+
+
+def _drawn(figure: str, given: tuple[object, ...], wanted: object) -> Any:  # noqa: ANN401 - as asked for
+    from dbbstation.report.figure_format import figure_format
+
+    return getattr(import_module(f"dbbstation.report.{figure}"), figure)(*given, figure_format(wanted))

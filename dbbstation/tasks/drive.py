@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Files, Names, Option, paths_of, task
-from dbbstation.tasks.drawing import drawing
+from dbbstation.tasks.declare import Files, Names, Option, drawing, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

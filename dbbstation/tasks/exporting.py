@@ -14,7 +14,7 @@ from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.provenance import beside_table
 from dbbstation.files.recordings.run_lines import split_head
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace import columns
 from dbbstation.trace.cut import edges_of, progress_deg
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.provenance import Provenance
     from dbbstation.files.recordings.session import SessionFolder
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.trace.recording import Recording
 
     Blocks = Iterator[Mapping[str, Floats | list[str]]]

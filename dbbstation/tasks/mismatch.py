@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Files, Names, Option, paths_of, task
-from dbbstation.tasks.drawing import drawing
+from dbbstation.tasks.declare import File, Files, Names, Option, drawing, paths_of, task
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from dbbstation.files.recordings.table_csv import table_csv
 from dbbstation.results.simulator import SimulationsRun, simulator_result
 from dbbstation.simulators.code import missing_code
 from dbbstation.simulators.running import MOST_SECONDS, Runs
-from dbbstation.tasks.drawing import drawing
+from dbbstation.tasks.declare import drawing
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.simulator.answer import SimulatorComparison

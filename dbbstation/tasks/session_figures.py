@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.results.circles import MeasuredCircle
     from dbbstation.results.tolerances import ToleratedCircle
 

@@ -9,13 +9,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from dbbstation.errors import TraceError
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.cut import edges_of, progress_deg
 from dbbstation.trace.recording import CentredCircle, RawCircle
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.trace.recording import Recording
 
 MOST_STEPS = 20

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.computing.kept import once_for_each
 from dbbstation.errors import TraceError
-from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
+from dbbstation.plan.plan import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.trace.columns import each
 from dbbstation.trace.recording import AFTER_LOSS, RawCircle, lost_samples, means, share_lost
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.trace.recording import Recording
 
 LARGEST_GAP_DEG = 10.0

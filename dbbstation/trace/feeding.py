@@ -11,7 +11,7 @@ from dbbstation.trace.cut import OUTSIDE_FEEDINGS, progress_deg
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.trace.recording import Recording
 
 LEFT_OUT_DEG = 2.0

@@ -15,7 +15,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Flags, Floats
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 OVERRIDE = 1.2
 """Greatest feed override of usual controls; other checks detect a wrong feed."""

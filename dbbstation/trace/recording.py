@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.columns import WithLogged, each
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.trace.columns import Logged
 
 

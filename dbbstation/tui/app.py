@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from textual.events import Event as ScreenEvent
     from textual.screen import Screen
 
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front, Opened
     from dbbstation.service.live_trace import LiveTrace

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.plan.circle import Direction, circles_s
+from dbbstation.plan.plan import Direction, circles_s
 from dbbstation.quality.finding import against_limit
 from dbbstation.service.board import Mark, RunDecision, problem_alone
 from dbbstation.station.commands import GoTo

@@ -16,7 +16,7 @@ from dbbstation.tui.texts import NOT_SEATED_LONG, NOT_SEATED_SHORT, SEATED, SEAT
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.service.board import Board
     from dbbstation.station.detector import BarAtFeedIn
     from dbbstation.station.events import Sample

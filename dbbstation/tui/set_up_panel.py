@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
     from textual.app import ComposeResult
 
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Ball
+    from dbbstation.plan.plan import Ball, Circle
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
 

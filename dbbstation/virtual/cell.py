@@ -11,7 +11,7 @@ from dbbstation.errors import MachineError
 from dbbstation.virtual.wire_clock import WaitingClock
 
 if TYPE_CHECKING:
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
     from dbbstation.virtual.machine import VirtualMachine, VirtualRun
     from dbbstation.virtual.path import CommandedPath
     from dbbstation.virtual.wire_clock import ScaledClock

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from dbbstation.errors import MachineError, StationError
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -27,8 +27,8 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.source_text import text_of
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import forward
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
 from dbbstation.system.children import end_tree, is_root
 from dbbstation.system.handles import lock, open_to_change

@@ -15,8 +15,7 @@ from dbbstation.virtual.truth import SET_UP_MM, MeasurementErrors, put_up
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.plan.circle import Direction
-    from dbbstation.plan.plan import Ball, Plan, PlannedTest
+    from dbbstation.plan.plan import Ball, Direction, Plan, PlannedTest
     from dbbstation.sources.contract import Fitted
     from dbbstation.virtual.path import CommandedPath
     from dbbstation.virtual.truth import SetUp

@@ -14,7 +14,7 @@ from dbbstation.nc.toolpath import RowKind
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.nc.toolpath import Toolpath
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 
 @dataclass(frozen=True, eq=False)

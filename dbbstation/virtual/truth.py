@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Ball
+    from dbbstation.plan.plan import Ball, Circle
     from dbbstation.sources.contract import Setup
 
 SET_UP_MM = 0.05

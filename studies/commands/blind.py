@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.figures import format_of
+from dbbstation.cli.output import format_of
 from studies.figure_option import figure_option
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.circles.analysis import analyse, analyse_pair, refiltered
 from dbbstation.circles.path import Filter
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.analysis import figures, passes_of
 from dbbstation.trace.cut import SMALLEST_SHAPE_MM
 from dbbstation.trace.recording import RawCircle, Recording

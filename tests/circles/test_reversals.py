@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.circles.reversals import FAR_DEG, step_at
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.recording import RawCircle
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli.demo import _print
-from dbbstation.cli.figures import G_LOW_PASSED, G_WITH_NOISE
+from dbbstation.cli.output import G_LOW_PASSED, G_WITH_NOISE
 from dbbstation.demo.whole_job import _side_by_side
 from dbbstation.facts.serialise import as_objects
 from dbbstation.results.demo import DemoResult

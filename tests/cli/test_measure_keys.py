@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 
 from dbbstation.cli.measure_talk import Keyboard
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.finding import Name, found
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, Quit, Repeat

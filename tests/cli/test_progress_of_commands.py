@@ -14,7 +14,7 @@ import dbbstation
 from dbbstation.cli import DONE, progress
 from dbbstation.cli.demo import DemoShown
 from dbbstation.cli.measure_talk import Talk
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station.events import RunAccepted, RunId, RunProgress
 from tests.cli.conftest import call
 from tests.cli.golden_json import FIXTURES, SMALL, lines_of

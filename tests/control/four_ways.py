@@ -21,8 +21,7 @@ from dbbstation.demo.in_control import genhexkins, made_kins
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.places import shipped_folder
-from dbbstation.machine.geometry import Hexapod
-from dbbstation.machine.rotation import Frames, Rotation
+from dbbstation.machine.geometry import Frames, Hexapod, Rotation
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.tasks.compensate import compensate

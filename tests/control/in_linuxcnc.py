@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.control.kinematics import component
 from dbbstation.control.parameters import tool_errors
 from dbbstation.files.places import package_text
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.geometry import Frames
 from dbbstation.virtual.linuxcnc import installed_component
 
 if TYPE_CHECKING:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.geometry import Compliance, Hexapod, JointAxes, Masses, StrutMasses
+from dbbstation.machine.geometry import Compliance, Frames, Hexapod, JointAxes, Masses, Rotation, StrutMasses
 from dbbstation.machine.kinematics import inverse, strut_jacobian
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.machine.travel import middle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Need, Owner

@@ -12,8 +12,8 @@ import pytest
 from dbbstation.control.kinematics import component, settings
 from dbbstation.errors import ModelError, StationError
 from dbbstation.files.places import package_text
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import forward
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources

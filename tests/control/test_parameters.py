@@ -24,7 +24,7 @@ from dbbstation.control.parameters import (
 from dbbstation.errors import ModelError, OutputError, StationError, TravelError
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.model import write_model
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.geometry import Frames
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted

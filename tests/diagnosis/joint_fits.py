@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbbstation.calibration.checks.missing_physics import misfit_of
+from dbbstation.calibration.checks.scatter import misfit_of
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained
 from dbbstation.files.formats.plan import read_plan

@@ -16,7 +16,7 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.inference.verdict import Verdict
 from dbbstation.model.observation import Observation
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Setup
 from dbbstation.trace.recording import RawCircle
 from tests.plant.plan import EIGHT

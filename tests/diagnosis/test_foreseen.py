@@ -12,7 +12,7 @@ from dbbstation.diagnosis.channel import CircleChannel
 from dbbstation.diagnosis.foreseen import ForeseenTests
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Fitted, Motion, Need
 from dbbstation.sources.registry import sources_named
 from dbbstation.tasks.load import load_sessions

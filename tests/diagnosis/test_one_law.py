@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dbbstation.files.own_sources import every_source
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.of_struts import moving_columns
 from dbbstation.sources.trial import trial_machine

@@ -9,8 +9,8 @@ from dbbstation.diagnosis.findings import Unexplained
 from dbbstation.diagnosis.shapes import READING, SIGNED, Follows
 from dbbstation.diagnosis.source_curves import SEEN, found_sources, source_curves
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Owner, Parameter
 from tests.diagnosis.joint_fits import CONSTANT_S, DRIFT_UM, PLAY_UM, joint_fit

@@ -27,7 +27,7 @@ from dbbstation.machine.geometry import ControlCorrection
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.bar import Bar
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.virtual.machine import VirtualMachine

@@ -9,7 +9,7 @@ import pytest
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.history.run_length import average_run_length
 from dbbstation.history.trend import TrendOptions, histories
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.plan.tolerance import CircleFigure, Tolerance
 from dbbstation.results.history import history_result
 

@@ -27,7 +27,7 @@ from dbbstation.instrument.library import known_instruments, load_variants, with
 from dbbstation.instrument.polling import PolledReply
 from dbbstation.instrument.reading import OK
 from dbbstation.instrument.sequence import SampleOrder
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.reachable import Reachable
 
 if TYPE_CHECKING:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import KinematicsError
-from dbbstation.machine.geometry import Hexapod
+from dbbstation.machine.geometry import Frames, Hexapod
 from dbbstation.machine.kernels import LANES
 from dbbstation.machine.kinematics import bar_sensitivity, forward, inverse, strut_jacobian, strut_lengths
-from dbbstation.machine.rotation import Frames
 
 BALL = np.array([20.0, -35.0, -1010.0])
 

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import KinematicsError
-from dbbstation.machine.geometry import Hexapod
+from dbbstation.machine.geometry import Frames, Hexapod, Rotation, rotation_matrices
 from dbbstation.machine.kinematics import bar_sensitivity, forward, inverse, position_responses, strut_jacobian
-from dbbstation.machine.rotation import Frames, Rotation, rotation_matrices
 from dbbstation.machine.travel import middle as middle_of
 
 BALL = np.array([20.0, -35.0, -1010.0])

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import KinematicsError
-from dbbstation.machine.geometry import Compliance, Masses, StrutMasses
+from dbbstation.machine.geometry import Compliance, Frames, Masses, Rotation, StrutMasses
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.machine.statics import (
     base_loads,
     motor_loads,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import forward, strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import begun, compensated, compensated_on
 from dbbstation.model.machine_model import MachineModel, actual_hexapod
 from dbbstation.sources.contract import Effect, ErrorSource, Fitted, Motion, Need, Owner, Parameter

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.expected import SECTORS, expected_circle
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.knowledge import LOCAL_COEFFICIENTS
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Need, Owner, Parameter, Setup, Texts
 from dbbstation.sources.registry import known_sources

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames, Rotation
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.compensation import compensated
 from dbbstation.model.identified import IdentifiedModel, position_uncertainty_mm
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
 from studies.gravity import shifted

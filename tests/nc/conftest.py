@@ -13,8 +13,7 @@ from dbbstation.machine.geometry import Machine
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.registry import dialect_named
-from dbbstation.plan.circle import Circle
-from dbbstation.plan.plan import Plan
+from dbbstation.plan.plan import Circle, Plan
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 

@@ -12,7 +12,7 @@ from dbbstation.model.observation import Observation
 from dbbstation.nc.circle_program import chord_error_mm, circle_toolpath
 from dbbstation.nc.commanded import commanded_poses, poses_at_progress
 from dbbstation.nc.export import Inverse, circle_programs
-from dbbstation.plan.circle import Circle
+from dbbstation.plan.plan import Circle
 from dbbstation.sources.contract import Motion, Setup
 from dbbstation.trace.recording import RawCircle
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError, StationError, TravelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.toolpath import RowKind

@@ -12,7 +12,7 @@ from dbbstation.nc.circle_program import arc_phi_deg, chord_error_mm, circle_too
 from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.nc.toolpath import RowKind, Toolpath, in_pieces
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.sources.contract import Motion
 from tests.nc.whole import compensate_toolpath
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation as Turn
 import dbbstation.nc.dialects
 from dbbstation.errors import InputError, StationError
 from dbbstation.files.own_dialects import dialect_given
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.dialect import Dialect
@@ -362,7 +362,7 @@ WITH_TCP = """
 from types import MappingProxyType
 
 from dbbstation.errors import InputError
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import Rotation
 from dbbstation.nc.dialects.sinumerik840d import Sinumerik840D
 
 

@@ -11,7 +11,7 @@ from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.toolpath import IN_FORCE, RowKind, ToolpathBuilder
 from dbbstation.nc.words import digits
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 
 SMALL = Circle(
     ball_mm=(10.0, 20.0, -1100.0),

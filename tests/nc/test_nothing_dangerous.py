@@ -126,8 +126,8 @@ class Ripple(LinearSource):
         return (Parameter("amplitude_um", "µm", 1.0, ""),)
 
     def derivative(self, motion, machine, values):  # noqa: ARG002
+        from dbbstation.machine.geometry import Frames  # noqa: PLC0415
         from dbbstation.machine.kinematics import strut_lengths  # noqa: PLC0415
-        from dbbstation.machine.rotation import Frames  # noqa: PLC0415
 
         length = strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
         return Effect(strut_mm=1e-3 * np.sin(2.0 * np.pi * length / self.period_mm)[:, :, None])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import TravelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.nc.reach import check_reach
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import RAPID_MM_MIN, RowKind, ToolpathBuilder, bits_of, rounded

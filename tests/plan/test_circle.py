@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 
 LEVEL = Circle((10, 20, -1000), (10, 20, -1000), 150, (5, -3, 0), 1000, 30, 45, 1.5, 0, Direction.CCW)
 

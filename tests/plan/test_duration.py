@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
-from dbbstation.plan.circle import circle_s, circles_s
+from dbbstation.plan.plan import circle_s, circles_s
 
 
 def test_a_circle_takes_its_path_over_its_feed():

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dbbstation.plan.circle import Circle
+from dbbstation.plan.plan import Circle
 from dbbstation.quality.finding import Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Seen, seen

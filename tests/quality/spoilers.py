@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dbbstation.plan.circle import Circle
+from dbbstation.plan.plan import Circle
 from dbbstation.quality.finding import Name
 from dbbstation.quality.knowledge import Run
 from dbbstation.trace.cut import edges_of, progress_deg

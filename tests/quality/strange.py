@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dbbstation.plan.circle import Circle
+from dbbstation.plan.plan import Circle
 from dbbstation.quality.answer import Advice, answer
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Seen, seen

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.all_runs import BAR_UM, WAYS, bar_of_all, programs_of_all
 from dbbstation.quality.answer import Advice, answer
 from dbbstation.quality.finding import FindingVerdict, Name

@@ -16,7 +16,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.judged import circles_of_plan
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, effects_of
 from dbbstation.quality.beside import SIZES, NearAssignments, mean_of
 from dbbstation.quality.finding import FindingVerdict, Name, undecided

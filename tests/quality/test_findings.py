@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.places import shipped_folder
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict, Name
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import Others, Run, seen

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, stricter, undecided
 from dbbstation.quality.knowledge import seen
 from dbbstation.sources.registry import known_sources

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.quality.finding import FindingVerdict
 from dbbstation.quality.knowledge import COEFFICIENTS, Expected, Planned
 from dbbstation.quality.swapped import of_its_test

@@ -14,7 +14,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.bar import Bar
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.report.certificate import _dates, _lacking
 from dbbstation.report.conditions import identity
 from dbbstation.report.html import _css

@@ -10,8 +10,7 @@ import pytest
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
-from dbbstation.plan.circle import Direction
-from dbbstation.plan.plan import Plan
+from dbbstation.plan.plan import Direction, Plan
 from dbbstation.service.board import Board, Mark, RunDecision, SequenceOpened, Weight
 from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.station import events

@@ -13,7 +13,7 @@ import pytest
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.after import USUAL, After
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, keep_models
 from dbbstation.service.live_trace import last_traces

@@ -22,7 +22,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.instrument.library import load_instrument
-from dbbstation.plan.circle import circle_s
+from dbbstation.plan.plan import circle_s
 from dbbstation.service.after import After, Result
 from dbbstation.service.choice import Choice, Gate, Order, SetUpPart, ordered
 from dbbstation.service.front import Front

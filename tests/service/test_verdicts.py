@@ -12,7 +12,7 @@ from dbbstation.errors import OutputError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.after import After
 from dbbstation.service.session_notes import give_verdict
 from dbbstation.service.work import Call, SessionTask, WorkProgress

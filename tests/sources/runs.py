@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dbbstation.machine.geometry import Compliance, JointAxes, Machine, Masses, StrutMasses
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import Compliance, JointAxes, Machine, Masses, Rotation, StrutMasses
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plate
 from dbbstation.sources.causes.base_joints import BaseJoints

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import Rotation
 from dbbstation.sources.contract import Effect, Need, Owner
 from dbbstation.sources.registry import known_sources, sources_named
 from tests.sources.runs import random_machine, random_run

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from dbbstation.machine.rotation import Rotation
+from dbbstation.machine.geometry import Rotation
 from dbbstation.sources.contract import Effect, ErrorSource, Need, Owner, Parameter
 from dbbstation.sources.registry import known_sources
 from tests.sources.runs import random_machine, random_run

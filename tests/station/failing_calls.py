@@ -23,7 +23,7 @@ from dbbstation.files.formats.session import Counts, Note, RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import parse_session, read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 
 BEGUN = datetime(2026, 11, 23, 8, tzinfo=UTC)
 SAMPLES = 40

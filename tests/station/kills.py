@@ -12,7 +12,7 @@ from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.formats.session import Counts, Note, RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station.storage import COLUMNS
 from tests.station.bench import MACHINE_FILE
 

@@ -14,7 +14,7 @@ from dbbstation.virtual.path import circle_path
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.station.events import Event, RunId, Sample
     from dbbstation.trace.recording import Recording
 

@@ -31,7 +31,7 @@ from dbbstation.instrument.reading import Reading
 from dbbstation.instrument.stamps import MachineTime
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.bar import Bar
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.answer import Advice, rank
 from dbbstation.quality.finding import Name
 from dbbstation.service.held_line import driver_patience
@@ -53,7 +53,7 @@ from tests.virtual.faulty import FaultyInstrument as VirtualInstrument
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.quality.finding import Finding
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import ReadingSource

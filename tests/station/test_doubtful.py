@@ -14,7 +14,7 @@ from dbbstation.files.checking import check
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.reading import Reading
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.bar_calibration import read_on_calibrator
 from dbbstation.service.board import Board
 from dbbstation.station import events

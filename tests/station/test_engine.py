@@ -15,7 +15,7 @@ from dbbstation.files.formats.session import Counts
 from dbbstation.files.recordings.journal import RunWriter
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Accept, AddNote, Quit, Repeat, Skip, Start

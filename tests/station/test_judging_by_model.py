@@ -14,7 +14,7 @@ from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.events import RunId
 from dbbstation.trace.recording import Recording

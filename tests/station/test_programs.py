@@ -12,7 +12,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.nc.registry import dialect_named
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station.programs import load_programs, read_toolpath
 from dbbstation.tasks.load import load_sessions
 from dbbstation.virtual.path import path_of

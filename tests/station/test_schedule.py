@@ -10,8 +10,7 @@ import pytest
 
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.formats.session import RunEntry, RunState
-from dbbstation.plan.circle import Direction
-from dbbstation.plan.plan import Plan
+from dbbstation.plan.plan import Direction, Plan
 from dbbstation.station.schedule import NextRun, Schedule
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.instrument.reading import Reading
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, AddNote, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.schedule import Schedule

@@ -17,7 +17,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.former import former_sessions
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import load_instrument
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.choice import Choice, prepare
 from dbbstation.service.front import line_to_go_on
 from dbbstation.service.memory import Line

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import TraceError
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.analysis import _circles_about_ball, best_circle, centred, figures, figures_of
 from dbbstation.trace.recording import RawCircle
 

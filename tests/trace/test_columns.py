@@ -12,7 +12,7 @@ from dbbstation.files.recordings.journal import run_header, run_line
 from dbbstation.files.recordings.run_csv import parse_run
 from dbbstation.model.observation import Observation
 from dbbstation.model.simulation import setup_of
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.trace import columns
 from dbbstation.trace.columns import COLUMNS, Column, ColumnKind, currents, temperatures
 from dbbstation.trace.cut import cut

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.trace.reachable import AGREEING, OVERRIDE, SUDDEN_MM, UNDULATIONS, Reachable
 from dbbstation.virtual.path import circle_path
 

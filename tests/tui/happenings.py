@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dbbstation.instrument.reading import Reading
-from dbbstation.plan.circle import Circle, Direction
-from dbbstation.plan.plan import Ball, Plan, PlannedTest
+from dbbstation.plan.plan import Ball, Circle, Direction, Plan, PlannedTest
 from dbbstation.quality.finding import Finding
 from dbbstation.service.board import Board, SequenceOpened
 from dbbstation.station.commands import Start

@@ -17,7 +17,7 @@ from textual.widgets import Input, Static
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.finding import Name, found
 from dbbstation.report.conditions import conditions
 from dbbstation.service.live_trace import LiveTrace

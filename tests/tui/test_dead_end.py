@@ -17,7 +17,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.board import SequenceOpened
 from dbbstation.service.runner import Runner
 from dbbstation.station import events

@@ -19,7 +19,7 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import load_instrument
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.held_line import HeldLine
 from dbbstation.service.runner import Runner, opener
 from dbbstation.service.virtual_place import VirtualPlace, virtual_place

@@ -18,7 +18,7 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import load_instrument
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.service.after import After
 from dbbstation.service.choice import SetUpPart
 from dbbstation.service.front import Front

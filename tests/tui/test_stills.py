@@ -20,7 +20,7 @@ import pytest
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.quality.finding import Name, found, undecided
 from dbbstation.station.commands import Accept
 from dbbstation.tui.app import DARK, LIGHT

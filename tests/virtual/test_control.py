@@ -12,7 +12,7 @@ from dbbstation.errors import MachineError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.control import CellCommands, ControlClient, ControlServer
 from dbbstation.virtual.machine import Sizes, VirtualMachine

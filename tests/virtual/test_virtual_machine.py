@@ -12,7 +12,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.toolpath import ToolpathBuilder
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.cut import cut
 from dbbstation.trace.recording import Recording

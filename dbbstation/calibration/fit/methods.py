@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import FEWEST_TESTS, check_raw
 from dbbstation.errors import CalibrationError
-from dbbstation.machine.rotation import Frames
+from dbbstation.machine.geometry import Frames
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import of_residuals
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.facts.run import OfRun
+from dbbstation.facts import OfRun
 from dbbstation.facts.serialise import Absent
 from dbbstation.model.identified import range_uncertainty_mm
 from dbbstation.model.machine_model import MachineModel

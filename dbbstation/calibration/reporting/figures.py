@@ -9,8 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from dbbstation.calibration.checks.missing_physics import LeftByFit, left_by
-from dbbstation.calibration.checks.scatter import ScatterCheck, check_scatter, fine_noise_mm, seats_of
+from dbbstation.calibration.checks.scatter import (
+    LeftByFit,
+    ScatterCheck,
+    check_scatter,
+    fine_noise_mm,
+    left_by,
+    seats_of,
+)
 from dbbstation.calibration.checks.visibility import Observability, PlanCheck, check_plan, gaps, visibility
 from dbbstation.calibration.outliers.outlier import Outlier
 from dbbstation.calibration.reporting.evaluation import EvaluatedRun, rms_um

@@ -12,7 +12,7 @@ from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.inference.harmonics import smooth
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.recording import by_angle
 

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import TraceError
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import bands, basis
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.recording import means
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.model.observation import Observation
-    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.plan import Circle, Direction
     from dbbstation.trace.recording import RawCircle
 
 

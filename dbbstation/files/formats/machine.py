@@ -22,10 +22,10 @@ from dbbstation.machine.geometry import (
     JointAxes,
     Machine,
     Masses,
+    Rotation,
     StrutMasses,
     Travel,
 )
-from dbbstation.machine.rotation import Rotation
 
 _Millimetre = Annotated[float, Quantity("mm", 0, 20, signed=True)]
 _SIX_JOINTS = AsArray(tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm])

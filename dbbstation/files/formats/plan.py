@@ -20,13 +20,12 @@ from dbbstation.files.formats.jig import (
     check_balls,
     parse_jig,
 )
+from dbbstation.files.places import is_device
 from dbbstation.files.source_text import without_faults
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Partly, Schema, dotted, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
-from dbbstation.plan.circle import Circle, Direction
-from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, Plate
-from dbbstation.system.mounts import is_device
+from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Circle, Direction, Plan, PlannedTest, Plate
 
 NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
 """Plate of a plan with all balls under the spindle: positions are in the machine frame."""

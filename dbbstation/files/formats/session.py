@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError, PydanticKnownError
 from dbbstation.facts.quantities import Ordinal, Point, Quantity, TemperatureDegc, Text
 from dbbstation.facts.record import LEFT_OUT_EMPTY, Moment, OrEmpty, Record, Sha256Hex, Sha256OrEmpty
 from dbbstation.plan.bar import Bar
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import SetUpErrors
 
 PART = ".part"

@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 from dbbstation.facts.quantities import BarMm, Ordinal, Quantity, TemperatureDegc, Text
 from dbbstation.files.yaml.schema import Schema
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.plan.tolerance import FILTERED, OF_BOTH_DIRECTIONS, USUAL_UPR, CircleFigure, Tolerance
 
 _UM_PER = {"µm": 1.0, "mm": 1e3}

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.session import Counts
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 _LOG = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from dbbstation.files.formats.session import RunEntry, RunState
 from dbbstation.model.expected import SECTORS, expected_circle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.quality.judge import Judgement, judge
 from dbbstation.quality.knowledge import Planned, Run
 from dbbstation.sources.registry import known_sources
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
     from dbbstation.quality.knowledge import Expected
     from dbbstation.trace.recording import Recording
 

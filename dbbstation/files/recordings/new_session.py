@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.files.formats.plan import PlanFile
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 
 @dataclass(frozen=True, eq=False)

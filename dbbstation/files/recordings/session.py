@@ -31,7 +31,7 @@ from dbbstation.files.recordings.session_store import REBUILD, document_in_force
 from dbbstation.files.source_text import read_bytes, unreadable, without_faults
 from dbbstation.files.yaml.schema import validate
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.sources.contract import Setup
 from dbbstation.text.written import natural, repeats_in_order
 from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Plan
+    from dbbstation.plan.plan import Circle, Plan
     from dbbstation.trace.recording import Recording
 
 _UNLIKE_RADIUS = 0.2

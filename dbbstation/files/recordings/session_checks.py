@@ -11,7 +11,7 @@ from dbbstation.files.formats.session import SessionFile, sealed_or_part
 from dbbstation.files.recordings.run_csv import changed
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import dotted, read_document, validate
-from dbbstation.plan.circle import USUAL_STROKE_MM
+from dbbstation.plan.plan import USUAL_STROKE_MM
 from dbbstation.text.written import listed
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.session import Counts, ReadBy
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Direction
 
 
 class SessionWriter(Closing):

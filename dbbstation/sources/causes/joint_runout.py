@@ -9,8 +9,17 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
-from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    MM_PER_UM,
+    SMOOTH_MM,
+    CForm,
+    Effect,
+    LinearSource,
+    Motion,
+    Owner,
+    Parameter,
+    Texts,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection

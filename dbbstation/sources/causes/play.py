@@ -16,10 +16,10 @@ from dbbstation.machine.statics import (
     transverse_load,
     transverse_pull,
 )
-from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import (
     MM_PER_UM,
     SMOOTH_MM,
+    CForm,
     Effect,
     ErrorSource,
     Motion,

@@ -8,8 +8,17 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    MM_PER_UM,
+    CForm,
+    Effect,
+    ErrorSource,
+    LinearSource,
+    Motion,
+    Owner,
+    Parameter,
+    Texts,
+)
 from dbbstation.sources.laws.screws import screw_lead_mm
 
 if TYPE_CHECKING:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import (
     MM_PER_UM_M,
     SMOOTH_MM,
+    CForm,
     Effect,
     LinearSource,
     Motion,

@@ -6,8 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    MM_PER_UM,
+    SMOOTH_MM,
+    CForm,
+    Effect,
+    ErrorSource,
+    Motion,
+    Need,
+    Owner,
+    Parameter,
+    Texts,
+)
 from dbbstation.sources.laws.temperature import (
     EQUATION,
     LOGGED_EQUATION,

@@ -5,8 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.machine.statics import DOWN
-from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import MM_PER_UM, SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    MM_PER_UM,
+    SMOOTH_MM,
+    CForm,
+    Effect,
+    LinearSource,
+    Motion,
+    Owner,
+    Parameter,
+    Texts,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -9,8 +9,7 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
-from dbbstation.sources.c_form import CForm
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
 
 if TYPE_CHECKING:
@@ -19,9 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.geometry import JointAxes, Machine
+    from dbbstation.machine.geometry import Frames, JointAxes, Machine
     from dbbstation.machine.kinematics import Struts
-    from dbbstation.machine.rotation import Frames
 
 ALONG = 0.05
 """Sine of the least angle between a joint's axis and its strut; below it, 3 degrees, the joint is locked [1]."""

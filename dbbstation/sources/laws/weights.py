@@ -13,9 +13,8 @@ from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensi
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
-    from dbbstation.machine.geometry import Hexapod, Machine, Masses
+    from dbbstation.machine.geometry import Frames, Hexapod, Machine, Masses
     from dbbstation.machine.kinematics import Struts
-    from dbbstation.machine.rotation import Frames
 
 MM_PER_N = 1e-6
 """One µm/kN in mm/N."""

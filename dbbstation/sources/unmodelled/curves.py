@@ -8,10 +8,10 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import GRAVITY_M_S2, platform_weight, strut_tensions
-from dbbstation.sources.c_form import CForm
 from dbbstation.sources.contract import (
     MM_PER_UM,
     SMOOTH_MM,
+    CForm,
     Effect,
     ErrorSource,
     LinearSource,

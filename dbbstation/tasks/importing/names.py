@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.files.formats.mapping import DIRECTION, REPEAT, TEST
 from dbbstation.files.recordings.run_csv import count_in
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME, UNITS
-from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
+from dbbstation.plan.plan import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.tasks.importing.travel import UnusableTravelError
 from dbbstation.trace.cut import LARGEST_JUMP_MM
 
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.table_csv import TableFile
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Ball
+    from dbbstation.plan.plan import Ball, Circle
 
 LEAST_RANGE_MM = 2e-4
 """Least range of a bar's readings over a turn [mm]: bars resolve 0.1 µm, and their noise alone spans more."""

@@ -30,7 +30,7 @@ from dbbstation.files.formats.session import RunState
 from dbbstation.files.recordings.event_log import impossible_day
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.run_csv import count_in
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.tasks.importing.moments import UnclearMomentError, moment_of
 from dbbstation.tasks.importing.names import WORDS, RunName, named_by, run_name
 from dbbstation.tasks.importing.plausible import centre_mm, chance_of_centres, check_units

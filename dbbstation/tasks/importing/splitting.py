@@ -11,7 +11,7 @@ from dbbstation.errors import MOST_FAULTS, Problem
 from dbbstation.files.formats.mapping import ANGLE, DEVIATION, LENGTH, TIME
 from dbbstation.files.recordings.table_csv import NO_NUMBER
 from dbbstation.files.source_text import shortened
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.plan import FULL_TURN_DEG
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.recordings.foreign_csv import ForeignTable
-    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Circle
 
 
 SMALLEST_RUN_DEG = 90.0

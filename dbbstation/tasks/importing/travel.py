@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.plan.circle import FULL_TURN_DEG, Circle, Direction
+from dbbstation.plan.plan import FULL_TURN_DEG, Circle, Direction
 from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:

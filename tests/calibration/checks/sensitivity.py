@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.circle import Circle
-    from dbbstation.plan.plan import Plan, PlannedTest
+    from dbbstation.plan.plan import Circle, Plan, PlannedTest
     from dbbstation.sources.contract import ErrorSource
 
 STEP_DEG = 2.0

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from dbbstation.calibration.checks.missing_physics import is_missing_physics, misfit_of
+from dbbstation.calibration.checks.scatter import is_missing_physics, misfit_of
 from dbbstation.calibration.checks.visibility import check_plan
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate

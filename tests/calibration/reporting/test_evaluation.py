@@ -8,7 +8,7 @@ import pytest
 from dbbstation.calibration.reporting.evaluation import evaluate, plane_figures
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.sources.contract import Fitted, Setup
 from dbbstation.sources.registry import known_sources
 from dbbstation.trace.recording import RawCircle

@@ -11,7 +11,7 @@ from dbbstation.calibration.reporting.residual_map import SECTORS, names_of_test
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from studies.virtual_session import draw_session
 
 

@@ -7,9 +7,8 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.errors import KinematicsError
-from dbbstation.machine.geometry import Hexapod
+from dbbstation.machine.geometry import Frames, Hexapod, Rotation
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames, Rotation
 from tests.plant.machine import reference_machine
 
 BAR_MM = 150.0

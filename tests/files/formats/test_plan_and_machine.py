@@ -16,9 +16,8 @@ from dbbstation.files.formats.machine import machine_data, read_machine
 from dbbstation.files.formats.plan import plan_data, read_inline_plan, read_plan
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.machine.geometry import JointAxes
-from dbbstation.machine.rotation import Rotation
-from dbbstation.plan.circle import Direction
+from dbbstation.machine.geometry import JointAxes, Rotation
+from dbbstation.plan.plan import Direction
 
 if TYPE_CHECKING:
     from pathlib import Path

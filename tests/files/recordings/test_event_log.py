@@ -22,7 +22,7 @@ from dbbstation.files.recordings.seal import copy_faults
 from dbbstation.files.recordings.sealing import seal_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from tests.cli.conftest import call
 from tests.files.recordings.test_session_writer import BEGUN, COLUMNS, fill
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.recordings.journal import RunWriter, run_line
 from dbbstation.files.recordings.run_csv import parse_run, read_run
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 
 NAMES = ("t_s", "length_mm", "status")
 BLOCK = 512
@@ -176,7 +176,7 @@ def test_killed_in_mid_run_nothing_is_lost(tmp_path: Path) -> None:
     program = (
         "import os, pathlib, signal, sys\n"
         "from dbbstation.files.recordings.journal import RunWriter\n"
-        "from dbbstation.plan.circle import Direction\n"
+        "from dbbstation.plan.plan import Direction\n"
         "writer = RunWriter(pathlib.Path(sys.argv[1]), 'a', Direction.CCW, 1, ('t_s', 'length_mm'))\n"
         "for i in range(1234):\n"
         "    writer.append((i / 1000, 150.0))\n"

@@ -18,7 +18,7 @@ from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.lock import LOCK_FILE, SessionLock
 from dbbstation.files.recordings.session import unlisted_sealed
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from tests.files.recordings.test_session_writer import BEGUN, COLUMNS, fill
 
 HOLD = """

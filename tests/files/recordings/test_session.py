@@ -14,7 +14,7 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.session import RunState
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
 

@@ -15,7 +15,7 @@ from dbbstation.files.formats.session import SessionDetails
 from dbbstation.files.places import shipped_folder
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 from dbbstation.station.opening import open_session
 
 UNDER_SPINDLE = shipped_folder("fixtures") / "sessions" / "under-spindle"

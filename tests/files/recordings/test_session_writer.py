@@ -17,7 +17,7 @@ from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.plan.bar import Bar
-from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Direction
 
 BEGUN = datetime(2026, 11, 20, 8, 0, 0, 250000, tzinfo=UTC)
 COLUMNS = ("t_s", "length_mm")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength

@@ -10,7 +10,7 @@ import pytest
 from dbbstation.errors import ModelError
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.sources.causes.bar_cyclic import BarCyclic
 from dbbstation.sources.causes.base_joints import BaseJoints
 from dbbstation.sources.contract import Fitted, Motion, Need

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import StrutMasses
+from dbbstation.machine.geometry import Frames, StrutMasses
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.causes.drive_friction import TURNED_OVER_MM, DriveFriction, driven_directions
 from dbbstation.sources.contract import Motion
 from dbbstation.trace.columns import currents

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames, Rotation
 from dbbstation.machine.kinematics import forward, inverse, strut_lengths
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.platform_joints import PlatformJoints
 from dbbstation.sources.causes.screw_cyclic import ScrewCyclic

@@ -10,9 +10,8 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import Compliance
+from dbbstation.machine.geometry import Compliance, Frames, Rotation
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.gravity import Gravity
 from dbbstation.sources.contract import Fitted, Motion

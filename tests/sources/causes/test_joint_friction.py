@@ -10,9 +10,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import Compliance
+from dbbstation.machine.geometry import Compliance, Frames
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.joint_friction import WIND_UP_RAD, JointFriction, friction_drag, outer_axes, resistance

@@ -11,9 +11,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import JointAxes
+from dbbstation.machine.geometry import Frames, JointAxes, Rotation
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.machine.travel import middle
 from dbbstation.sources.causes.joint_runout import JointRunout
 from dbbstation.sources.causes.strut_bending import StrutBending

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.base_joints import BaseJoints

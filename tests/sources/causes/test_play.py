@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import Compliance, StrutMasses
+from dbbstation.machine.geometry import Compliance, Frames, StrutMasses
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash

@@ -10,8 +10,8 @@ import pytest
 from scipy.optimize import brentq
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.reversal_spike import DECAY_MM, ReversalSpike

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Thermometer
 from dbbstation.sources.laws.temperature import following_thermometers
 from dbbstation.sources.registry import sources_named

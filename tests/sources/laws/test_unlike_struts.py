@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.reversal_spike import ReversalSpike
 from dbbstation.sources.laws.turning import since_turning

@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.bar_drift import BarDrift
 from dbbstation.sources.causes.platform_joints import PlatformJoints

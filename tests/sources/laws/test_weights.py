@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import Compliance, Masses, StrutMasses
+from dbbstation.machine.geometry import Compliance, Frames, Masses, Rotation, StrutMasses
 from dbbstation.machine.kinematics import forward, inverse
-from dbbstation.machine.rotation import Frames, Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.base_compliance import BaseCompliance
 from dbbstation.sources.causes.cog_shift import CogShift

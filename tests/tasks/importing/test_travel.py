@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.mapping import AngleSchema
-from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import Circle, Direction
 from dbbstation.tasks.importing.travel import UnusableTravelError, machine_angles, travel
 
 

@@ -11,17 +11,15 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.after_reversals import after_reversals
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained
+from dbbstation.diagnosis.held import shifts_between
 from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests, without_tests
-from dbbstation.diagnosis.left_where import where_left
 from dbbstation.diagnosis.levels import circle_levels, outcome_of
-from dbbstation.diagnosis.limits import limits_of
+from dbbstation.diagnosis.limits import limits_of, where_left
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shapes import Follows
-from dbbstation.diagnosis.shifts import shifts_between
 from dbbstation.diagnosis.thinned import sectors_for, thinned
-from dbbstation.diagnosis.unexplained_curve import curve_of
-from dbbstation.diagnosis.unexplained_model import with_exact_wave
+from dbbstation.diagnosis.unexplained import curve_of, with_exact_wave
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError

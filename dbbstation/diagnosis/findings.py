@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.levels import Levels
-    from dbbstation.inference.limit_reached import LimitReached
+    from dbbstation.inference.verdict import LimitReached
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,10 +1,13 @@
-"""Uncertainty along directions that the fit holds at nominal."""
+"""Uncertainty along directions that the fit holds at nominal, and biases of machine parameters."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from dbbstation.diagnosis.findings import Shift
+from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
@@ -56,3 +59,21 @@ def held_beside(before: Calibration, after: Calibration) -> Floats:
 HALF = float(np.sqrt(0.5))
 """Least length of a separate direction after projecting out the base's directions, and least determined share of a
 source's amplitudes that gives the size of the others."""
+
+
+def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
+    """Return biases of machine parameters, largest first; may be empty."""
+    if after is before:
+        return ()
+    row_of = {name: k for k, name in enumerate(after.layout.names)}
+    sigma = uncertainties(after, held_beside(before, after))
+    shifts = []
+    for term in before.layout.terms:
+        if term.source.belongs_to is not Owner.MACHINE:
+            continue
+        for k, parameter in enumerate(term.parameters):
+            row = row_of[term.source.name, term.shared, parameter.name]
+            old, new = 1e3 * float(before.x[term.columns.start + k]), 1e3 * float(after.x[row])
+            name = f"{term.source.name} {parameter.name.removesuffix('_mm')}"
+            shifts.append(Shift(name, old, new, old - new, 1e3 * float(sigma[row])))
+    return tuple(sorted(shifts, key=lambda shift: -abs(shift.shift_um)))

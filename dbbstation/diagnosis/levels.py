@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.scatter import is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.outlier import OutlierKind
-from dbbstation.diagnosis.left_where import where_left
+from dbbstation.diagnosis.limits import where_left
 from dbbstation.diagnosis.parts import SESSION_TIME, variable_of
 from dbbstation.diagnosis.shapes import SIGNED
 from dbbstation.inference.alternatives import EQUIVALENT
@@ -18,7 +18,7 @@ from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.left_over import SIGNIFICANT, LeftOver, ResidualTest
 from dbbstation.inference.levels import BALL, BAR, RUN, Differs, Followed, FollowsAnswer
-from dbbstation.inference.places import levels_by_tests
+from dbbstation.inference.levels_of import levels_by_tests
 from dbbstation.inference.settled import Settled
 
 if TYPE_CHECKING:

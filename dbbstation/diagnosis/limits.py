@@ -1,4 +1,4 @@
-"""Limits reached by search, parameters, fit or interruption."""
+"""Limits reached by search, parameters, fit or interruption, and where the largest residual is."""
 
 from __future__ import annotations
 
@@ -7,13 +7,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.checks.scatter import remainder_of
-from dbbstation.diagnosis.left_where import where_left
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.limit_reached import LimitReached
+from dbbstation.inference.verdict import LimitReached
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.explained import SettledCircles
+    from dbbstation.inference.left_over import Remainder
+    from dbbstation.model.observation import Observation
+
+
+def where_left(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:
+    """Return a sentence on size [µm] and place of the largest residual."""
+    worst = min((found.harmonic, found.run, found.pulse), key=lambda one: one.probability)
+    size_um = 1e3 * worst.rms
+    if worst is found.harmonic:
+        return size_um, f"Most of it comes {worst.place} times per turn, {size_um:.2g} µm rms over all runs."
+    run = f"test {observations[worst.place].test} {observations[worst.place].raw.circle.direction}"
+    if worst is found.run:
+        return size_um, f"Most of it is in {run}, {size_um:.2g} µm rms."
+    return size_um, f"Most of it is in {run} about {np.degrees(found.pulse_phase_rad):.0f} degrees, {size_um:.2g} µm."
 
 
 def limits_of(settled: SettledCircles) -> tuple[LimitReached, ...]:

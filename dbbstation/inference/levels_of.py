@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import fdtrc, logsumexp
 
 from dbbstation.facts.value import Value
 from dbbstation.inference.coloured import FEWEST_INDEPENDENT
 from dbbstation.inference.consequence import may_result
-from dbbstation.inference.detectable import detectable
+from dbbstation.inference.detectable import detectable, detectable_causes
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Detectable
     from dbbstation.inference.settled import Settled
+
 
 SLOW = 10
 """Number of slowest frequencies of a stretch; their power is compared with the power of the next twice as many. Noise
@@ -209,3 +211,29 @@ def _answer(probability: float, gain: ClassGain | None, *, in_time: bool) -> Fol
     if gain is None:
         return FollowsAnswer.NOT_TESTED
     return FollowsAnswer.FOLLOWS if gain.predicts else FollowsAnswer.DOES_NOT_PREDICT
+
+
+def levels_by_tests(settled: Settled, left: LeftOver, gains: KnownGains | None) -> Levels:
+    """Return the three answers, with the strut, or all struts, on which each class surely acts."""
+    anew, reference = (None, None) if gains is None else (gains.anew, gains.of(None).before)
+    found = levels_of(settled, left, gains, anew, reference=reference, sizes=detectable_causes(settled))
+    follows = tuple(replace(one, where=_place(settled, one.members)) for one in found.follows)
+    return replace(found, follows=follows)
+
+
+def _place(settled: Settled, names: tuple[str, ...]) -> str | None:
+    labels = {max(form_probabilities(settled, name).items(), key=lambda one: one[1]) for name in names}
+    found = {label if probability >= SURE else "" for label, probability in labels}
+    return (found.pop() or None) if len(found) == 1 else None
+
+
+def form_probabilities(settled: Settled, name: str) -> dict[str, float]:
+    """Return the probability of each form of a member, by label, given the other members."""
+    cause = next(one for one in settled.causes if one.name == name)
+    scan = settled.comparison.scan(settled.best.without(name), [cause])
+    worth = logsumexp(scan.weighted, axis=1)
+    shares = np.exp(worth - logsumexp(worth))
+    found: dict[str, float] = {}
+    for variant, share in zip(cause.variants, shares, strict=True):
+        found[variant.label] = found.get(variant.label, 0.0) + float(share)
+    return found

@@ -143,3 +143,17 @@ class DensityGains(Gains):
 def is_worse(corrected: float, reference: float) -> bool:
     """Return whether a correction has a larger rms error on held-out rows than the reference."""
     return corrected > (1.0 + SEEN_WORSE) * reference
+
+
+@dataclass(frozen=True)
+class LimitReached:
+    """A limit at which a computation ended.
+
+    Attributes:
+        what: `search`, `parameter`, `fit` or `stopped`.
+        name: source and parameter, such as `play shaking_n`; may be empty.
+    """
+
+    what: str
+    name: str
+    text: str

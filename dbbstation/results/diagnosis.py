@@ -16,8 +16,7 @@ from dbbstation.facts import OfRun, of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
-from dbbstation.inference.limit_reached import LimitReached
-from dbbstation.inference.verdict import Acts, Verdict
+from dbbstation.inference.verdict import Acts, LimitReached, Verdict
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.results.calibration import WithModel
 from dbbstation.results.frame import ByName, Framed

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from dbbstation.diagnosis.findings import Diagnosis
-    from dbbstation.diagnosis.unexplained_model import JointFitWithCurve
+    from dbbstation.diagnosis.unexplained import JointFitWithCurve
     from dbbstation.results.diagnosis import DiagnosisResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.telling import Progress
@@ -120,7 +120,7 @@ def diagnose(
 
 def _unnamed(found: Diagnosis) -> JointFitWithCurve | None:
     """Return the fit with an effect of unknown cause that other tests confirm, or None."""
-    from dbbstation.diagnosis.unexplained_model import KEPT_AS, keep_unexplained
+    from dbbstation.diagnosis.unexplained import KEPT_AS, keep_unexplained
 
     curve = found.unexplained.curve
     if curve is None or curve.follows not in KEPT_AS or curve.follows.variable not in found.levels.corrects:

@@ -16,7 +16,7 @@ from dbbstation.inference.chosen_anew import chosen_anew
 from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.levels import Differs, FollowsAnswer
-from dbbstation.inference.places import form_probabilities
+from dbbstation.inference.levels_of import form_probabilities
 from dbbstation.inference.verdict import Verdict
 from dbbstation.results.levels_text import short_sentences
 from dbbstation.sources.registry import sources_named

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.foreseen import ForeseenTests
+from dbbstation.diagnosis.next_test import ForeseenTests
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Direction

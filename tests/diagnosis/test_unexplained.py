@@ -10,7 +10,7 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.shapes import READING, Follows
-from dbbstation.diagnosis.unexplained_model import keep_unexplained
+from dbbstation.diagnosis.unexplained import keep_unexplained
 from dbbstation.errors import ModelError
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.model import read_model, write_model

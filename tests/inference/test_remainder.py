@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.harmonics import LOW, Spectrum
-from dbbstation.inference.remainder import remainder
+from dbbstation.inference.left_over import remainder
 
 RUNS, SAMPLES, LEVEL = 10, 720, 0.4
 PHASE = np.linspace(0.0, 2 * np.pi, SAMPLES, endpoint=False)

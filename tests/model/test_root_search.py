@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.model.root_search import RootSearch
+from dbbstation.model.compensation import RootSearch
 
 
 def searched(function, guess, met=1e-10):

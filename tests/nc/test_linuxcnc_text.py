@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.rs274.guard import guard_lines
+from dbbstation.nc.dialects.linuxcnc import guard_lines
 from dbbstation.nc.toolpath import IN_FORCE, RowKind, ToolpathBuilder
 from dbbstation.nc.words import digits
 from dbbstation.plan.plan import Circle, Direction

@@ -9,8 +9,7 @@ from itertools import combinations, pairwise
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.nc.rs274.blocks import block_of
-from dbbstation.nc.rs274.codes import G_CODES, M_CODES, name
+from dbbstation.nc.rs274.blocks import G_CODES, M_CODES, block_of, name
 from dbbstation.nc.rs274.tokens import BadLine, Place
 from tests.nc.interpreter import RS274, needs_rs274
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.nc.rs274 import reader
-from dbbstation.nc.rs274.plain import plain_lines
+from dbbstation.nc.rs274.lines import plain_lines
 from dbbstation.nc.rs274.reader import read_program
 
 AXES = "XYZABC"

@@ -10,8 +10,8 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.nc.circle_program import circle_toolpath
+from dbbstation.nc.dialects.linuxcnc import guard_lines
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
-from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.setup import ZERO, ControlSetup
 from dbbstation.nc.toolpath import IN_FORCE, PIECE_CORNER_MM, Ending

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.inference.harmonics import LOW, Misfit, misfit, smooth
-from dbbstation.inference.remainder import Remainder, remainder
+from dbbstation.inference.left_over import Remainder, remainder
 from dbbstation.trace.recording import means, sector_of
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.cancelling import cancelling
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.levels_of import levels_by_tests
 from dbbstation.inference.model_comparison import all_columns
-from dbbstation.inference.places import levels_by_tests
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.triangle import rms, root

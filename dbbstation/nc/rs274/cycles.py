@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from dbbstation.nc.rs274.codes import TAPS, name
+from dbbstation.nc.rs274.blocks import TAPS, name
 from dbbstation.nc.rs274.state import unknown_place, unplaced
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ import numpy as np
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274.blocks import BLANKS
 from dbbstation.nc.rs274.expressions import ValueReader
-from dbbstation.nc.rs274.lines import ProgramLines
-from dbbstation.nc.rs274.plain import plain_lines
+from dbbstation.nc.rs274.lines import ProgramLines, plain_lines
 from dbbstation.nc.rs274.tokens import BadLine, Place
 from dbbstation.nc.setup import ControlSetup
 from dbbstation.nc.spilled import LongText
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.nc.rs274.plain import PlainLines
+    from dbbstation.nc.rs274.lines import PlainLines
 
 MOST_AGAIN = 500_000
 """Greatest number of repeated lines in loops and subprograms. A program that repeats more is assumed to run for

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dbbstation.nc.rs274.arc_words import CENTRES
-from dbbstation.nc.rs274.codes import CURVES, CYCLES, NEEDED, STORED, ModalGroup, name
+from dbbstation.nc.rs274.arcs import CENTRES
+from dbbstation.nc.rs274.blocks import CURVES, CYCLES, NEEDED, STORED, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, Cutter
 from dbbstation.nc.rs274.cycles import ModalCycle
 from dbbstation.nc.rs274.expressions import shown

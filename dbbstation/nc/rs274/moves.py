@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.rs274.arc_words import CENTRES, arc_of, curve_of
-from dbbstation.nc.rs274.arcs import Arc
-from dbbstation.nc.rs274.codes import CURVES, CYCLES, TAPS, ModalGroup, name
+from dbbstation.nc.rs274.arcs import CENTRES, Arc, arc_of, curve_of
+from dbbstation.nc.rs274.blocks import CURVES, CYCLES, TAPS, ModalGroup, name
 from dbbstation.nc.rs274.cutter import Beside, NoRoomError, element_of, with_plane
 from dbbstation.nc.rs274.cycles import cycle_steps
 from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced

@@ -10,9 +10,8 @@ import numpy as np
 
 from dbbstation.errors import MOST_FAULTS, InputError, Problem
 from dbbstation.nc.dialect import plain
-from dbbstation.nc.rs274.blocks import ProgramBlock, block_of
-from dbbstation.nc.rs274.codes import CYCLES, ModalGroup, name
-from dbbstation.nc.rs274.plain import LEAST_LINES
+from dbbstation.nc.rs274.blocks import CYCLES, ModalGroup, ProgramBlock, block_of, name
+from dbbstation.nc.rs274.lines import LEAST_LINES
 from dbbstation.nc.rs274.state import AXES, unknown_place, unplaced
 from dbbstation.nc.rs274.tokens import BadLine
 from dbbstation.nc.setup import ControlSetup

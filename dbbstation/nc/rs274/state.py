@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.rs274.codes import ModalGroup, name
+from dbbstation.nc.rs274.blocks import ModalGroup, name
 from dbbstation.nc.setup import FIRST_PARAMETERS, ZERO
 from dbbstation.nc.toolpath import SYSTEMS
 from dbbstation.nc.words import digits

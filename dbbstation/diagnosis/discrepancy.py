@@ -75,7 +75,9 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
         if source.varies_with in BY_DIRECTION:
             signs.append(known["strut-speed-sign"][motion.kept])
     degree = ALONG_SCREWS if source.varies_with == "strut-speed-sign" else DEGREE
-    by_variable = [modulated(effects, one, signs or None, degree) for one in zip(*along, strict=True)]
+    # Contacts stiffen under pull and under push, and a lag may differ with the direction.
+    sides = by_strut is not None and source.varies_with in OF_STRUTS_SMOOTH
+    by_variable = [modulated(effects, one, signs or None, degree, each_side=sides) for one in zip(*along, strict=True)]
     # The variables share the formula's inaccuracy.
     columns = np.hstack(by_variable) / np.sqrt(len(by_variable))
     return np.hstack([columns, _other_stages(source, machine, runs)])

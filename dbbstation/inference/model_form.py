@@ -13,7 +13,7 @@ from scipy.special import comb
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Flags, Floats
 
 DEGREE = 3
 """Degree of the modulating polynomials: four functions over the range of a variable."""
@@ -38,11 +38,14 @@ def modulated(
     along: Sequence[Floats],
     signs: Sequence[Floats] | None,
     degree: int = DEGREE,
+    *,
+    each_side: bool = False,
 ) -> Floats:
     """Return effects of m actuators times smooth functions, over all runs, shape (n, q).
 
     Args:
         signs: directions of travel per run, shape (n, m); None if irrelevant.
+        each_side: functions differ on both sides of zero.
     """
     effect, values = np.vstack(effects), np.vstack(along)
     ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
@@ -51,11 +54,18 @@ def modulated(
         own, at = effect[:, mover], values[:, mover]
         if not own.any():
             continue
-        functions = bernstein(at, float(at.min()), float(at.max()), degree)
+        sides = [at > 0.0, at <= 0.0] if each_side else [np.ones_like(at, dtype=bool)]
+        functions = np.hstack([_within(at, side, degree) for side in sides if side.any()])
         found += [functions * (own * way[:, mover])[:, None] for way in ways]
         if signs is not None:
             found.append(_other_transits(effects, signs, mover))
     return np.hstack(found) if found else np.zeros((len(effect), 0))
+
+
+def _within(values: Floats, side: Flags, degree: int) -> Floats:
+    """Return Bernstein polynomials over some of the values, zero at the others, shape (n, degree + 1)."""
+    low, high = float(values[side].min()), float(values[side].max())
+    return bernstein(values, low, high, degree) * side[:, None]
 
 
 def _other_transits(effects: Sequence[Floats], signs: Sequence[Floats], mover: int) -> Floats:

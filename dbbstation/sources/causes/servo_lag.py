@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 S_PER_MS = 1e-3
 
+OF_SECOND = 0.5
+"""Usual relative departure of the second term: a pure delay has half that of a loop of first order."""
+
 
 class ServoLag(ErrorSource):
     """A strut follows its command as a position loop with gain 1/tau: tau_i dy_i/dt = x_i - y_i.
@@ -96,6 +99,14 @@ class ServoLag(ErrorSource):
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         by_constant = self._lag(motion, machine, values)[1]
         own = [of_own_strut(S_PER_MS * np.tensordot(by_constant, more, (1, 0))) for more in self._more]
+        return Effect(strut_mm=np.concatenate(own, axis=2))
+
+    def left_open(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+        """Return other second terms than tau² d²x/dt², as of loops with several time constants, by strut and direction."""
+        lag, by_constant = self._lag(motion, machine, values)
+        second = np.sum(self._constants_s(values) * by_constant, axis=1) - lag
+        lengthens = np.abs(by_constant[:, 1]) > np.abs(by_constant[:, 0])
+        own = [of_own_strut(OF_SECOND * np.where(way, second, 0.0)) for way in (lengthens, ~lengthens)]
         return Effect(strut_mm=np.concatenate(own, axis=2))
 
     def _constants_s(self, values: Floats) -> Floats:

@@ -76,6 +76,24 @@ def test_uneven_times_make_no_difference(reference, rng):
     assert np.allclose(lag_mm(reference, uneven, *ms), lag_mm(reference, even, *ms)[kept], rtol=1e-3, atol=1e-5)
 
 
+def test_what_is_left_open_makes_a_loop_a_pure_delay_in_each_direction(reference):
+    """A delay follows x(t - tau), so its error is the loop's without half of tau² d²x/dt²."""
+    motion = run((-100, 0, -1008), (0, -15), step_deg=0.25)
+    length, time_s = travel(reference, motion), motion.time_s
+    delayed = CubicSpline(time_s, length)(time_s - 0.06) - length
+    lag, left_open = lag_mm(reference, motion, *[60.0] * 6), LAG.left_open(motion, reference, np.full(6, 60.0)).strut_mm
+    inside = slice(20, -20)
+    speed = np.gradient(length, time_s, axis=0)
+    without = lag - np.sum(left_open, axis=2)
+    # The next terms, tau³ d³x/dt³, at 0.11 radians per second and 12 mm/s.
+    beyond = 1.5 * 0.06**3 * 0.11**2 * 12
+    assert np.abs(lag - delayed)[inside].max() > 5.0 * beyond
+    assert np.allclose(without[inside], delayed[inside], rtol=0, atol=beyond)
+    longer, shorter = left_open[..., :6], left_open[..., 6:]
+    assert not longer[speed < -1.0].any()
+    assert not shorter[speed > 1.0].any()
+
+
 def test_a_strut_ahead_and_one_behind_differ_by_sign_and_curvature(reference):
     motion = run((-100, 0, -1008), (0, -15), step_deg=0.25)
     late, ahead = (lag_mm(reference, motion, *[ms] * 6) for ms in (60.0, -60.0))

@@ -13,14 +13,13 @@ from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained
 from dbbstation.diagnosis.held import shifts_between
 from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests, without_tests
-from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.limits import limits_of, where_left
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shapes import Follows
 from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.diagnosis.unexplained import curve_of, with_exact_wave
-from dbbstation.diagnosis.verdicts import judge
+from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN, Alternatives

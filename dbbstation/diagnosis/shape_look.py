@@ -25,8 +25,8 @@ from dbbstation.diagnosis.shapes import (
 )
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.forms import Form, Lobes, PlaneStep, Ringing, Wave, WaveOfTurn
+from dbbstation.inference.looks import Sums, bumps, peaks, steps
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.sums import Sums, bumps, peaks, steps
 from dbbstation.machine.geometry import STRUT_NUMBERS
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from scipy.linalg import null_space
 from dbbstation.diagnosis.diagnose import without_doubtful
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.left_out import without_tests
-from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.diagnosis.verdicts import judge
+from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.chosen_anew import chosen_anew
 from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of

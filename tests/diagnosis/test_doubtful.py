@@ -6,9 +6,8 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import doubtful, without_doubtful
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.levels import circle_levels, outcome_of
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.diagnosis.verdicts import judge
+from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.verdict import Verdict
 from dbbstation.sources.registry import sources_named

@@ -14,7 +14,6 @@ from dbbstation.inference import settle as settling
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.channel import Base, Channel, Law
-from dbbstation.inference.consequence import may_result
 from dbbstation.inference.detectable import MARGIN, POWER, detectable, detectable_causes, least_seen
 from dbbstation.inference.folds import Fold, HeldOutError, parts_of
 from dbbstation.inference.followed import (
@@ -41,7 +40,7 @@ from dbbstation.inference.levels import (
     Levels,
     difference_of,
 )
-from dbbstation.inference.levels_of import levels_of, slow_chance
+from dbbstation.inference.levels_of import levels_of, may_result, slow_chance
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle

@@ -24,7 +24,7 @@ NAMES = ("gravity", "thermal-frame", "thermal-struts", "bar-drift")
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("tests", "rise_k"), [(EIGHT, 0.0293), pytest.param("abcdefghijklmno", 0.0133, marks=pytest.mark.nightly)]
+    ("tests", "rise_k"), [(EIGHT, 0.0315), pytest.param("abcdefghijklmno", 0.0133, marks=pytest.mark.nightly)]
 )
 def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_path, tests, rise_k):
     """A frame that warms by hundredths of a kelvin: three causes share the probability, and none of them has half of it."""

@@ -18,7 +18,7 @@ from studies import coverage_calibration, coverage_feed
 from studies.coverage_circles import CELLS, GAUSSIAN, SHARP, _drawn
 
 MODULES = (
-    *(f"results/{name}" for name in ("circles", "report", "prediction", "evaluation")),
+    *(f"results/{name}" for name in ("circles", "report", "prediction", "calibration")),
     "diagnosis/effects",
     *(f"circles/{name}" for name in ("reversals", "budget", "quick_look")),
     *(
@@ -60,8 +60,9 @@ PRINTED = {
     "prediction.PredictionResult.greatest_uncertainty_um": PREDICTED,
     "prediction.PredictionResult.greatest_uncertainty_by_axis_um": PREDICTED,
     "prediction.PredictionResult.uncertainty_mm": PREDICTED,
-    "evaluation.EvaluationResult.flatness_u_um": ["flatness"],
-    "evaluation.EvaluationResult.parallelism_u_um": ["parallelism"],
+    "calibration.CalibrationResult.centre_u_um": PREDICTED,
+    "calibration.EvaluationResult.flatness_u_um": ["flatness"],
+    "calibration.EvaluationResult.parallelism_u_um": ["parallelism"],
 }
 """Rows of the study by module, class and field."""
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, takewhile
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,7 +96,7 @@ class Assigned:
 
     def odds(self, one: Seen) -> float:
         """Return the log odds against a run's planned circle."""
-        others, own = _odds(self._looked_up, self.runs.index(one))
+        others, own = _odds(_ranked(self._looked_up), self.runs.index(one))
         return others - own
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
@@ -108,7 +109,7 @@ class Assigned:
 
     def suspects(self) -> dict[Seen, Finding]:
         """Return the runs that contradict the others, with findings that name the circles shown instead."""
-        likely = [dict(changes) for changes in _likely(self._looked_up)]
+        likely = [dict(changes) for changes in _likely(_ranked(self._looked_up), self._looked_up[()])]
         found = {}
         for at, one in enumerate(self.runs):
             changed = [labels[at] for labels in likely if at in labels]
@@ -377,31 +378,39 @@ class _Limits:
     @classmethod
     def of(cls, known: Mapping[_Changes, float], cost: float, new: int) -> _Limits:
         """Return the limits that follow from known log posterior densities."""
-        scores, floor = sorted(known.values(), reverse=True), known[()]
-        followed = scores[WIDE - 1] if len(scores) >= WIDE else -np.inf
-        suspects = {run for changes in _likely(known) for run, _ in changes}
-        others, own = _odds(known, new)
+        ranked, floor = _ranked(known), known[()]
+        followed = ranked[WIDE - 1][1] if len(ranked) >= WIDE else -np.inf
+        suspects = {run for changes in _likely(ranked, floor) for run, _ in changes}
+        others, own = _odds(ranked, new)
         return cls(
-            max(floor - cost, min(followed, max(floor, scores[0] - LOG_ODDS_LIMIT))),
-            {run: _odds(known, run)[1] for run in suspects},
+            max(floor - cost, min(followed, max(floor, ranked[0][1] - LOG_ODDS_LIMIT))),
+            {run: _greatest(ranked, run, own=True) for run in suspects},
             max(others, own - 2.0 * LOG_ODDS_LIMIT),
         )
 
 
-def _odds(known: Mapping[_Changes, float], run: int) -> tuple[float, float]:
+_Ranked = list[tuple[_Changes, float]]
+"""Assignments with their log posterior densities, in descending order."""
+
+
+def _ranked(known: Mapping[_Changes, float]) -> _Ranked:
+    return sorted(known.items(), key=itemgetter(1), reverse=True)
+
+
+def _odds(ranked: _Ranked, run: int) -> tuple[float, float]:
     """Return the greatest log posterior density with another circle for a run, and with its planned circle."""
-    found = [-np.inf, -np.inf]
-    for changes, score in known.items():
-        own = run not in dict(changes)
-        found[own] = max(found[own], score)
-    return found[False], found[True]
+    return _greatest(ranked, run, own=False), _greatest(ranked, run, own=True)
 
 
-def _likely(known: Mapping[_Changes, float]) -> list[_Changes]:
-    """Return assignments more probable than the plan and nearly as probable as the best, in descending order."""
-    floor, top = known[()], max(known.values())
-    scored = [one for one in known.items() if one[1] > floor and one[1] >= top - LOG_ODDS_LIMIT]
-    return [changes for changes, _ in sorted(scored, key=lambda one: one[1], reverse=True)]
+def _greatest(ranked: _Ranked, run: int, *, own: bool) -> float:
+    keeps = (score for changes, score in ranked if all(other != run for other, _ in changes) is own)
+    return next(keeps, -np.inf)
+
+
+def _likely(ranked: _Ranked, floor: float) -> list[_Changes]:
+    """Return assignments more probable than the plan, whose log density is `floor`, and nearly as probable as the best."""
+    least = ranked[0][1] - LOG_ODDS_LIMIT
+    return [changes for changes, score in takewhile(lambda one: one[1] > floor and one[1] >= least, ranked)]
 
 
 _OTHERWISE = {

@@ -436,8 +436,8 @@ def noise_of_turns(residuals: Sequence[Floats], freedom_used: float) -> Noise:
     Args:
         freedom_used: degrees of freedom of smooth columns.
     """
-    # Misfit and absorption are smooth, so high harmonics give the noise, which is extrapolated
-    # (`dbbstation.inference.harmonics`). Other residuals count as white noise.
+    # Misfit and absorption are smooth, so high harmonics give the noise, which is extrapolated. Other residuals count as
+    # white noise.
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
     turns = [residual for residual in residuals if len(residual) >= FEWEST_SAMPLES]

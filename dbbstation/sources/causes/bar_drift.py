@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class BarDrift(ErrorSource):
-    """The bar's reading drifts with its body's temperature, by `warm_up`.
+    """The bar's reading drifts with its body's temperature, by `laws.temperature`.
 
     The drift is zero at the session's first sample, because earlier errors are the bar's offset. Sessions with one bar share its values.
     """

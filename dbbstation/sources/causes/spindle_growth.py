@@ -44,7 +44,7 @@ _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
 
 
 class SpindleGrowth(ErrorSource):
-    """The tool tip moves along the spindle by g(t) of `warm_up` plus earlier growth.
+    """The tool tip moves along the spindle by g(t) of `laws.temperature` plus earlier growth.
 
     Earlier growth is a share b of the remaining growth a; a warm spindle that cools has b = -1. Upright level circles
     do not show it; tilted circles are shifted by (g + b a) sin(tilt).

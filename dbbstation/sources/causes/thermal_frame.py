@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 class ThermalFrame(ErrorSource):
-    """Base joints move from the plate's centre: dQ_i = Q_i g(t), g of `warm_up`.
+    """Base joints move from the plate's centre: dQ_i = Q_i g(t), g of `laws.temperature`.
 
     The plate's temperature is uniform, and it is fixed at the machine frame's origin; another fixed point only shifts
     it. Growth counts from the session's first sample.

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 class ThermalStruts(ErrorSource):
-    """All struts grow in proportion to length: dL_i = L_i g(t), g of `warm_up`.
+    """All struts grow in proportion to length: dL_i = L_i g(t), g of `laws.temperature`.
 
     Growth counts from the session's first sample; earlier growth is part of the reference lengths. Cold and warm starts
     therefore have different values. A prediction assumes the start of the fitted sessions.

@@ -15,6 +15,7 @@ import pytest
 import dbbstation as dbb
 from dbbstation.demo import whole_job
 from dbbstation.demo.whole_job import QUICK, run_demo
+from dbbstation.files.recordings.session import read_session
 from tests.cli.conftest import call
 
 SCRIPT = Path(__file__).parents[1] / "docs" / "examples" / "whole_job.py"
@@ -66,6 +67,9 @@ def _does_the_whole_job(job, result, tests):
     # What remains is where the balls came to stand, 0.6 to 1.9 µm per axis, and the noise of the bar.
     assert max(run["centre_deviation_um"] for run in after) < 10
     assert max(run["circularity_um"] for run in after) < 4
+    for session in ("measured", "verified"):  # the balls are in the right bores, and no run is held for another circle
+        runs = read_session(job / session).runs
+        assert [run.reason for run in runs] == [""] * (2 * tests)
     report = result["report"]
     assert report["verdict"]["kind"] == "within"
     assert [one["cause"] for one in report["causes"]] == ["geometry", "gravity"]

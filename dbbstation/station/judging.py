@@ -124,7 +124,8 @@ class RunJudge:
         counting = {key: known for key, known in self._counting.items() if key != _key(run)}
         # A circle during which something moved says nothing about the others.
         whole = new.analysis is not None and not any(finding.wrong for finding in by_itself(new, Others()))
-        assigned = self._assigned([*counting.values(), new]) if whole else None
+        # Compensated programs make all circles alike, so a circle's form does not tell which one it is.
+        assigned = self._assigned([*counting.values(), new]) if whole and entry.program is None else None
         suspects = {} if assigned is None else assigned.suspects()
         self._doubted = {events.RunId(*key, 0): suspects[known] for key, known in counting.items() if known in suspects}
         others = [known for known in counting.values() if known not in suspects]

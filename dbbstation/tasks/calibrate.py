@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.errors import ModelError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option, drawing, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
+    from typing import Unpack
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.fit.directions import Name
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.results.calibration import CalibrationResult
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.tasks.load import Recorded
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 STAGES = {"fit": 0, "figures": 36, "observability": 53}
 """Stages of a calibration after reading, and the share of its time that has passed at each begin [%]; there are one or
@@ -42,9 +43,7 @@ def calibrate(
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     known: Mapping[str, ErrorSource] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> CalibrationResult:
     r"""Fit the machine's errors to the raw circles of one or more sessions.
 
@@ -93,7 +92,7 @@ def calibrate(
     from dbbstation.sources.registry import sources_named
     from dbbstation.tasks.load import loaded
 
-    telling = Telling(progress, stop, say)
+    telling = Telling(**hooks)
     way = Method(method)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(sources)
     if known is None:

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from typing import Unpack
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.results.programs import ProgramsResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 
 @task("program", label="programs")
@@ -44,9 +45,7 @@ def program(
     force: o.Force = False,
     known: Mapping[str, ErrorSource] | None = None,
     provenance: Callable[[], Provenance] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> ProgramsResult:
     r"""Write the NC programs of a plan's circles, one for each test and direction, nominal or compensated.
 
@@ -83,16 +82,16 @@ def program(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.own_dialects import dialect_given
-    from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import from_python
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result
+    from dbbstation.tasks.models import sources_known
     from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
 
-    telling = Telling(progress, stop, say)
+    telling = Telling(**hooks)
     written_in, plan_file, machine_file, folder = dialect_given(dialect), Path(plan), Path(machine), Path(out)
     tests_of, hexapod = read_plan(plan_file), read_machine(machine_file)
     inverse = None
@@ -100,7 +99,7 @@ def program(
         refuse_second_correction(hexapod)
         inverse = inverse_of(
             model,
-            every_source(paths_of(source_files)) if known is None else known,
+            sources_known(known, source_files),
             time_s=time_s,
             largest_mm=largest_correction_mm,
             prefer=prefer,

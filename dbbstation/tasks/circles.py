@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option, drawing, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from typing import Unpack
 
     from numpy.typing import ArrayLike
 
     from dbbstation.results.circles import CircleFiguresResult, CirclesResult
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 
 @task("circles")
@@ -32,9 +32,7 @@ def circles(
     kind: Annotated[Literal["polar", "deviation", "spectrum", "map", "compare"], Option("Kind of figure.")] = "polar",
     tests: o.Tests = (),
     exclude: o.Exclude = (),
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> CirclesResult:
     r"""Compute the figures of measured circles, in the terms of ISO 230-4:2005. No model is needed.
 
@@ -75,7 +73,7 @@ def circles(
     from dbbstation.tasks.circle_runs import load_circles
     from dbbstation.tasks.models import model_of
 
-    telling = Telling(progress, stop, say)
+    telling = Telling(**hooks)
     if kind == "compare" and len(paths_of(sessions)) == 1:
         raise ArgumentError("kind", "one session is nothing to compare: name two sessions or more")
     chosen = Filter.of_word(filter)

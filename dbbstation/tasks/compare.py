@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 from dbbstation.errors import InputError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Option, drawing, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from typing import Unpack
 
     from dbbstation.results.comparison import ComparisonResult
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "held-out tests": 80}
 """Stages of a comparison after reading, and the share of its time that has passed at each begin [%]."""
@@ -28,9 +28,7 @@ def compare(
     tests: o.Tests = (),
     exclude: o.Exclude = (),
     held_out: o.HeldOut = True,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> ComparisonResult:
     r"""Compare two sessions: where they differ, in what form, and by which cause. Differences are B less A.
 
@@ -59,10 +57,10 @@ def compare(
     from dbbstation.results.comparison import comparison_result
     from dbbstation.sources.registry import known_sources, sources_named
     from dbbstation.tasks.diagnosed import default_candidates
-    from dbbstation.tasks.load import load
+    from dbbstation.tasks.load import loaded
 
-    telling = Telling(progress, stop, say)
-    one, other = (load(each, tests=tests, exclude=exclude, progress=progress, stop=stop) for each in (a, b))
+    telling = Telling(**hooks)
+    one, other = (loaded(each, tests, exclude, Telling(telling.stage)) for each in (a, b))
     if set(one.sessions.values()) == set(other.sessions.values()):
         what = f"this is the same session as {os.fspath(a)}, byte for byte"
         raise InputError.of(os.fspath(b), what, "give two sessions")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from dbbstation.files.inputs import in_a_book
 from dbbstation.nc.limits import CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, paths_of, task
+from dbbstation.tasks.declare import File, Option, task
 from dbbstation.tasks.options import lengths_by_tool, named_numbers, numbers_of
 from dbbstation.tasks.telling import Telling, silent
 
@@ -151,13 +151,13 @@ def compensate(
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_dialects import dialect_given
-    from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import from_python
     from dbbstation.machine.geometry import check_model_is_of
     from dbbstation.nc.export import compensated_program
     from dbbstation.nc.registry import dialect_of_file
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.programs import programs_result, write_programs
+    from dbbstation.tasks.models import sources_known
     from dbbstation.tasks.programs import (
         NOT_CORRECTED,
         ProgramText,
@@ -187,7 +187,7 @@ def compensate(
     path = reader.toolpath(text, name, start=None if np.isnan(pose).all() else pose, setup=setup)
     inverse = inverse_of(
         model,
-        every_source(paths_of(source_files)) if known is None else known,
+        sources_known(known, source_files),
         time_s=time_s,
         largest_mm=largest_correction_mm,
         prefer=prefer,

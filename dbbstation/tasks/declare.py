@@ -22,6 +22,7 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from dbbstation.errors import ArgumentError
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -244,7 +245,7 @@ def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Functi
     """Make a function a task, whose arguments are checked and whose docstring lists its options."""
 
     def give(function: _Function) -> _Function:
-        parameters, signature = options_of(function), inspect.signature(function)
+        parameters, signature = options_of(function), _with_hooks(inspect.signature(function))
         options = {name: one.option for name, one in parameters.items()}
         text = inspect.cleandoc(function.__doc__ or "")
         head, rest = re.split(r"\n\nArgs:\n|(?=\n\n(?:Returns|Raises):\n)", text, maxsplit=1)
@@ -270,6 +271,14 @@ def task(name: str, *, label: str = "", stages: Any = None) -> Callable[[_Functi
         return call  # type: ignore[return-value]
 
     return give
+
+
+def _with_hooks(signature: inspect.Signature) -> inspect.Signature:
+    """Return the signature with the arguments of `Hooks` by name."""
+    named = {one.kind: one for one in signature.parameters.values()}
+    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    hooks = inspect.signature(Telling).parameters.values() if inspect.Parameter.VAR_KEYWORD in named else ()
+    return signature.replace(parameters=[*own, *(one.replace(kind=one.KEYWORD_ONLY) for one in hooks)])
 
 
 def options_of(function: Callable[..., Any]) -> dict[str, TaskParameter]:

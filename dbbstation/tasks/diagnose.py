@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.errors import CalibrationError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Names, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.declare import Names, task
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
+    from typing import Unpack
 
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.diagnosis.unexplained import JointFitWithCurve
     from dbbstation.results.diagnosis import DiagnosisResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 STAGES = {
     "kinematic calibration": 0,
@@ -44,9 +45,7 @@ def diagnose(
     held_out: o.HeldOut = True,
     until_interrupted: bool = False,
     known: Mapping[str, ErrorSource] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> DiagnosisResult:
     r"""Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
 
@@ -86,12 +85,12 @@ def diagnose(
     from dbbstation.calibration.reporting.figures import calibration_figures, identified_model, report_of
     from dbbstation.diagnosis import diagnose as search
     from dbbstation.diagnosis.effects import effects_of
-    from dbbstation.files.own_sources import every_source
     from dbbstation.results.diagnosis import diagnosis_figures, diagnosis_result, kept_of
     from dbbstation.tasks.diagnosed import diagnosed_of
+    from dbbstation.tasks.models import sources_known
 
-    telling = Telling(progress, stop, say)
-    every = every_source(paths_of(source_files)) if known is None else known
+    telling = Telling(**hooks)
+    every = sources_known(known, source_files)
     how = partial(search.diagnose, hold_out=held_out, until_interrupted=until_interrupted)
     diagnosed = diagnosed_of(sessions, sources, (tuple(tests), tuple(exclude)), every, telling, how)
     found = diagnosed.diagnosis

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Files, Names, Option, drawing, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
+    from typing import Unpack
 
     from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.drive import DriveResult
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
     Recordings = Files | Columns | Iterable[Columns]
 else:
@@ -47,9 +48,7 @@ def identify(
         Option("Bandwidth in which force and model are compared [default: chosen from the recording].", metavar="HZ"),
     ] = None,
     held_out: o.HeldOut = True,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> DriveResult:
     r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
 
@@ -82,7 +81,7 @@ def identify(
     from dbbstation.laws.contract import MOVING
     from dbbstation.results.drive import drive_result
 
-    telling = Telling(progress, stop, say)
+    telling = Telling(**hooks)
     named = drive_sources_named(known_drive_sources() if sources is None else tuple(sources))
     own, lacking = load_sources(paths_of(source_files), MOVING, "a recording of a drive")
     replaced = {source.name for source in own}

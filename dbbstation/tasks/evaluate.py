@@ -7,16 +7,17 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.declare import task
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
+    from typing import Unpack
 
     from dbbstation.plan.tolerance import Tolerance
     from dbbstation.results.calibration import EvaluationResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 STAGES = {"predicting runs": 0}
 """Stages of an evaluation after reading, and the share of its time that has passed at each begin [%]."""
@@ -32,9 +33,7 @@ def evaluate(
     exclude: o.Exclude = (),
     tolerances: Sequence[Tolerance] = (),
     known: Mapping[str, ErrorSource] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> EvaluationResult:
     r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
@@ -69,15 +68,14 @@ def evaluate(
     )
     from dbbstation.calibration.reporting.prediction import predicted_circles
     from dbbstation.facts import of_facts
-    from dbbstation.files.own_sources import every_source
     from dbbstation.machine.geometry import check_model_is_of
     from dbbstation.results.calibration import EvaluationResult
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.tasks.load import loaded
-    from dbbstation.tasks.models import model_of
+    from dbbstation.tasks.models import model_of, sources_known
 
-    telling = Telling(progress, stop, say)
-    identified = model_of(model, every_source(paths_of(source_files)) if known is None else known)
+    telling = Telling(**hooks)
+    identified = model_of(model, sources_known(known, source_files))
     telling.note(*model_warnings(identified))
     recorded = loaded(sessions, tests, exclude, telling)
     check_model_is_of(recorded.machine, identified.model.machine)

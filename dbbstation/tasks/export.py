@@ -9,14 +9,15 @@ from dbbstation.errors import ArgumentError
 from dbbstation.files.inputs import in_a_book
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Option, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from typing import Unpack
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.results.exchange import ExportResult
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
     States = str | Sequence[str]
 else:
@@ -39,9 +40,7 @@ def export(
     ] = (),
     force: o.Force = False,
     provenance: Callable[[], Provenance] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> ExportResult:
     r"""Write sessions as one tidy table: one row per sample, with test, direction, repeat, state, time, angle, length, deviation.
 
@@ -82,7 +81,7 @@ def export(
         chosen = set(chosen_of(session.plan.name, session.plan.tests, tests, exclude))
         runs += [(session, run) for run in session.runs if run.test in chosen and (not states or run.state in states)]
     what = exporting(runs)
-    telling = Telling(progress, stop, say)
+    telling = Telling(**hooks)
     write = write_csv if is_csv else write_parquet
     read = blocks(what, telling.counted("export"), telling.note)
     rows = write(path, what, read, provenance or from_python, force=force)

@@ -24,7 +24,6 @@ from dbbstation.history.order import date_faults
 from dbbstation.history.record import ModelFigures, SessionFigures
 from dbbstation.history.trend import histories
 from dbbstation.results.history import history_result
-from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.text.written import listed
 
 if TYPE_CHECKING:
@@ -33,10 +32,6 @@ if TYPE_CHECKING:
 
     from dbbstation.history.trend import TrendOptions
     from dbbstation.results.history import HistoryResult
-    from dbbstation.tasks.telling import Progress
-
-READING = "reading sessions"
-"""Name of the counted stage."""
 
 
 def histories_in(
@@ -46,8 +41,7 @@ def histories_in(
     *,
     rebuild: bool = False,
     now: datetime | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
+    counted: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> HistoryResult:
     """Return the histories of all machines with sessions in a folder, at most four levels deep.
 
@@ -61,7 +55,6 @@ def histories_in(
         StoppedError: `stop` returned True; the index keeps the figures read so far.
     """
     folder = Path(folder)
-    counted = Telling(progress, stop).counted(READING)
     found = files_of(folder)
     with Kept(folder, begin_anew=rebuild) as kept:
         reading = _Reading(kept, counted, len(found.sessions) + len(found.models))

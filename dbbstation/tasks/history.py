@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Option, paths_of, task
-from dbbstation.tasks.telling import never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
+    from typing import Unpack
 
     from dbbstation.plan.tolerance import Tolerance
     from dbbstation.results.history import HistoryResult
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 
 @task("history", label="sessions")
@@ -32,9 +33,7 @@ def history(
     anew: o.Anew = False,
     tolerances: Sequence[Tolerance] = (),
     coverage_factor: float = 2.0,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> HistoryResult:
     r"""Show the figures of a folder of sessions over time, machine by machine, and changes beyond uncertainty.
 
@@ -66,7 +65,9 @@ def history(
     from dbbstation.tasks.histories import histories_in
 
     asked = TrendOptions(coverage_factor, tolerances, false_alarms, tuple(tests), tuple(exclude))
-    found = histories_in(Path(folder), asked, paths_of(source_files), rebuild=anew, progress=progress, stop=stop)
-    for note in found.remarks:
-        say(note)
+    telling = Telling(**hooks)
+    found = histories_in(
+        Path(folder), asked, paths_of(source_files), rebuild=anew, counted=telling.counted("reading sessions")
+    )
+    telling.note(*found.remarks)
     return found

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Files, Names, Option, drawing, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
+    from typing import Unpack
 
     from numpy.typing import NDArray
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from dbbstation.results.mismatch import MismatchResult
     from dbbstation.results.simulator import SimulatorResult
     from dbbstation.tasks.tables import Tabulated
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
     Tables = Files | Columns | Iterable[Columns]
     Variables = str | Mapping[str, Meaning | str | None] | Names
@@ -143,9 +144,7 @@ def mismatch(
     decimal: o.Decimal = None,
     separator: o.Separator = None,
     allowed: Collection[str] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> MismatchResult | SimulatorResult:
     r"""Find where a simulation and a recording differ, in what form, and which physics the simulation lacks.
 
@@ -192,7 +191,7 @@ def mismatch(
         stated_variables,
     )
 
-    telling = Telling(progress, stop, say)
+    telling = Telling(**hooks)
     numbers = number_language(decimal, separator)
     if simulator is not None:
         from dbbstation.simulators.allowed import require_allowed, simulator_file

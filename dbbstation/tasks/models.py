@@ -10,12 +10,14 @@ from dbbstation.files.formats.model import read_model as read_model_file
 from dbbstation.files.formats.model import write_model as write_model_file
 from dbbstation.files.own_sources import every_source
 from dbbstation.model.identified import IdentifiedModel
+from dbbstation.tasks.declare import paths_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.files.provenance import Provenance
     from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.declare import Files
 
 
 class HasModel(Protocol):
@@ -42,6 +44,11 @@ def model_of(model: Model, known: Mapping[str, ErrorSource] | None = None) -> Id
     if isinstance(model, str | PathLike):
         return read_model_file(Path(model), every_source() if known is None else known)
     return model if isinstance(model, IdentifiedModel) else model.model
+
+
+def sources_known(known: Mapping[str, ErrorSource] | None, source_files: Files) -> Mapping[str, ErrorSource]:
+    """Return error sources by name; None: those of package, installed packages and files."""
+    return every_source(paths_of(source_files)) if known is None else known
 
 
 def read_model(path: str | PathLike[str], *, source_files: Sequence[str | PathLike[str]] = ()) -> IdentifiedModel:

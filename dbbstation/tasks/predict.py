@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from dbbstation.errors import ArgumentError
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import Option, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.declare import Option, task
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from typing import Unpack
 
     from numpy.typing import ArrayLike
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.table_csv import Columns
     from dbbstation.results.prediction import PredictionResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
     Poses = ArrayLike | Columns | str | PathLike[str]
 else:
@@ -50,9 +50,7 @@ def predict(
     decimal: o.Decimal = None,
     separator: o.Separator = None,
     known: Mapping[str, ErrorSource] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> PredictionResult:
     r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
@@ -82,15 +80,14 @@ def predict(
     """
     from dbbstation.control.commands import nominal_commands
     from dbbstation.files.formats.number_language import PLAIN, number_language
-    from dbbstation.files.own_sources import every_source
     from dbbstation.machine.travel import check_travel
     from dbbstation.model.identified import predicted_poses
     from dbbstation.results.model_warnings import model_warnings
     from dbbstation.results.prediction import prediction_result
-    from dbbstation.tasks.models import model_of
+    from dbbstation.tasks.models import model_of, sources_known
 
-    telling = Telling(progress, stop, say)
-    every = every_source(paths_of(source_files)) if known is None else known
+    telling = Telling(**hooks)
+    every = sources_known(known, source_files)
     identified = model_of(model, every)
     machine = identified.model.machine
     telling.note(*model_warnings(identified))

@@ -9,16 +9,17 @@ from dbbstation.errors import StationError
 from dbbstation.files.inputs import in_a_book
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import File, Option, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from typing import Unpack
 
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.results.report import ReportResult
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
 
 STAGES = {
     "circles": 0,
@@ -60,9 +61,7 @@ def report(
     coverage_factor: float = USUAL_COVERAGE,
     known: Mapping[str, ErrorSource] | None = None,
     provenance: Callable[[], Provenance] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> ReportResult:
     r"""Write a report of measured circles: one HTML file that opens anywhere, without network, and prints to A4.
 
@@ -94,23 +93,21 @@ def report(
 
     from dbbstation.circles.path import TOLERATED
     from dbbstation.files.atomic import refuse_outputs, write_bytes
-    from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import from_python
     from dbbstation.files.recordings.session import read_session
     from dbbstation.machine.geometry import check_model_is_of
     from dbbstation.report.content import Reported, certified_of, content_of, numbers_of
     from dbbstation.report.html import chromium, printed, report_html
     from dbbstation.tasks.circle_runs import load_circles
-    from dbbstation.tasks.models import model_of
+    from dbbstation.tasks.models import model_of, sources_known
     from dbbstation.tasks.reporting import logo_of, modelled_runs, ranked_causes, read_runs
 
     out, paper = Path(page), None if pdf is None else Path(pdf)
     refuse_outputs([out, paper], force=force)
     browser = None if paper is None else chromium()
     logo = logo_of(settings)
-    telling = Telling(progress, stop, say)
-    every = every_source(paths_of(source_files)) if known is None and model is not None else known
-    identified = None if model is None else model_of(model, every)
+    telling = Telling(**hooks)
+    identified = None if model is None else model_of(model, sources_known(known, source_files))
     # Circles, evaluation and ranking need the same recordings: each is read once.
     now = [read_session(path, keeps=identified is not None) for path in paths_of(sessions)]
     then = None if before is None else read_session(Path(before), keeps=identified is not None)

@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from dbbstation.tasks import options as o
-from dbbstation.tasks.declare import File, Option, paths_of, task
-from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.tasks.declare import File, Option, task
+from dbbstation.tasks.telling import Telling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
+    from typing import Unpack
 
     from dbbstation.files.recordings.new_session import FinishedRun
     from dbbstation.results.sessions import SimulatedSession
     from dbbstation.sources.contract import ErrorSource
-    from dbbstation.tasks.telling import Progress
+    from dbbstation.tasks.telling import Hooks
     from dbbstation.trace.recording import Recording
 
 BEGUN = datetime(2000, 1, 1, tzinfo=UTC)
@@ -38,9 +39,7 @@ def simulate(
     samples: Annotated[int, Option("Samples per turn.", least=36)] = 720,
     interval_s: Annotated[float, Option("Time from the start of one run to the next [s].")] = 200.0,
     known: Mapping[str, ErrorSource] | None = None,
-    progress: Progress = silent,
-    stop: Callable[[], bool] = never,
-    say: Callable[[str], None] = silent,
+    **hooks: Unpack[Hooks],
 ) -> SimulatedSession:
     r"""Write the session that a ball bar would record on the machine of a model, without noise.
 
@@ -67,17 +66,15 @@ def simulate(
     """
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.formats.session import ReadBy, SessionDetails
-    from dbbstation.files.own_sources import every_source
     from dbbstation.files.recordings.new_session import FinishedRun, write_session
     from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.plan.plan import chosen_of
     from dbbstation.results.sessions import SimulatedSession
-    from dbbstation.tasks.models import model_of
+    from dbbstation.tasks.models import model_of, sources_known
     from dbbstation.virtual.truth import SetUp, put_up
 
-    telling = Telling(progress, stop, say)
-    every = every_source(paths_of(source_files)) if known is None else known
-    machine_model = model_of(model, every).model.of_the_machine()
+    telling = Telling(**hooks)
+    machine_model = model_of(model, sources_known(known, source_files)).model.of_the_machine()
     machine_model = replace(machine_model, machine=replace(machine_model.machine, control=None))
     inline = read_inline_plan(Path(plan))
     planned = inline.to_domain()

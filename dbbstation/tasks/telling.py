@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypedDict
 
 from dbbstation.errors import StationError
 
@@ -32,6 +32,14 @@ def silent(text: str, done: int = 0, of: int = 0) -> None:
 def never() -> bool:
     """Never stop."""
     return False
+
+
+class Hooks(TypedDict, total=False):
+    """Arguments of every task; `Telling` has their defaults."""
+
+    progress: Progress
+    stop: Callable[[], bool]
+    say: Callable[[str], None]
 
 
 class Telling:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import click
 
@@ -18,6 +18,8 @@ from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from dbbstation.results.fleet import FleetResult
 
 ONLY_OF = {
@@ -79,21 +81,14 @@ def fleet(
     from dbbstation.tasks.fleet import write_fleet_table
     from dbbstation.tasks.fleet_work import FleetOptions
 
-    _refuse_options_of_others(task)
+    of_fit = {"sources": sources, "method": method, "law_over_time": law_over_time, "source_files": source_files}
+    given = _of_task(task, of_fit | {"findings": findings, "tests": tests, "exclude": exclude})
+    files = tuple(path.absolute() for path in given.pop("source_files", ()))
+    options = FleetOptions(given, files, shop_settings() if task == "report" else Settings())
     if table is not None:
         if table.suffix.lower() not in FORMATS:
             raise click.UsageError(f"--table {table}: name a file that ends in {' or '.join(FORMATS)}")
         refuse_outputs([table], force=force)
-    options = FleetOptions(
-        sources=tuple(sources) if sources else None,
-        method=method,
-        law_over_time=law_over_time,
-        findings=findings,
-        tests=tuple(tests),
-        exclude=tuple(exclude),
-        source_files=tuple(path.absolute() for path in source_files),
-        settings=shop_settings() if task == "report" else Settings(),
-    )
     with count_bar(f"sessions: {task}") as progress:
         result = worked_out(
             folders,
@@ -119,13 +114,15 @@ def fleet(
         raise click.exceptions.Exit(1)
 
 
-def _refuse_options_of_others(task: str) -> None:
-    context = click.get_current_context()
-    for option in context.command.params:
-        name = option.name or ""
-        given = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-        if given and task not in ONLY_OF.get(name, (task,)):
-            raise click.UsageError(f"{option.opts[0]} is an option of {' and '.join(ONLY_OF[name])}, not of {task}")
+def _of_task(task: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the given options; refuse an option that the task does not have."""
+    source = click.get_current_context().get_parameter_source
+    given = [name for name in options if source(name) is click.core.ParameterSource.COMMANDLINE]
+    for name in given:
+        if task not in ONLY_OF.get(name, (task,)):
+            flag = f"--{name.replace('_', '-')}"
+            raise click.UsageError(f"{flag} is an option of {' and '.join(ONLY_OF[name])}, not of {task}")
+    return {name: options[name] for name in given}
 
 
 def _print(result: FleetResult) -> None:

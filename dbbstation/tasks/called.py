@@ -53,7 +53,7 @@ def called(
     values = of_shop | dict(given)
 
     def provenance() -> Provenance:
-        return made_by(shlex.join(["dbbstation", name, *_words(task, values)]))
+        return made_by(shlex.join(["dbbstation", name, *words_of(function, values)]))
 
     more = {
         "settings": settings,
@@ -69,14 +69,15 @@ def called(
     return result
 
 
-def _words(task: Declared, values: Mapping[str, Any]) -> Iterator[str]:
+def words_of(function: Any, values: Mapping[str, Any]) -> Iterator[str]:  # noqa: ANN401 - any task
+    """Return the words of a command line by the task's parameters, without folders and outputs."""
     for name, value in values.items():
-        if name in {"out", "page"}:
-            continue
-        one = task.parameters[name]
-        if one.flag.startswith("--"):
-            yield one.flag
-        yield name_of(Path(value)) if one.option.kind == "file" or one.type in _PATHS else str(value)
+        one = function.declared.parameters[name]
+        for each in value if isinstance(value, tuple) else [value] if name not in {"out", "page"} else ():
+            if one.flag.startswith("--"):
+                yield one.flag
+            if each is not True:
+                yield name_of(Path(each)) if one.option.kind == "file" or one.type in _PATHS else str(each)
 
 
 def _write(

@@ -255,9 +255,12 @@ def _once(sessions: Iterator[_Named], telling: Telling) -> list[_Named]:
 
 
 def _plain(options: FleetOptions) -> dict[str, object]:
-    data = {key: value for key, value in vars(options).items() if key not in {"source_files", "settings"}}
     settings = options.settings
-    return {**data, "tolerances": [asdict(one) for one in settings.tolerances], "from": settings.tolerances_from}
+    return {
+        **options.given,
+        "tolerances": [asdict(one) for one in settings.tolerances],
+        "from": settings.tolerances_from,
+    }
 
 
 def _taken(one: _Named, kept: FleetFolder, key: str, result: Worked | Ended) -> _Outcome:

@@ -6,8 +6,9 @@ import shlex
 import tempfile
 from collections import defaultdict
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +23,9 @@ from dbbstation.files.places import name_of
 from dbbstation.files.provenance import Provenance, made_by
 from dbbstation.files.recordings.former import reason_of
 from dbbstation.results.fleet import FleetCause, FleetFound, FleetValue
+from dbbstation.results.words import outlier_sentence
 from dbbstation.tasks.calibrate import calibrate
+from dbbstation.tasks.called import words_of
 from dbbstation.tasks.circles import circles
 from dbbstation.tasks.diagnose import diagnose
 from dbbstation.tasks.executors import refuse_other_program
@@ -38,27 +41,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FleetOptions:
-    """Options for every session."""
+    """Options for every session.
 
-    sources: tuple[str, ...] | None = None
-    method: Literal["jig", "conv-a", "conv-b"] = "jig"
-    law_over_time: bool = False
-    findings: bool = False
-    tests: tuple[str, ...] = ()
-    exclude: tuple[str, ...] = ()
+    Attributes:
+        given: arguments of the task by name.
+    """
+
+    given: Mapping[str, Any] = field(default_factory=dict)
     source_files: tuple[Path, ...] = ()
     settings: Settings = field(default_factory=Settings)
-
-    def words(self) -> list[str]:
-        """Return the options of a single session's command, in order."""
-        words = [] if self.sources is None else ["--sources", ",".join(self.sources)]
-        for path in self.source_files:
-            words += ["--source-files", name_of(path)]
-        words += ["--law-over-time"] if self.law_over_time else []
-        words += [] if self.method == "jig" else ["--method", self.method]
-        words += ["--findings"] if self.findings else []
-        words += [word for name in self.tests for word in ("--tests", name)]
-        return words + [word for name in self.exclude for word in ("--exclude", name)]
 
 
 @dataclass(frozen=True)
@@ -112,15 +103,7 @@ Done = tuple[FleetFound, "dict[str, object]", "dict[str, bytes]"]
 
 def _calibrated(piece: FleetPiece) -> Done:
     options = piece.options
-    result = calibrate(
-        piece.folder,
-        sources=options.sources,
-        method=options.method,
-        tests=options.tests,
-        exclude=options.exclude,
-        law_over_time=options.law_over_time,
-        known=every_source(options.source_files),
-    )
+    result = calibrate(piece.folder, **options.given, known=every_source(options.source_files))
     figures = (
         _size("noise of one reading", result.noise_um),
         _size("residual within mountings", result.residual_within_mounting_rms_um),
@@ -132,20 +115,15 @@ def _calibrated(piece: FleetPiece) -> Done:
     headline = (
         f"{result.parameters_identified} parameters, {result.residual_within_mounting_rms_um:.2f} µm rms left, {misfit}"
     )
-    outliers = tuple(f"outlier, kept out of the fit: {one.text}" for one in result.outliers)
-    found = FleetFound(_parameters(result.model) + figures, (), headline, (*result.notes, *outliers))
+    parameters = (FleetValue("parameter", *number) for _, *number in _numbers(result.model))
+    notes = (*result.notes, *map(outlier_sentence, result.outliers))
+    found = FleetFound((*parameters, *figures), (), headline, notes)
     return found, plain(result), {".yaml": model_text(result.model, _provenance(piece)).encode()}
 
 
 def _diagnosed(piece: FleetPiece) -> Done:
     options = piece.options
-    result = diagnose(
-        piece.folder,
-        sources=options.sources,
-        tests=options.tests,
-        exclude=options.exclude,
-        known=every_source(options.source_files),
-    )
+    result = diagnose(piece.folder, **options.given, known=every_source(options.source_files))
     figures = [
         _size("noise of one reading", result.noise_um),
         _size("residual within mountings", result.residual_rms_um.after),
@@ -158,8 +136,8 @@ def _diagnosed(piece: FleetPiece) -> Done:
         headline += f", {result.misfit_rms_um:.2f} µm rms without a name"
     of_causes = {one.name for one in result.sources if one.verdict == "identified"}
     parameters = [
-        FleetValue("cause" if source in of_causes else "parameter", quantity, unit, value, u)
-        for source, quantity, unit, value, u in _numbers(result.model)
+        FleetValue("cause" if source in of_causes else "parameter", *number)
+        for source, *number in _numbers(result.model)
     ]
     notes = (*result.notes, *(f"outlier, kept out of the fits: {one.text}" for one in result.outliers))
     found = FleetFound((*parameters, *figures), causes, headline, notes)
@@ -167,8 +145,7 @@ def _diagnosed(piece: FleetPiece) -> Done:
 
 
 def _circles(piece: FleetPiece) -> Done:
-    options = piece.options
-    result = circles(piece.folder, tests=options.tests, exclude=options.exclude, findings=options.findings)
+    result = circles(piece.folder, **piece.options.given)
     runs = run_figures(result.circles.circles)
     worst = max(
         (one for run in runs for one in run.figures if one.name == "G"), key=lambda one: one.value_um, default=None
@@ -181,14 +158,8 @@ def _reported(piece: FleetPiece) -> Done:
     options = piece.options
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "report.html"
-        written = report(
-            piece.folder,
-            page,
-            settings=options.settings,
-            tests=options.tests,
-            exclude=options.exclude,
-            provenance=lambda: _provenance(piece),
-        )
+        provenance = partial(_provenance, piece)
+        written = report(piece.folder, page, settings=options.settings, **options.given, provenance=provenance)
         html = content_of(page)
     numbers = plain(written)
     del numbers["report"]  # a folder that is gone
@@ -200,18 +171,17 @@ TASKS = {"calibrate": _calibrated, "circles": _circles, "diagnose": _diagnosed, 
 
 
 def _provenance(piece: FleetPiece) -> Provenance:
-    return made_by(shlex.join(["dbbstation", piece.task, name_of(piece.folder), *piece.options.words()]))
+    task = {"calibrate": calibrate, "circles": circles, "diagnose": diagnose, "report": report}[piece.task]
+    files = {"source_files": piece.options.source_files} if piece.options.source_files else {}
+    words = words_of(task, {**piece.options.given, **files})
+    return made_by(shlex.join(["dbbstation", piece.task, name_of(piece.folder), *words]))
 
 
 def _size(name: str, value_um: float) -> FleetValue:
     return FleetValue("figure", name, "µm", value_um, logarithmic=True)
 
 
-def _parameters(model: IdentifiedModel) -> tuple[FleetValue, ...]:
-    return tuple(FleetValue("parameter", quantity, unit, value, u) for _, quantity, unit, value, u in _numbers(model))
-
-
-def _numbers(model: IdentifiedModel) -> list[tuple[str, str, str, float, float | None]]:
+def _numbers(model: IdentifiedModel) -> list[tuple[Any, ...]]:
     return [
         (one.source, f"{one.source}: {one.name}", one.unit, one.value, one.u)
         for one in machine_parameters(model)

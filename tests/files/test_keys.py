@@ -133,12 +133,7 @@ def test_a_result_of_a_fleet_is_of_all_files_of_its_session(session, name, monke
 def test_a_result_of_a_fleet_is_of_its_task_and_of_every_option(session, monkeypatch, tmp_path):
     own = Path(shutil.copy("fixtures/sources/scale_bow.py", tmp_path / "own.py"))
     others = {
-        "sources": ("base-joints",),
-        "method": "ball",
-        "law_over_time": True,
-        "findings": True,
-        "tests": ("a",),
-        "exclude": ("b",),
+        "given": {"tests": ("a",)},
         "source_files": (own,),
         "settings": Settings(tolerances_from="shop.yaml:3"),
     }
@@ -148,6 +143,8 @@ def test_a_result_of_a_fleet_is_of_its_task_and_of_every_option(session, monkeyp
     found.append(fleet_key(session, "circles", FleetOptions(settings=limit), monkeypatch))
     for name, other in others.items():
         found.append(fleet_key(session, "circles", replace(FleetOptions(), **{name: other}), monkeypatch))
+    further = ({"findings": True}, {"exclude": ("a",)}, {"tests": ("b",)})
+    found += [fleet_key(session, "circles", FleetOptions(given), monkeypatch) for given in further]
     change(own)
     found.append(fleet_key(session, "circles", FleetOptions(source_files=(own,)), monkeypatch))
     assert len(set(found)) == len(found)

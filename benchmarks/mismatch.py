@@ -17,7 +17,7 @@ import numpy as np
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import Mismatch, find_mismatch
-from dbbstation.inference.curves import Spline
+from dbbstation.inference.forms import Spline
 from dbbstation.inference.variables import Kind, Variable
 
 SEED = 5

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
-from dbbstation.diagnosis.workspace import workspace
+from dbbstation.diagnosis.effects import workspace
 from dbbstation.inference.verdict import Verdict
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plan, PlannedTest

@@ -64,8 +64,8 @@ ENGINE = (
 """Of whatever compares sets of causes. Of a cosine, what it lacks of one is halved and doubled."""
 
 SAID = (
-    Constant("inference.cancelling", "MOST_CANCELS", (0.35, 0.7)),
-    Constant("inference.pushes", "MOST_PUSHES"),
+    Constant("inference.alternatives", "MOST_CANCELS", (0.35, 0.7)),
+    Constant("inference.levels", "MOST_PUSHES"),
 )
 """Of what is said of what was found in tables and drives. Of a root, its square is halved and doubled."""
 
@@ -101,8 +101,8 @@ TABLE = (
     *ENGINE,
     Constant("diagnosis.table.data", "REFITTED"),
     Constant("diagnosis.table.mismatch", "FAR_STATED"),
-    Constant("inference.memory", "LATE"),
-    Constant("inference.memory", "AT_ONCE", (0.25, 0.75)),
+    Constant("inference.bent", "LATE"),
+    Constant("inference.bent", "AT_ONCE", (0.25, 0.75)),
     *SAID,
     Constant("inference.bank", "HARDLY_TAKEN", (0.9, 0.975)),
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from dbbstation.errors import ModelError
-from dbbstation.inference.blocks import Columns
+from dbbstation.inference.square_root import Columns
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Motions
 from dbbstation.sources.contract import ErrorSource, Fitted, Need, Parameter

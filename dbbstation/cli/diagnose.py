@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dbbstation.diagnosis.effects import CauseEffect
+    from dbbstation.diagnosis.effects import CauseEffect, WorkspaceError
     from dbbstation.diagnosis.findings import Curve, SourceFinding
-    from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.results.diagnosis import DiagnosisFigures, DiagnosisResult
 

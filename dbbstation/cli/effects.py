@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.drive.findings import ForceLocation
     from dbbstation.diagnosis.findings import Location
-    from dbbstation.inference.cancelling import Cancelling
+    from dbbstation.inference.alternatives import Cancelling
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.verdict import Gains

@@ -11,17 +11,25 @@ import numpy as np
 
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, misfit_of
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
-from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of, left_open_of, seen_of
-from dbbstation.diagnosis.parts import amplitudes, by_amplitudes, by_terms, is_shape, parts_of
+from dbbstation.diagnosis.parts import (
+    Effects,
+    amplitudes,
+    by_amplitudes,
+    by_terms,
+    discrepancy_of,
+    is_shape,
+    left_open_of,
+    parts_of,
+    seen_of,
+)
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.bank import spacing_of
-from dbbstation.inference.blocks import Block, compress, slices, with_random
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import MOST_SLACK, Cause, Variant, largest_sd
 from dbbstation.inference.projection import BesideBase, CauseColumns
-from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.square_root import Block, compress, free_directions, slices, with_random
 from dbbstation.inference.triangle import axes_of, rms
 
 if TYPE_CHECKING:
@@ -29,8 +37,8 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.blocks import Columns
     from dbbstation.inference.harmonics import Spectrum
+    from dbbstation.inference.square_root import Columns
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,6 @@ from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default
 from dbbstation.calibration.outliers.robust import MOST, calibrate_robust, in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.explained import Explained, SettledCircles
 from dbbstation.diagnosis.parts import amplitudes, at_point
 from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
@@ -22,6 +21,7 @@ from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.bounds import BOUNDS, CIRCLES
 from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, other_laws, search
 from dbbstation.inference.model_comparison import SCALES, all_columns
+from dbbstation.inference.settled import Outcome
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
@@ -29,12 +29,58 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.outliers.outlier import Fit, Outlier
     from dbbstation.computing.arrays import Floats
+    from dbbstation.inference.harmonics import Misfit, Spectrum
     from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SettledCircles(Outcome):
+    """The outcome of the comparison, linearised about the joint fit.
+
+    Attributes:
+        after: joint fit of base and named causes.
+        noise: estimated with all causes.
+        scatter: of balls, in stated standard deviations.
+    """
+
+    after: Calibration
+    target: Floats
+    unmodelled: Unmodelled
+    noise: Spectrum
+    left: Misfit
+    scatter: float = 1.0
+
+    def second_start_agrees(self) -> bool:
+        """Return whether a search without seeds agrees."""
+        anew = search(self.comparison, self.causes, most_members=BOUNDS.members, likely=CLOSE)
+        return anew.best.names == max(self.posterior.weights, key=self.posterior.weights.__getitem__)
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """Return the best hypothesis's named causes."""
+        return tuple(m for m in self.best.members if m.cause.named)
+
+    @property
+    def noise_mm(self) -> float:
+        """Return the white noise per sample that affects smooth quantities equally [mm]."""
+        return float(np.sqrt(self.noise.power[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """Inputs and results of the comparison."""
+
+    before: Calibration
+    outliers: tuple[Outlier, ...]
+    channel: CircleChannel
+    first: Misfit
+    settled: SettledCircles
+
 
 GRID = 0.3
 """Relative prior standard deviation of nonlinear parameters in a second try, about their grid spacing."""

@@ -16,11 +16,11 @@ from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
-    from dbbstation.diagnosis.workspace import WorkspaceError
-    from dbbstation.inference.cancelling import Cancelling
+    from dbbstation.diagnosis.effects import WorkspaceError
+    from dbbstation.inference.alternatives import Cancelling
     from dbbstation.inference.chosen_anew import ChosenAnew
+    from dbbstation.inference.folds import HeldOut
     from dbbstation.inference.harmonics import Misfit
-    from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.levels import Levels
     from dbbstation.inference.verdict import LimitReached
 

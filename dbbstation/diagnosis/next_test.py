@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
-    from dbbstation.diagnosis.explained import Explained
+    from dbbstation.diagnosis.effects import WorkspaceError
+    from dbbstation.diagnosis.explain import Explained
     from dbbstation.diagnosis.findings import SourceFinding
-    from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.model_comparison import Variant
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation

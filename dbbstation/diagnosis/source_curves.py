@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.diagnosis.discrepancy import BY_DIRECTION
 from dbbstation.diagnosis.drawn import Branch, SourceCurves
+from dbbstation.diagnosis.parts import BY_DIRECTION
 from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.machine.geometry import STRUTS

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.channel import CircleChannel
-    from dbbstation.diagnosis.explained import SettledCircles
+    from dbbstation.diagnosis.explain import SettledCircles
     from dbbstation.diagnosis.findings import Unexplained
     from dbbstation.diagnosis.shapes import Samples, Shape
     from dbbstation.machine.geometry import Machine

@@ -10,20 +10,28 @@ import numpy as np
 from dbbstation.calibration.checks.scatter import is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.findings import SourceFinding
-from dbbstation.diagnosis.held import uncertainties, unseen
-from dbbstation.diagnosis.limits import where_left
+from dbbstation.diagnosis.limits import uncertainties, unseen, where_left
 from dbbstation.diagnosis.parts import SESSION_TIME, amplitudes, variable_of
 from dbbstation.diagnosis.shapes import SIGNED
 from dbbstation.facts import of_facts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.by_level import ambiguous, open_to, with_texts
-from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.channel import Base, Channel, Law, impossibly_negative
 from dbbstation.inference.coloured import Coloured
-from dbbstation.inference.impossible import impossibly_negative
 from dbbstation.inference.left_over import SIGNIFICANT, LeftOver, ResidualTest
-from dbbstation.inference.levels import BALL, BAR, JOINED, RUN, Differs, Followed, FollowsAnswer
+from dbbstation.inference.levels import (
+    BALL,
+    BAR,
+    JOINED,
+    RUN,
+    Differs,
+    Followed,
+    FollowsAnswer,
+    ambiguous,
+    open_to,
+    with_texts,
+)
 from dbbstation.inference.levels_of import levels_by_tests
 from dbbstation.inference.read_off import CauseJudge, Trial, concealed
 from dbbstation.inference.settled import Settled
@@ -36,10 +44,9 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.diagnosis.channel import CircleChannel
-    from dbbstation.diagnosis.explained import Explained, SettledCircles
-    from dbbstation.inference.by_level import Said
+    from dbbstation.diagnosis.explain import Explained, SettledCircles
     from dbbstation.inference.chosen_anew import ChosenAnew, KnownGains
-    from dbbstation.inference.levels import Levels
+    from dbbstation.inference.levels import Levels, Said
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.projection import BesideBase
 

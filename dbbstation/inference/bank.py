@@ -11,7 +11,6 @@ import numpy as np
 from scipy.sparse import diags_array
 from scipy.special import chdtri
 
-from dbbstation.inference.blocks import compress, with_random
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.coloured import (
     FEWEST_INDEPENDENT,
@@ -24,12 +23,12 @@ from dbbstation.inference.coloured import (
     largest_decay,
     with_put_back,
 )
+from dbbstation.inference.forms import modulated
 from dbbstation.inference.harmonics import LEAST_LEFT
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant, largest_sd
-from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, ZERO_SD, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
-from dbbstation.inference.square_root import solve
+from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.triangle import RANK, rms
 from dbbstation.inference.uneven import (
     has_long_tails,
@@ -45,11 +44,11 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.blocks import Columns
     from dbbstation.inference.channel import Channel, Law
+    from dbbstation.inference.coloured import Left
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.patterns import Choices, Pattern
-    from dbbstation.inference.pieces import Left
+    from dbbstation.inference.square_root import Columns
 
 TANGENT = 1e-3
 """Step for the derivative by a nonlinear parameter, in units of its grid spacing."""

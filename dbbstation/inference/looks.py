@@ -13,8 +13,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.curves import Spline
-from dbbstation.inference.forms import HARMONICS, Bump, Form, StepForm, Wave
+from dbbstation.inference.forms import HARMONICS, Bump, Form, Spline, StepForm, Wave
 from dbbstation.inference.patterns import Family, Pattern, log_odds
 from dbbstation.inference.variables import Kind
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.pieces import Left
+    from dbbstation.inference.coloured import Left
     from dbbstation.inference.variables import Variable
 
 

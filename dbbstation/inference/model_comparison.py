@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 from scipy.linalg.lapack import dtrtri, dtrtrs
 
-from dbbstation.inference.blocks import slices
+from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:

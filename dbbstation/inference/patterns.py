@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dbbstation.inference.curves import Power, Spline
-from dbbstation.inference.forms import Form, SignForm, Walk, Wave
+from dbbstation.inference.forms import Form, Power, SignForm, Spline, Walk, Wave
 from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.blocks import Columns
+    from dbbstation.inference.square_root import Columns
 
 
 LEAST_SHARE = 1e-12

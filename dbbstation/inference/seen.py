@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.coloured import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.looks import PLACED, looked_for, placed_better
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.stretches import refined, stretches
 from dbbstation.inference.variables import Kind, Variable

@@ -10,11 +10,11 @@ import numpy as np
 from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.channel import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
-from dbbstation.inference.impossible import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
 from dbbstation.inference.model_comparison import all_columns
-from dbbstation.inference.named_values import moved, values_of_law
 from dbbstation.inference.patterns import patterns, wander
+from dbbstation.inference.read_off import moved, values_of_law
 from dbbstation.inference.seen import MOVED, places_anew, seen
 from dbbstation.inference.settled import Beginning, Settled
 from dbbstation.inference.triangle import rms, squares

@@ -9,15 +9,14 @@ import numpy as np
 from scipy.special import gammaln
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.curves import Clock, Stretches
+from dbbstation.inference.forms import Clock, Stretches
 from dbbstation.inference.patterns import Family, Pattern
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
-    from dbbstation.inference.coloured import Coloured
-    from dbbstation.inference.pieces import Left
+    from dbbstation.inference.coloured import Coloured, Left
     from dbbstation.inference.variables import Variable
 
 SHORTEST = 3

@@ -13,8 +13,8 @@ from dbbstation.diagnosis.compare.findings import DirectionHalves, LargestEffect
 from dbbstation.diagnosis.compare.pairs import NotComparable
 from dbbstation.facts import of_facts, picked
 from dbbstation.facts.value import Value
+from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.cancelling import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.read_off import Span
 from dbbstation.inference.verdict import Gains, Verdict

@@ -9,12 +9,11 @@ from pydantic import computed_field
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, Outlier, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
-from dbbstation.diagnosis.effects import CauseEffect
+from dbbstation.diagnosis.effects import CauseEffect, WorkspaceError
 from dbbstation.diagnosis.findings import Location, NextTest, Shift, SourceFinding, Unexplained
-from dbbstation.diagnosis.workspace import WorkspaceError
 from dbbstation.facts import OfRun, of_facts
 from dbbstation.facts.value import Value
-from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Acts, LimitReached, Verdict
 from dbbstation.model.identified import IdentifiedModel

@@ -17,7 +17,7 @@ from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.recordings.table_csv import table_csv
-from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.folds import Fold
 from dbbstation.inference.left_over import LeftOver
 from dbbstation.inference.levels import Levels

@@ -14,8 +14,7 @@ import tempfile
 from pathlib import Path
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.diagnosis.per_test import gains_by_test
-from dbbstation.diagnosis.source_curves import source_curves
+from dbbstation.diagnosis.drawn import gains_by_test, source_curves
 from dbbstation.report.calibration_figure import calibration_figure
 from dbbstation.report.diagnosis_figure import diagnosis_figure
 from dbbstation.tasks.load import load_sessions

@@ -9,7 +9,7 @@ from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder
-from dbbstation.inference.held_out import HeldOut
+from dbbstation.inference.folds import HeldOut
 from dbbstation.inference.levels import DifferenceFound, Differs, Levels
 from dbbstation.inference.verdict import Verdict
 from dbbstation.model.machine_model import MachineModel

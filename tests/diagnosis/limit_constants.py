@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from dbbstation.diagnosis import explain, shape_look, shapes
+from dbbstation.diagnosis import explain, shapes, unmodelled
 from dbbstation.diagnosis.diagnose import usable_sources, without_doubtful
 from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.sources.causes import servo_lag
@@ -26,7 +26,7 @@ from dbbstation.tasks.load import load_sessions
 MOVED: dict[str, tuple[Any, str, tuple[Any, ...], int]] = {
     "IDLE": (explain, "IDLE", (0.7, 0.97), 4),
     "ROUGH": (explain, "ROUGH", (0.03, 0.3), 92),
-    "HALF": (shape_look, "HALF", (0.25, 1.0), 4),
+    "HALF": (unmodelled, "HALF", (0.25, 1.0), 4),
     "WALK_STEPS": (shapes, "WALK_STEPS", (3, 12), 2),
     "STICKING_MM": (shapes, "STICKING_MM", (0.02, 0.08), 23),
     "STICKING_HALVES": (shapes, "STICKING_HALVES", (4, 6), 23),

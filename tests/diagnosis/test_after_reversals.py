@@ -7,9 +7,9 @@ import gc
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.diagnosis.after_reversals import after_reversals
 from dbbstation.diagnosis.channel import CircleChannel
-from dbbstation.diagnosis.explained import SettledCircles
+from dbbstation.diagnosis.explain import SettledCircles
+from dbbstation.diagnosis.locate import after_reversals
 from dbbstation.diagnosis.shapes import samples_of
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.tasks.load import load_sessions

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from dbbstation.diagnosis.diagnose import without_doubtful
+from dbbstation.diagnosis.diagnose import without_doubtful, without_tests
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.left_out import without_tests
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.chosen_anew import chosen_anew

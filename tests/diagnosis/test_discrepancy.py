@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbbstation.diagnosis.discrepancy import seen_of
-from dbbstation.inference.model_form import modulated
+from dbbstation.diagnosis.parts import seen_of
+from dbbstation.inference.forms import modulated
 
 
 def test_axes_stand_for_the_covariance_of_columns_up_to_the_least(rng):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.reporting.prediction import smooth_circularities_um
-from dbbstation.diagnosis.effects import GEOMETRY, effects_of
-from dbbstation.diagnosis.workspace import workspace
+from dbbstation.diagnosis.effects import GEOMETRY, effects_of, workspace
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dbbstation.diagnosis.after_reversals import louder
+from dbbstation.diagnosis.locate import louder
 
 RUNS, ROWS, LENGTH = 20, 600, 12
 

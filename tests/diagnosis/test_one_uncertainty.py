@@ -11,7 +11,7 @@ from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
 from dbbstation.calibration.reporting.figures import calibration_figures, identified_model
 from dbbstation.diagnosis.diagnose import diagnose
-from dbbstation.diagnosis.workspace import workspace
+from dbbstation.diagnosis.effects import workspace
 from dbbstation.facts.serialise import plain
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.places import shipped_folder

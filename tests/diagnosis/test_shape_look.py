@@ -7,11 +7,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.shape_look import Ranges, TemplateScan, looked_for
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Samples
-from dbbstation.inference.blocks import Columns
+from dbbstation.diagnosis.unmodelled import Ranges, TemplateScan, looked_for
 from dbbstation.inference.forms import Bump, Ringing, Wave
 from dbbstation.inference.looks import REACH, NearbyWaves
+from dbbstation.inference.square_root import Columns
 
 NOISE_MM = 5e-4
 SAMPLES = 2000

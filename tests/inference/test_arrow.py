@@ -7,11 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.inference import arrow
-from dbbstation.inference.arrow import arrow_of
-from dbbstation.inference.blocks import Columns, compress, spread, spread_over
+from dbbstation.inference import square_root
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.square_root import chi2_without, lost_directions, solve
+from dbbstation.inference.square_root import (
+    Columns,
+    arrow_of,
+    chi2_without,
+    compress,
+    lost_directions,
+    solve,
+    spread,
+    spread_over,
+)
 
 FITTED, MOUNTINGS, OF_EACH = 5, 24, 3
 BARS = 2
@@ -106,7 +113,7 @@ def test_directions_are_those_of_all_rows_at_once(rng, known, monkeypatch):
         jacobian[:, 4] = jacobian[:, 3]  # their difference is lost
     blocks = blocks_of(runs, noises)
     by_groups = lost_directions(blocks, known, NOISE)
-    monkeypatch.setattr(arrow, "BOUNDS", replace(BOUNDS, group_work=np.inf))
+    monkeypatch.setattr(square_root, "BOUNDS", replace(BOUNDS, group_work=np.inf))
     assert not arrow_of(blocks, known, NOISE).groups
     np.testing.assert_allclose(np.abs(by_groups @ lost_directions(blocks, known, NOISE).T), [[1.0]], atol=1e-9)
     expected = np.zeros(FITTED)

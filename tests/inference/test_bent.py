@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from dbbstation.inference.bent import bent_laws, grows_with, integral_of
-from dbbstation.inference.impossible import beyond_reach
+from dbbstation.inference.bent import bent_laws, grows_with, integral_of, memory_laws
+from dbbstation.inference.channel import beyond_reach
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
-from dbbstation.inference.memory import memory_laws
-from dbbstation.inference.named_values import named_values
 from dbbstation.inference.patterns import Family
+from dbbstation.inference.read_off import named_values
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.variables import Kind, Variable

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.inference.cancelling import cancelling
+from dbbstation.inference.alternatives import cancelling
 
 ANGLE = 2.0 * np.pi * np.arange(1000) / 1000.0
 ONCE, TWICE = np.sin(ANGLE), np.sin(2.0 * ANGLE)

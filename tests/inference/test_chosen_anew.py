@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from dbbstation.inference.blocks import Columns
 from dbbstation.inference.chosen_anew import KnownGains, chosen_anew
 from dbbstation.inference.hypotheses import search
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.square_root import Columns
 from dbbstation.inference.verdict import ABSENT, DensityGains
 from tests.inference.dense import cause, variant
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.facts.value import Value
-from dbbstation.inference.jackknife import refits_without, weighted_jackknife, widening
-from dbbstation.inference.named_values import with_jackknife
+from dbbstation.inference.folds import refits_without, weighted_jackknife, widening
+from dbbstation.inference.read_off import with_jackknife
 from dbbstation.inference.settle import settle
 from tests.inference.tables import table
 from tests.inference.test_channel import EFFECTS, channel

@@ -12,9 +12,7 @@ from scipy.special import logsumexp
 from dbbstation.facts.value import Value
 from dbbstation.inference import settle as settling
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.by_level import VerdictsByLevel
 from dbbstation.inference.channel import Base, Channel, Law
-from dbbstation.inference.detectable import MARGIN, POWER, detectable, detectable_causes, least_seen
 from dbbstation.inference.folds import Fold, HeldOutError, parts_of
 from dbbstation.inference.followed import (
     ChosenWithoutParts,
@@ -27,7 +25,6 @@ from dbbstation.inference.followed import (
     probability_of_any,
 )
 from dbbstation.inference.hypotheses import SearchWork
-from dbbstation.inference.law_form import law_form
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels import (
     TIME,
@@ -38,9 +35,20 @@ from dbbstation.inference.levels import (
     FollowsAnswer,
     LawForm,
     Levels,
+    VerdictsByLevel,
     difference_of,
 )
-from dbbstation.inference.levels_of import levels_of, may_result, slow_chance
+from dbbstation.inference.levels_of import (
+    MARGIN,
+    POWER,
+    detectable,
+    detectable_causes,
+    law_form,
+    least_seen,
+    levels_of,
+    may_result,
+    slow_chance,
+)
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES
 from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle

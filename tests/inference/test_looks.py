@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.inference.coloured import Coloured
+from dbbstation.inference.coloured import Coloured, Fitting
 from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Fitting
 from dbbstation.inference.variables import Kind, Variable
 
 

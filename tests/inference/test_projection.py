@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from dbbstation.inference.blocks import Columns
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.square_root import Columns
 from tests.inference.dense import cause, variant
 
 NOISE = 0.2

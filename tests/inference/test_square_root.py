@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.inference.blocks import Columns, compress, spread
 from dbbstation.inference.harmonics import noise_of
-from dbbstation.inference.square_root import lost_directions, solve, unseen_combinations
+from dbbstation.inference.square_root import Columns, compress, lost_directions, solve, spread, unseen_combinations
 
 NOISE = 0.3
 

@@ -11,10 +11,9 @@ from scipy.stats import t as student_t
 
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
-from dbbstation.inference.coloured import Coloured, akaike_cost
-from dbbstation.inference.curves import Clock, Stretches
+from dbbstation.inference.coloured import Coloured, Fitting, Left, LeftBesideOthers, akaike_cost
+from dbbstation.inference.forms import Clock, Stretches
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Fitting, Left, LeftBesideOthers
 from dbbstation.inference.settle import settle
 from dbbstation.inference.stretches import SHORTEST, _pattern, _squares_of_edges, refined
 from tests.inference.reading import read_by_levels

@@ -14,15 +14,14 @@ from pydantic import computed_field
 
 from dbbstation.calibration.fit.directions import in_words
 from dbbstation.computing.threads import with_one_thread
-from dbbstation.inference.blocks import spread_over
-from dbbstation.inference.square_root import complement, lost_directions
+from dbbstation.inference.square_root import complement, lost_directions, spread_over
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.computing.arrays import Floats, Integers
-    from dbbstation.inference.blocks import Block
+    from dbbstation.inference.square_root import Block
 
 
 WEAKEST = 3

@@ -20,9 +20,8 @@ from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.blocks import Block, compress
 from dbbstation.inference.harmonics import Noise, noise_of_turns
-from dbbstation.inference.square_root import Solution, lost_directions, solve, unseen_combinations
+from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Need, Owner

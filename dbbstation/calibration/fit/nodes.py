@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.blocks import compress
+from dbbstation.inference.square_root import compress
 from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers
-    from dbbstation.inference.blocks import Block
+    from dbbstation.inference.square_root import Block
     from dbbstation.model.observation import Observation
 
 SECTORS = 60

@@ -1,4 +1,4 @@
-"""Compare two sessions and explain their difference."""
+"""Compare two sessions, explain their difference with its place, and predict held-out tests."""
 
 from __future__ import annotations
 
@@ -9,43 +9,46 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit, logsumexp
 
+from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.calibration.fit.methods import CENTRED_MM
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.compare.channel import channel_of
-from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm
-from dbbstation.diagnosis.compare.findings import DirectionHalves, RunDifference
-from dbbstation.diagnosis.compare.left_out import predicted, tried_without_tests
-from dbbstation.diagnosis.compare.pairs import match
+from dbbstation.diagnosis.compare.findings import DirectionHalves, EffectOfCause, LargestEffect, RunDifference
+from dbbstation.diagnosis.compare.pairs import Sides, match
 from dbbstation.diagnosis.compare.set_up import with_set_up
-from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
+from dbbstation.inference.alternatives import cancelling
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.cancelling import cancelling
+from dbbstation.inference.chosen_anew import KnownGains, gains_of_tests, groups_of_tests, rows_of_groups
+from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, held_out, in_turn, refits_without
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_by_tests
 from dbbstation.inference.model_comparison import all_columns
-from dbbstation.inference.read_off import read_off
+from dbbstation.inference.read_off import HALF, Trial, read_off
 from dbbstation.inference.settle import settle
-from dbbstation.inference.triangle import rms, root
+from dbbstation.inference.square_root import compress
+from dbbstation.inference.triangle import RANK, rms, root
 from dbbstation.inference.verdict import OUT, SURE
+from dbbstation.sources.registry import sources_named
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats, Integers
-    from dbbstation.diagnosis.compare.findings import EffectOfCause
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
-    from dbbstation.inference.cancelling import Cancelling
-    from dbbstation.inference.held_out import HeldOut
+    from dbbstation.inference.alternatives import Cancelling
+    from dbbstation.inference.folds import HeldOut
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.levels import Levels
-    from dbbstation.inference.read_off import CauseFinding, Trial
+    from dbbstation.inference.model_comparison import Member
+    from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.settled import Settled
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
+
 
 CENTRED_SIGMA = 4.0
 """Centres were removed if all are within so many standard uncertainties of noise, or within `CENTRED_MM`."""
@@ -254,3 +257,93 @@ def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
         f"in session {name} all circles lie on their commanded centres within noise: their centres were removed",
         remedy="compare raw bar lengths; a circle without its centre has no position",
     )
+
+
+def effects_of(sides: Sides, settled: Settled) -> dict[str, EffectOfCause]:
+    """Return effects of the best set by name, largest evidence first."""
+    comparison, best = settled.comparison, settled.best
+    kinematic = _kinematic(sides)
+    found = {}
+    for member in sorted(best.members, key=lambda m: -best.log_factor(m.name)):
+        name = member.name
+        rows = settled.effect([name])
+        share = comparison.explained([member]) / comparison.explained(best.members)
+        taken_up = float(np.sum((kinematic.T @ rows) ** 2) / max(float(rows @ rows), 1e-300))
+        found[name] = _placed(sides, rows, min(share, 1.0), taken_up)
+    return found
+
+
+def _placed(sides: Sides, rows: Floats, share: float, taken_up: float) -> EffectOfCause:
+    by_run = sides.by_angle(rows)
+    worst = int(np.argmax([np.abs(values).max() for values in by_run]))
+    pair, values = sides.pairs[worst], by_run[worst]
+    at, count = int(np.argmax(np.abs(values))), len(values)
+    inside = values * np.sign(values[at]) >= HALF * abs(values[at])
+    # The contiguous arc about the peak, across the turn's start.
+    rolled = np.roll(inside, -at)
+    ahead = count if rolled.all() else int(np.argmin(rolled))
+    back = 0 if rolled.all() else int(np.argmin(rolled[::-1]))
+    step = 360.0 / count
+    first, last = (at - back) * step % 360.0, ((at + ahead) * step - 1e-9) % 360.0
+    peak_um, run = 1e3 * float(values[at]), f"{pair.test} {pair.direction}"
+    text = f"up to {peak_um:+.1f} µm in test {run}, {first:.0f} to {last:.0f} degrees"
+    where = LargestEffect(pair.test, str(pair.direction), (first, last), peak_um, text)
+    return EffectOfCause(1e3 * rms(rows), share, taken_up, opposite_share(sides, by_run), where)
+
+
+def opposite_share(sides: Sides, by_run: list[Floats]) -> float:
+    """Return the share of squares that change sign with direction."""
+    same, opposite = 0.0, 0.0
+    for one, other in both_directions(sides.pairs):
+        same += float(np.sum((by_run[one] + by_run[other]) ** 2))
+        opposite += float(np.sum((by_run[one] - by_run[other]) ** 2))
+    return opposite / (same + opposite) if same + opposite > 0.0 else 0.0
+
+
+def both_directions(pairs: Sequence[Pair]) -> list[tuple[int, int]]:
+    """Return the runs of tests measured in both directions."""
+    by_test: dict[tuple[str, int], list[int]] = {}
+    for k, pair in enumerate(pairs):
+        by_test.setdefault((pair.test, pair.number), []).append(k)
+    return [(runs[0], runs[1]) for runs in by_test.values() if len(runs) == 2]  # noqa: PLR2004
+
+
+def _kinematic(sides: Sides) -> Floats:
+    """Return an orthonormal basis of kinematic effects on B's readings, shape (n, k)."""
+    sources = sources_named(KINEMATIC_SOURCES)
+    columns = [
+        np.hstack([reading.by_source(s, sides.machine, np.zeros(len(s.parameters(sides.machine)))) for s in sources])
+        for reading in sides.readings[1]
+    ]
+    axes, sizes, _ = np.linalg.svd(sides.averaged(1, columns), full_matrices=False)
+    return axes[:, sizes > RANK * sizes[0]]
+
+
+def noticed_mm(settled: Settled) -> float:
+    """Return the detectable change of length for the least visible strut [mm]."""
+    cause = next(cause for cause in settled.causes if cause.name == "strut-reference-length")
+    single = [v.columns for v in cause.variants if len(v.columns) == 1 and v.label.startswith("strut")]
+    products = [float(settled.comparison.beside((), columns)[0, 0]) for columns in single]
+    return OUT / float(np.sqrt(max(min(products), 1e-300)))
+
+
+def tried_without_tests(sides: Sides, settled: Settled, *, hold_out: bool = True) -> tuple[Trial, KnownGains | None]:
+    """Predict groups of tests; empty without findings or with fewer than `LEAST_PARTS` groups."""
+
+    def errors(without: Sequence[Collection[str]]) -> Sequence[float]:
+        return [predicted(sides, settled, settled.best.without(*names)).rms for names in without]
+
+    parts = rows_of_groups(groups_of_tests([pair.test for pair in sides.pairs]), sides.blocks)
+    refits = refits_without(settled, parts) if settled.best.members else ()
+    gains = gains_of_tests(settled, parts, errors, most_expanded=BOUNDS.expanded_of_table) if hold_out else None
+    return Trial(None if gains is None else gains.anew, refits), gains
+
+
+def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> HeldOut:
+    """Return prediction errors of held-out tests with stated set-ups and some causes."""
+    bank, channel = settled.bank, settled.channel
+    columns, known = bank.jointly(members)
+    groups = in_turn([pair.test for pair in sides.pairs], FOLDS_OF_AN_ERROR)
+    every = np.arange(len(known.prior))
+    blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
+    return held_out(blocks, groups, known, every, len(channel.base.prior), settled.noise.innovation, channel.held)

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.compare.pairs import Pair
-    from dbbstation.diagnosis.compare.sides import Sides
+    from dbbstation.diagnosis.compare.pairs import Pair, Sides
     from dbbstation.diagnosis.shapes import Samples
     from dbbstation.inference.levels import Followed
     from dbbstation.inference.settled import Settled

@@ -12,8 +12,7 @@ from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Channel, Law
-from dbbstation.inference.curves import Clock, Spline
-from dbbstation.inference.model_form import modulated
+from dbbstation.inference.forms import Clock, Spline, modulated
 from dbbstation.inference.patterns import CURVES, Family, Pattern, of_blocks
 from dbbstation.inference.triangle import axes_of
 from dbbstation.inference.variables import Kind, Variable

@@ -11,7 +11,7 @@ from pydantic import Field
 from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import AsItIs, Kept
 from dbbstation.facts.value import Value
-from dbbstation.inference.cancelling import Cancelling
+from dbbstation.inference.alternatives import Cancelling
 from dbbstation.inference.levels import Levels
 from dbbstation.inference.verdict import Acts, CatalogueFinding, Gains
 

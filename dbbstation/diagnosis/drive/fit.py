@@ -13,10 +13,10 @@ from scipy.special import log_ndtr
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.channel import NEGATIVE_SIGMA
 from dbbstation.inference.folds import FOLDS
-from dbbstation.inference.impossible import NEGATIVE_SIGMA
 from dbbstation.inference.model_comparison import slices_of
-from dbbstation.inference.named_values import values_of_law
+from dbbstation.inference.read_off import values_of_law
 from dbbstation.inference.triangle import RANK, root, triangle_of
 from dbbstation.inference.verdict import OUT
 

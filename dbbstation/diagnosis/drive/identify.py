@@ -29,12 +29,11 @@ from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.facts.value import Value
+from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.cancelling import cancelling_of
-from dbbstation.inference.detectable import detectable_causes
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
-from dbbstation.inference.levels_of import levels_of
+from dbbstation.inference.levels_of import detectable_causes, levels_of
 from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.verdict import Verdict
 

@@ -13,8 +13,8 @@ from dbbstation.diagnosis.drive.findings import CausePart, Complement
 from dbbstation.diagnosis.drive.fit import fit
 from dbbstation.facts.value import Value
 from dbbstation.inference.channel import NAMED_ODDS
-from dbbstation.inference.curves import Stretches
-from dbbstation.inference.pushes import distinct_sizes, most_of_one_size, pooled
+from dbbstation.inference.forms import Stretches
+from dbbstation.inference.levels import distinct_sizes, most_of_one_size, pooled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

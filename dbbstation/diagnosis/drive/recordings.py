@@ -12,8 +12,8 @@ from dbbstation.diagnosis.drive.contract import Scale
 from dbbstation.diagnosis.drive.moving import impulse_response
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import left_by, rms
 from dbbstation.inference.verdict import OUT
 

@@ -32,7 +32,7 @@ from dbbstation.diagnosis.drive.moving import (
 from dbbstation.diagnosis.drive.sampling import evenly_sampled, stuck_samples
 from dbbstation.diagnosis.drive.travel import resolution_of, retreat_m, turning_points, ways
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.blocks import runs_of
+from dbbstation.inference.square_root import runs_of
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:

@@ -11,10 +11,8 @@ import numpy as np
 from dbbstation.diagnosis.drive.channel import COGGING, COULOMB, METHOD_SHARE, TRANSIENT, acts, source_of
 from dbbstation.diagnosis.drive.findings import CausePart, DriveFinding, UnexplainedForce
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, edges_of, pulse_parts
-from dbbstation.inference.by_level import ambiguous, open_to, with_texts
-from dbbstation.inference.levels import FollowsAnswer
+from dbbstation.inference.levels import MOST_PUSHES, FollowsAnswer, ambiguous, open_to, with_texts
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pushes import MOST_PUSHES
 from dbbstation.inference.read_off import NOT_NEEDED, CauseFinding, CauseJudge, Trial
 from dbbstation.inference.stretches import SHORTEST
 from dbbstation.inference.triangle import rms
@@ -29,8 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.findings import Complement, HeldOutForce
     from dbbstation.diagnosis.drive.pulses import Edges
     from dbbstation.facts.value import Value
-    from dbbstation.inference.by_level import Said
-    from dbbstation.inference.levels import Levels
+    from dbbstation.inference.levels import Levels, Said
     from dbbstation.inference.model_comparison import Cause, Member
 
 

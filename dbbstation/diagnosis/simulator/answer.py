@@ -16,7 +16,7 @@ from dbbstation.diagnosis.simulator.separate import separations
 from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, FittedState, SimulationRuns
 from dbbstation.facts.value import Value, finite
 from dbbstation.inference.chosen_anew import LEAST_PARTS
-from dbbstation.inference.jackknife import refits_without
+from dbbstation.inference.folds import refits_without
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
 from dbbstation.inference.read_off import Trial, read_off

@@ -25,10 +25,10 @@ from dbbstation.diagnosis.simulator.laws import (
 from dbbstation.diagnosis.simulator.noise_left import channel_of, noise_left
 from dbbstation.diagnosis.simulator.work import AGREE, FittedState, RanAwayError
 from dbbstation.inference.bank import alike
-from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Law
-from dbbstation.inference.named_values import named_values
+from dbbstation.inference.read_off import named_values
+from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:

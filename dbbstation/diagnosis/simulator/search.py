@@ -15,7 +15,7 @@ from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.trials import beside
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.bounds import BOUNDS, SIMULATORS
-from dbbstation.inference.named_values import values_of_members
+from dbbstation.inference.read_off import values_of_members
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.triangle import rms

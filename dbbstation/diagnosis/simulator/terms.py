@@ -196,7 +196,7 @@ Step: TypeAlias = "Callable[[tuple[float, float, float], float, float], float]"
 
 
 def _lagging(constant: float) -> Step:
-    """Return a first-order lag [triangle-hold equivalent, as `inference.memory.lagging`], initially settled."""
+    """Return a first-order lag [triangle-hold equivalent, as `inference.bent.lagging`], initially settled."""
     if constant <= 0.0:
         return lambda _past, _t, _now: 0.0
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.model import SimulationRequest
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.blocks import slices
 from dbbstation.inference.bounds import BOUNDS
+from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import rms
 
 if TYPE_CHECKING:

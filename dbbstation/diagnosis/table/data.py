@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.law import law_of
-from dbbstation.inference.bent import bent_laws, grows_with, is_same
+from dbbstation.inference.bent import bent_laws, grows_with, is_same, memory_laws
 from dbbstation.inference.channel import Base, Channel, Law
-from dbbstation.inference.memory import memory_laws
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.variables import STILL, Kind, Variable
 

@@ -13,20 +13,17 @@ from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.facts.value import Value
-from dbbstation.inference.blocks import compress
+from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.cancelling import cancelling_of
-from dbbstation.inference.folds import held_out_error, parts_of, selections_without
+from dbbstation.inference.folds import held_out_error, parts_of, refits_without, selections_without, weighted_jackknife
 from dbbstation.inference.followed import ChosenWithoutParts, WithoutPart, left_with
 from dbbstation.inference.harmonics import noise_of
-from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_of
-from dbbstation.inference.named_values import values_of_members
-from dbbstation.inference.read_off import Trial, read_off
+from dbbstation.inference.read_off import Trial, read_off, values_of_members
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
-from dbbstation.inference.square_root import solve
+from dbbstation.inference.square_root import compress, solve
 from dbbstation.inference.triangle import rms, root
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.verdict import OUT, Verdict, is_worse
@@ -36,7 +33,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Flags, Floats
     from dbbstation.diagnosis.table.data import Table
-    from dbbstation.inference.cancelling import Cancelling
+    from dbbstation.inference.alternatives import Cancelling
     from dbbstation.inference.channel import Channel
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.left_over import LeftOver

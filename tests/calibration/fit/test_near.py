@@ -6,7 +6,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import _near
 from dbbstation.calibration.layout import Layout, ParameterSet
-from dbbstation.inference.blocks import Columns
+from dbbstation.inference.square_root import Columns
 from dbbstation.sources.registry import sources_named
 
 

@@ -10,7 +10,7 @@ from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.facts.value import Value
-from dbbstation.inference.pushes import pooled
+from dbbstation.inference.levels import pooled
 from dbbstation.results.drive import drive_result
 from dbbstation.trace.recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro

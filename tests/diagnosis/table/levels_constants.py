@@ -19,10 +19,10 @@ from unittest import mock
 import numpy as np
 
 from dbbstation.inference import patterns
-from dbbstation.inference.curves import Spline
-from dbbstation.inference.detectable import MARGIN, detectable
 from dbbstation.inference.followed import VariableProbabilities, classes_of, probability_of_any
+from dbbstation.inference.forms import Spline
 from dbbstation.inference.levels import TIME
+from dbbstation.inference.levels_of import MARGIN, detectable
 from dbbstation.inference.settle import settle
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.variables import Kind, Variable

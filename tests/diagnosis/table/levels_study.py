@@ -24,7 +24,7 @@ from scipy.signal import lfilter
 
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
-from dbbstation.inference.curves import Spline
+from dbbstation.inference.forms import Spline
 from dbbstation.inference.levels import TIME, FollowsAnswer
 from dbbstation.inference.variables import Kind, Variable
 from tests.diagnosis.table.nulls import NOISES, null_table

@@ -15,8 +15,7 @@ from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.inference import looks
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
-from dbbstation.inference.folds import parts_of
-from dbbstation.inference.jackknife import refits_without
+from dbbstation.inference.folds import parts_of, refits_without
 from dbbstation.inference.levels import FollowsAnswer
 from dbbstation.inference.read_off import Trial
 from dbbstation.inference.seen import seen

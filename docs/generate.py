@@ -14,7 +14,7 @@ import click
 
 import dbbstation
 from dbbstation.cli import COMMANDS, cli
-from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.places import shipped_folder
 from dbbstation.sources.registry import known_sources
@@ -37,7 +37,7 @@ DESCRIBED = {
 _UNWRAPPED = "\b"
 
 _DRIVE_SOURCES_HEAD = """\
-Every cause of force that `dbbstation identify` looks for, from its own texts in `dbbstation/diagnosis/drive/sources/`. The
+Every cause of force that `dbbstation identify` looks for, from its own texts in `dbbstation/laws/`. The
 names are what `drive --sources` takes."""
 
 _SOURCES_HEAD = """\

@@ -12,7 +12,7 @@ from dbbstation.computing.processes import each
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.drive.identify import identify
-from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.facts.serialise import plain
 from dbbstation.files.recordings.drive_csv import read_drive

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.compiled import in_parallel
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.harmonics import Noise, noise_of
 from dbbstation.inference.square_root import Block, Columns, Solution, compress, lost_directions, solve
-from dbbstation.machine.compiled import in_parallel
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
 from dbbstation.sources.contract import Effect, Fitted, Motion

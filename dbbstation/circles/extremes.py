@@ -17,7 +17,7 @@ from scipy.fft import next_fast_len
 from scipy.special import chndtr, chndtrinc
 
 from dbbstation.circles.form import drawn_lines
-from dbbstation.machine.compiled import compiled
+from dbbstation.computing.compiled import compiled
 from dbbstation.plan.plan import FULL_TURN_DEG
 
 if TYPE_CHECKING:

@@ -184,7 +184,7 @@ _SHOWN_BY_PYTHON = warnings.showwarning
 
 
 def _noted(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:  # noqa: ANN401 - passed on
-    from dbbstation.machine.compiled import NotKeptWarning
+    from dbbstation.computing.compiled import NotKeptWarning
 
     if issubclass(category, NotKeptWarning):
         say(f"note: {message}")

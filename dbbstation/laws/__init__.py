@@ -1,1 +1,1 @@
-"""Laws over columns of tables, drives, simulators' ports and hexapods' struts."""
+"""Laws of friction, play, loads, delay and memory, over columns of tables, drives, ports and struts."""

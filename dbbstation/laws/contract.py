@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from dbbstation.computing.arrays import Floats
 
@@ -85,6 +85,62 @@ class Parameter:
         return 2.0 * grid[0] - grid[-1], 2.0 * grid[-1] - grid[0]
 
 
+@dataclass(frozen=True)
+class Scale:
+    """Sizes of signals over all recordings of a drive, which make amplitudes comparable; initially of a usual drive.
+
+    Attributes:
+        mean_m: mean position of compared samples.
+        reverses: whether a recording changes direction.
+        waves_per_m: strongest residual waves over position [1/m].
+    """
+
+    force_n: float = 100.0
+    speed_m_s: float = 0.1
+    low_m: float = 0.0
+    high_m: float = 0.2
+    mean_m: float = 0.1
+    duration_s: float = 60.0
+    cutoff_hz: float = 20.0
+    sample_s: float = 1e-3
+    reverses: bool = True
+    both_ways: bool = True
+    waves_per_m: tuple[float, ...] = (100.0,)
+    waves_tried: float = 1.0
+
+    @property
+    def travel_m(self) -> float:
+        """Return the distance between the ends of travel [m]."""
+        return self.high_m - self.low_m
+
+
+@dataclass(frozen=True, eq=False)
+class SourceForm:
+    """One form of a cause.
+
+    Attributes:
+        parameters: amplitudes, then nonlinear parameters with an ascending `grid`.
+        columns: as `TableSource.columns`.
+        label: of a form that can coexist with others; may be empty.
+        tried: number of independent forms from which it was picked.
+    """
+
+    parameters: tuple[Parameter, ...]
+    columns: Callable[[Mapping[str, Floats], Mapping[str, float]], Floats]
+    label: str = ""
+    tried: float = 1.0
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """Return the amplitudes."""
+        return tuple(p for p in self.parameters if not p.grid)
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """Return the nonlinear parameters."""
+        return tuple(p for p in self.parameters if p.grid)
+
+
 class PortSource(ABC):
     """A physical cause at a port of a simulator; instances have no state."""
 
@@ -121,6 +177,20 @@ class TableSource(PortSource):
     follows: ClassVar[str] = ""
     """Column over which they depart from the formula; if empty, the first in `needs`."""
 
+    prior_probability: ClassVar[float] = 0.05
+    """Prior probability that it matters in a drive."""
+
+    varies_with: ClassVar[str] = ""
+    """Variable of a drive on which its force depends, as printed; if empty, that of `follows`."""
+
+    def forms(self, scale: Scale) -> tuple[SourceForm, ...]:  # noqa: ARG002
+        """Return forms in a drive; empty if recordings of this scale cannot show the cause."""
+        return (SourceForm(self.parameters(), self.columns),)
+
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
+        """Return whether values are possible in a drive."""
+        return True
+
     @abstractmethod
     def columns(self, variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
         """Return the effect of unit amplitudes, shape (n, p): in the measured unit, in N of a drive, in µm of a strut."""
@@ -131,6 +201,20 @@ class TableSource(PortSource):
         sizes = [parameters[p.name] for p in self.parameters() if not p.grid]
         shapes = {p.name: parameters[p.name] for p in self.parameters() if p.grid}
         return float(self.columns(row, shapes)[0] @ sizes)
+
+
+class ScaledSource(TableSource):
+    """A law whose sizes follow from a drive's recordings; elsewhere they are those of a usual drive."""
+
+    @abstractmethod
+    def forms(self, scale: Scale) -> tuple[SourceForm, ...]:
+        """Return forms; empty if recordings of this scale cannot show the cause."""
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self.forms(Scale())[0].parameters
+
+    def columns(self, variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
+        return self.forms(Scale())[0].columns(variables, shapes)
 
 
 MOVING = {

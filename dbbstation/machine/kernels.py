@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled, inlined
+from dbbstation.computing.compiled import compiled, inlined
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats, Integers

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.compiled import in_blocks
 from dbbstation.errors import KinematicsError
 from dbbstation.machine import kernels
-from dbbstation.machine.compiled import in_blocks
 from dbbstation.machine.geometry import STRUTS, Frames, Hexapod
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.compiled import compiled, inlined
 from dbbstation.errors import MachineError, TravelError
-from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS, Frames, rotation_matrices
 from dbbstation.machine.kinematics import inverse, strut_jacobian
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import bdtrc
 
-from dbbstation.machine.compiled import compiled, inlined
+from dbbstation.computing.compiled import compiled, inlined
 from dbbstation.nc.spilled import Spilled
 from dbbstation.nc.toolpath import DECIMALS, in_last_decimals
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.computing.compiled import compiled
 from dbbstation.errors import StationError
-from dbbstation.machine.compiled import compiled
 from dbbstation.nc.curve import felt_mm, in_mm, row_and_share
 from dbbstation.nc.spilled import forget
 from dbbstation.nc.toolpath import ROWS_AT_ONCE, RowKind, in_pieces

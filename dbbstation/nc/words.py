@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from dbbstation.computing.compiled import compiled
 from dbbstation.errors import StationError
-from dbbstation.machine.compiled import compiled
 from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.spilled import LongText
 from dbbstation.nc.toolpath import RowKind, in_last_decimals, rounded

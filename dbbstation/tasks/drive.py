@@ -74,8 +74,7 @@ def identify(
         StoppedError: `stop` returned True.
     """
     from dbbstation.diagnosis.drive.identify import identify as identified_drive
-    from dbbstation.diagnosis.drive.own import own_force
-    from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
+    from dbbstation.diagnosis.drive.sources import drive_sources_named, known_drive_sources
     from dbbstation.files.own_classes import load_sources
     from dbbstation.files.recordings.drive_csv import given_drive, read_drive
     from dbbstation.laws.contract import MOVING
@@ -85,7 +84,7 @@ def identify(
     named = drive_sources_named(known_drive_sources() if sources is None else tuple(sources))
     own, lacking = load_sources(paths_of(source_files), MOVING, "a recording of a drive")
     replaced = {source.name for source in own}
-    named = (*(source for source in named if source.name not in replaced), *map(own_force, own))
+    named = (*(source for source in named if source.name not in replaced), *own)
     telling.note(*(f"{name} is not compared: {why}" for name, why in lacking.items()))
     given = recordings if isinstance(recordings, tuple) else (recordings,)
     files = [

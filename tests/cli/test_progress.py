@@ -110,7 +110,7 @@ def test_compiling_is_said_once_with_a_bar_that_goes(monkeypatch):
 SOME_KERNEL = """
 import sys
 from dbbstation.computing.compiling import tell_of_compiling
-from dbbstation.machine.compiled import compiled
+from dbbstation.computing.compiled import compiled
 told = []
 tell_of_compiling(told.append)
 def twice(x):

@@ -18,11 +18,11 @@ from dbbstation.calibration.currents import (
 from dbbstation.calibration.fit.directions import Name, in_words, names_of, of_circles, prescribed
 from dbbstation.calibration.fit.nodes import RunNodes, nodes_of, smooth
 from dbbstation.calibration.layout import Layout, lay_out
+from dbbstation.computing.compiled import in_parallel
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.harmonics import Noise, noise_of_turns
 from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
-from dbbstation.machine.compiled import in_parallel
 from dbbstation.model.observation import Observation
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.drive.sources import force, variable_of
 from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.drive.contract import DriveForm, DriveSource, Scale
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.diagnosis.drive.signals import Signals
+    from dbbstation.laws.contract import Scale, SourceForm, TableSource
 
 MASS, VISCOUS = "mass_kg", "viscous_n_s_m"
 BASE_UNITS = {MASS: "kg", VISCOUS: "N·s/m"}
@@ -72,26 +73,26 @@ class DriveChannel:
     recordings: Recordings
     channel: Channel
     scale: Scale
-    sources: dict[str, DriveSource]
-    of_law: dict[str, tuple[DriveSource, DriveForm]]
+    sources: dict[str, TableSource]
+    of_law: dict[str, tuple[TableSource, SourceForm]]
     shortest_wave_mm: float
 
 
 def drive_channel(
     recordings: Recordings,
-    sources: Sequence[DriveSource],
+    sources: Sequence[TableSource],
     base: Sequence[str] = (MASS, VISCOUS),
 ) -> DriveChannel:
     """Make the channel of recordings."""
     variables = _variables(recordings)
     motion = recordings.motion[:, [(MASS, VISCOUS).index(name) for name in base]]
-    simple = [form for source in sources for form in source.forms(recordings.scale) if not form.shapes]
-    straight = np.hstack([motion, *(recordings.compared(lambda s, f=form: f.columns(s, ())) for form in simple)])  # type: ignore[misc]
+    simple = [force(one, form) for one in sources for form in one.forms(recordings.scale) if not form.shapes]
+    straight = np.hstack([motion, *map(recordings.compared, simple)])
     curves = tuple(_beyond(straight, _curves(recordings)))
     if len(recordings.blocks) > 1:
         curves = (*curves, of_blocks(recordings.blocks, len(recordings.force_n)))
     scale, shortest = _first_look(recordings, np.hstack([straight, *(p.samples for p in curves)]))
-    of_law: dict[str, tuple[DriveSource, DriveForm]] = {}
+    of_law: dict[str, tuple[TableSource, SourceForm]] = {}
     laws = []
     for source in sources:
         for form in source.forms(scale):
@@ -157,11 +158,11 @@ def _variables(recordings: Recordings) -> dict[str, Variable]:
 
 
 def _law(
-    name: str, source: DriveSource, form: DriveForm, recordings: Recordings, variables: dict[str, Variable]
+    name: str, source: TableSource, form: SourceForm, recordings: Recordings, variables: dict[str, Variable]
 ) -> Law:
     @cache
     def columns(values: tuple[float, ...]) -> Floats:
-        return recordings.compared(lambda signals: form.columns(signals, values))
+        return recordings.compared(force(source, form, values))
 
     positive = [p.name for p in form.amplitudes if p.positive]
 
@@ -172,7 +173,8 @@ def _law(
         )
 
     odds = np.log(source.prior_probability / (1.0 - source.prior_probability)) - np.log(form.tried)
-    along = "time" if source.varies_with.startswith("time") else "position"
+    variable = variable_of(source)
+    along = "time" if variable.startswith("time") else "position"
     return law_of(
         name,
         form.parameters,
@@ -180,8 +182,8 @@ def _law(
         form_uncertainty=source.form_uncertainty,
         discrepancy=lambda effect, _, __: _departure(effect, variables[along].values),
         log_odds=float(odds),
-        followed=(source.varies_with.removesuffix(" wave").removesuffix(" by direction"),),
-        way="direction" if source.varies_with.endswith(" by direction") else "",
+        followed=(variable.removesuffix(" wave").removesuffix(" by direction"),),
+        way="direction" if variable.endswith(" by direction") else "",
         acts_once=acts(source.name) is Acts.ONCE,
         confirm=source.texts.confirm,
         possible=possible,

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.diagnosis.drive.channel import DriveChannel
-    from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.inference.settled import Settled
+    from dbbstation.laws.contract import TableSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class ExplainedDrive:
     dropped: Mapping[str, str] = field(default_factory=dict)
 
 
-def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> ExplainedDrive:
+def explain(recordings: Recordings, sources: Sequence[TableSource], progress: Callable[[str], None]) -> ExplainedDrive:
     """Compare sets of causes, excluding sets with impossible mass or friction."""
     dropped: dict[str, str] = {}
     for number in range(DRIVES.rounds):

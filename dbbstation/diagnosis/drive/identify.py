@@ -27,6 +27,7 @@ from dbbstation.diagnosis.drive.held_out import held_out
 from dbbstation.diagnosis.drive.limits import VAGUE, DriveLimits, limits_of, mass_is_known, sentences
 from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
+from dbbstation.diagnosis.drive.sources import force, variable_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import cancelling_of
@@ -41,10 +42,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats
-    from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
     from dbbstation.diagnosis.drive.recordings import Recordings
+    from dbbstation.laws.contract import TableSource
     from dbbstation.trace.recording import DriveRecording
 
 HELD_BACK = 0.25
@@ -61,7 +62,7 @@ GRAVITY_M_S2 = 9.81
 @with_one_thread
 def identify(
     recordings: Sequence[DriveRecording],
-    sources: Sequence[DriveSource],
+    sources: Sequence[TableSource],
     cutoff_hz: float | None = None,
     progress: Callable[[str], None] = lambda _: None,
     *,
@@ -107,7 +108,7 @@ def identify(
     base_n, model_n = before.force_n(), after.force_n(predicting)
     chosen = tuple(dict.fromkeys(verdicts.source_of(name) for name in predicting))
     rest = _rest(explained, verdicts, after.force_n(named))
-    follows = explained.drive.sources[chosen[0]].varies_with if chosen else rest.variable
+    follows = variable_of(explained.drive.sources[chosen[0]]) if chosen else rest.variable
     steps = tuple(_steps(explained, verdicts, held_back))
     at_first = {name: _number(value, is_known=known[name]) for name, value in before.base.items()}
     numbers = _numbers(explained, values, known, limits)
@@ -315,9 +316,10 @@ def _curve(explained: ExplainedDrive) -> FrictionCurve:
     if VISCOUS in drive.channel.base.names:
         columns[:, drive.channel.base.names.index(VISCOUS)] = speed
     for name in fitted.laws:
-        if drive.of_law[name][0].varies_with == "speed":
-            shapes = tuple(fitted.parameters(name)[p.name].value for p in drive.of_law[name][1].shapes)
-            columns[:, fitted.columns_of(name)] = drive.of_law[name][1].columns(pretended, shapes)
+        source, form = drive.of_law[name]
+        if variable_of(source) == "speed":
+            shapes = tuple(fitted.parameters(name)[p.name].value for p in form.shapes)
+            columns[:, fitted.columns_of(name)] = force(source, form, shapes)(pretended)
     variance = np.einsum("ij,jk,ik->i", columns, fitted.covariance, columns)
     return FrictionCurve(speed, columns @ fitted.values, np.sqrt(np.maximum(variance, 0.0)))
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS
-from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
 from dbbstation.facts.value import Value
 from dbbstation.inference.triangle import norms, rms
 from dbbstation.inference.verdict import OUT
+from dbbstation.laws.friction import COULOMB_SHARE
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import ExplainedDrive

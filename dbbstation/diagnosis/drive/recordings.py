@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import Scale
 from dbbstation.diagnosis.drive.moving import impulse_response
 from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
@@ -16,6 +15,7 @@ from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import left_by, rms
 from dbbstation.inference.verdict import OUT
+from dbbstation.laws.contract import Scale
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import ExplainedDrive
     from dbbstation.diagnosis.drive.findings import Complement, HeldOutForce
     from dbbstation.diagnosis.drive.pulses import Edges
     from dbbstation.facts.value import Value
     from dbbstation.inference.levels import Levels, Said
     from dbbstation.inference.model_comparison import Cause, Member
+    from dbbstation.laws.contract import TableSource
 
 
 class Verdicts(CauseJudge):
@@ -150,7 +150,7 @@ class Verdicts(CauseJudge):
             return found
         return dict.fromkeys(found, ()) | {next(iter(found)): [part.parameters["force_n"] for part in self._pulses]}
 
-    def _finding(self, source: DriveSource) -> DriveFinding:
+    def _finding(self, source: TableSource) -> DriveFinding:
         own = self._of[source.name]
         there = [f for f in own if f.verdict.may_be_there and f.name in self.named]
         none = CauseFinding(name="", verdict=Verdict.RULED_OUT)
@@ -186,7 +186,7 @@ class Verdicts(CauseJudge):
             gains=gains,
         )
 
-    def _said(self, source: DriveSource, own: Sequence[CauseFinding], there: Sequence[CauseFinding]) -> Said:
+    def _said(self, source: TableSource, own: Sequence[CauseFinding], there: Sequence[CauseFinding]) -> Said:
         alike = self._others(source, there or own)
         if there and source.name == COULOMB and not self._several:
             alike = (*alike, "viscous friction")
@@ -225,7 +225,7 @@ class Verdicts(CauseJudge):
     def _probability(self, own: Sequence[CauseFinding]) -> float:
         return max([self._settled.probability([f.name for f in own]), *(f.probability for f in own)])
 
-    def _others(self, source: DriveSource, findings: Sequence[CauseFinding]) -> tuple[str, ...]:
+    def _others(self, source: TableSource, findings: Sequence[CauseFinding]) -> tuple[str, ...]:
         names, impossible = set(), {f.name for f in self._raw if f.verdict is Verdict.RULED_OUT}
         for finding in findings:
             for other in {*finding.equivalent, *finding.ambiguous_with} - {finding.name, *impossible}:
@@ -234,7 +234,7 @@ class Verdicts(CauseJudge):
                     names.add(theirs or f"a force that follows {other.split(' over ')[-1].split(',')[0]}")
         return tuple(sorted(names))
 
-    def _not_there(self, source: DriveSource, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
+    def _not_there(self, source: TableSource, own: Sequence[CauseFinding]) -> tuple[Verdict, str]:
         looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}
         if why := self._hidden(source, own):
             return Verdict.NOT_TESTABLE, why
@@ -250,7 +250,7 @@ class Verdicts(CauseJudge):
             return verdict, why
         return Verdict.RULED_OUT, refused or NOT_NEEDED
 
-    def _hidden(self, source: DriveSource, own: Sequence[CauseFinding]) -> str:
+    def _hidden(self, source: TableSource, own: Sequence[CauseFinding]) -> str:
         scale = self._drive.scale
         if faint := [f for f in own if f.name in self._members]:
             return f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."

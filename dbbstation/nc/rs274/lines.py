@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled, inlined
+from dbbstation.computing.compiled import compiled, inlined
 from dbbstation.nc.spilled import BLOCK_BYTES, forget
 
 if TYPE_CHECKING:

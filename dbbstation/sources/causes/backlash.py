@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.laws.play import PlayState, followed, leaning
+from dbbstation.laws.presliding import WoundState, wound, wound_up
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
     MM_PER_UM,
@@ -20,7 +22,6 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.presliding import PlayState, WoundState, followed, leaning, wound, wound_up
 from dbbstation.sources.laws.unlike_struts import of_several_lengths
 
 if TYPE_CHECKING:

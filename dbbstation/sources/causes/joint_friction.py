@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.laws.play import PlayState, followed, leaning
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
 from dbbstation.sources.contract import (
@@ -19,7 +20,6 @@ from dbbstation.sources.contract import (
     Texts,
     of_each_strut,
 )
-from dbbstation.sources.laws.presliding import PlayState, followed, leaning
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erf
 
-from dbbstation.machine.compiled import compiled
+from dbbstation.computing.compiled import compiled
+from dbbstation.laws.play import PlayState, leaning
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import (
     motor_loads,
@@ -31,7 +32,6 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.presliding import PlayState, leaning
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled, inlined
+from dbbstation.computing.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
     MM_PER_UM,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled
+from dbbstation.computing.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
     SMOOTH_MM,

@@ -1,1 +1,1 @@
-"""Laws shared by causes: warm-up, thermometers, play, speed, screws, weights."""
+"""What causes share: warm-up, thermometers, turning points, speed, screws, weights."""

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from dbbstation.errors import ModelError
+from dbbstation.laws.memory import warmed, warmed_by_constant
 from dbbstation.sources.contract import Effect, ErrorSource, LinearSource, Motion, Need, Parameter
 
 if TYPE_CHECKING:
@@ -258,25 +259,6 @@ def grown_by(motion: Motion, values: Floats) -> Floats:
     by_constant = growth * warmed_by_constant(time_s, constant_s)
     by_constant = by_constant - loss * _paused(motion, constant_s, warmed_by_constant)
     return np.column_stack([warmed(time_s, constant_s), by_constant, -_paused(motion, constant_s, warmed)])
-
-
-def warmed(time_s: Floats, constant_s: float) -> Floats:
-    """Return the completed share of a warm-up, 1 - exp(-t / tau), shape (n,) [1].
-
-    It is zero before t = 0; a time constant of zero or less gives a step.
-    """
-    since = np.maximum(time_s, 0.0)
-    if constant_s <= 0.0:
-        return np.where(since > 0.0, 1.0, 0.0)
-    return -np.expm1(-since / constant_s)
-
-
-def warmed_by_constant(time_s: Floats, constant_s: float) -> Floats:
-    """Return the derivative of `warmed` by the constant, -t / tau² exp(-t / tau), shape (n,) [1/s]."""
-    if constant_s <= 0.0:
-        return np.zeros(len(time_s))
-    ratio = np.maximum(time_s, 0.0) / constant_s
-    return -ratio * np.exp(-ratio) / constant_s
 
 
 def pauses_s(motion: Motion) -> list[tuple[float, float]]:

@@ -12,7 +12,7 @@ from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.sampling import evenly_sampled
 from dbbstation.diagnosis.drive.signals import signals_of
-from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
+from dbbstation.diagnosis.drive.sources import drive_sources_named, known_drive_sources
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.results.drive import drive_result
 from dbbstation.trace.recording import DriveRecording

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.drive.identify import identify
-from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.results.drive import drive_result
 from dbbstation.trace.recording import DriveRecording

@@ -8,7 +8,7 @@ import pytest
 from dbbstation.diagnosis.drive.findings import CausePart
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.pulses import complement_of, distinct_pushes, equal_pushes
-from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.facts.value import Value
 from dbbstation.inference.levels import pooled
 from dbbstation.results.drive import drive_result

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.laws.play import followed, leaning
 from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
 from dbbstation.sources.contract import Fitted
-from dbbstation.sources.laws.presliding import followed, leaning
 from tests.sources.runs import concealed_share, jig_runs, random_run, run
 
 BACKLASH = Backlash()

@@ -10,13 +10,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import ModelError
+from dbbstation.laws.play import leaning
 from dbbstation.machine.geometry import Compliance, Frames
 from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.joint_friction import WIND_UP_RAD, JointFriction, friction_drag, outer_axes, resistance
 from dbbstation.sources.contract import Fitted, Motion
-from dbbstation.sources.laws.presliding import leaning
 from tests.plant.linear import LinearSession
 from tests.plant.mechanisms.joints import JointFriction as FrictionOfPlant
 from tests.plant.plan import table_ii_plan

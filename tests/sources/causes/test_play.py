@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
+from dbbstation.laws.play import leaning
 from dbbstation.machine.geometry import Compliance, Frames, StrutMasses
 from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.model.compensation import compensated
@@ -16,7 +17,6 @@ from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.gravity import Gravity
 from dbbstation.sources.causes.play import Play, settled
 from dbbstation.sources.contract import Fitted
-from dbbstation.sources.laws.presliding import leaning
 from tests.sources.runs import BORES_MM, JIG_TESTS, LEVELS_MM, random_machine, random_run, run
 
 PLAY = Play()

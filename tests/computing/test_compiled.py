@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import dbbstation
+from dbbstation.computing import compiled as module
+from dbbstation.computing.compiled import NotKeptWarning, compiled
 from dbbstation.files.places import shipped_folder
-from dbbstation.machine import compiled as module
-from dbbstation.machine.compiled import NotKeptWarning, compiled
 
 
 def of_no_file(name):

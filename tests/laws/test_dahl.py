@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.sources.laws.presliding import wound, wound_up
+from dbbstation.laws.presliding import wound, wound_up
 
 
 def side_of(travel, length, state=None):

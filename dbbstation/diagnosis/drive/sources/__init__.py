@@ -1,1 +1,0 @@
-"""Causes beyond mass and viscous friction, one per file."""

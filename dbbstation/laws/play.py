@@ -1,0 +1,134 @@
+"""Play between drive and load: the play operator, and the load that is missing within the play."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.computing.compiled import compiled
+from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm, Texts
+from dbbstation.laws.friction import MOST_OF_COULOMB
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.computing.arrays import Floats
+
+GAP_SHARES = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
+"""Tried plays, over the travel."""
+
+RISES = (0.25, 1.0, 2.0)
+"""Tried travels over which the load returns, over the play."""
+
+
+class LostMotion(ScaledSource):
+    """After a reversal the load is missing until the play is crossed: F = -F_l sign(v) r(d).
+
+    r is 1 within the travel g, then falls to 0 over w. If F_l equals the Coulomb friction, all friction is behind the
+    play.
+    """
+
+    name = "lost-motion"
+    needs = ("since_reversal_mm", "direction")
+    form_uncertainty = 0.2  # contacts close gradually, and play is seldom the same at both ends of a travel
+    texts = Texts(
+        what="Between drive and load there is play or an elastic lash: after a reversal the drive moves over it before "
+        "the load, or its friction, is felt.",
+        shows="After every reversal the force stays near zero over the same travel before it rises to its new level.",
+        confirm="Reverse slowly and read force over position: a flat stretch near zero force of the same length at both "
+        "ends; measure the load itself with a dial gauge.",
+        cure="Preload nut and couplings; replace worn joints; backlash compensation in the control.",
+        equation="F = -F_l sign(v) r(d), r = 1 for d < g, then falling to 0 over w, d the travel since the reversal",
+        origin="Nordin and Gutman, Controlling mechanical systems with backlash, Automatica 38 (2002) 1633, sec. 2",
+    )
+
+    def forms(self, scale: Scale) -> tuple[SourceForm, ...]:
+        if not (scale.reverses and scale.both_ways):
+            return ()
+        size = Parameter("lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True)
+        gaps = tuple(1e3 * share * scale.travel_m for share in GAP_SHARES)
+        gap = Parameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play", gaps)
+        rise = Parameter("rise_per_gap", "1", 1.0, "way over which the load comes back, over the play", RISES)
+        return (SourceForm((size, gap, rise), _missing),)
+
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
+        return values["lost_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
+
+
+def _missing(variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
+    gap_mm, rise = shapes["gap_mm"], shapes["rise_per_gap"]
+    share = np.clip((gap_mm * (1.0 + rise) - variables["since_reversal_mm"]) / (gap_mm * rise), 0.0, 1.0)
+    return -(variables["direction"] * share)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class PlayState:
+    """State of m columns in their play.
+
+    Attributes:
+        place: output y, in the travel's unit, shape (m,); NaN before the first row.
+        side: derivative of y - x by width, -1/2 to 1/2, shape (m,); initially the end given by the first motion.
+    """
+
+    place: Floats
+    side: Floats
+
+
+def leaning(travel: Floats) -> PlayState:
+    """Return the initial state of a run that begins in motion.
+
+    `side` is -1/2 for a growing column, +1/2 for a shrinking one, 0 at rest.
+    """
+    side = np.zeros(travel.shape[1])
+    _lean(np.ascontiguousarray(travel), side)
+    return PlayState(np.full(travel.shape[1], np.nan), side)
+
+
+def followed(travel: Floats, width: Floats, state: PlayState) -> tuple[Floats, Floats, PlayState]:
+    """Apply the play operator: y_k is y_{k-1} limited to x_k - w/2 ... x_k + w/2.
+
+    Returns:
+        Error y - x and its derivative by the width, shapes (n, m), and the state after the last row.
+    """
+    lag, by_width = np.empty_like(travel), np.empty_like(travel)
+    place, side = state.place.copy(), state.side.copy()
+    _follow(np.ascontiguousarray(travel), width, place, side, lag, by_width)
+    return lag, by_width, PlayState(place, side)
+
+
+@compiled
+def _lean(travel: Floats, side: Floats) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        k = 1
+        while k < count and travel[k, i] == travel[0, i]:
+            k += 1
+        if k < count:
+            side[i] = -0.5 if travel[k, i] > travel[0, i] else 0.5
+
+
+@compiled
+def _follow(
+    travel: Floats,
+    width: Floats,
+    place: Floats,
+    side: Floats,
+    lag: Floats,
+    by_width: Floats,
+) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        half = 0.5 * width[i]
+        at, end = place[i], side[i]
+        if count > 0 and np.isnan(at):
+            at = travel[0, i] + end * width[i]
+        for k in range(count):
+            if at < travel[k, i] - half:
+                at, end = travel[k, i] - half, -0.5
+            elif at > travel[k, i] + half:
+                at, end = travel[k, i] + half, 0.5
+            lag[k, i] = at - travel[k, i]
+            by_width[k, i] = end
+        place[i], side[i] = at, end

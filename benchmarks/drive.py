@@ -17,7 +17,7 @@ from benchmarks.measuring import Row, show, timed  # isort: skip - sets up the e
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.sources import known_drive_sources
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 SECONDS, QUICK_SECONDS = 25.0, 8.0

@@ -16,7 +16,7 @@ from dbbstation.cli.lazy import RENAMED, RENAMED_FLAGS, LazyGroup
 from dbbstation.cli.log import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.cli.output import echo, say
 from dbbstation.cli.progress import Compiling
-from dbbstation.computing.compiling import tell_of_compiling
+from dbbstation.computing.compiled import tell_of_compiling
 from dbbstation.errors import InputError, StationError, in_a_sentence
 from dbbstation.files.inputs import input_book, virtual_so_far
 from dbbstation.system.signals import politely_ended

@@ -2,20 +2,51 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import threading
 import warnings
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from dbbstation.computing.compiling import listen_to_compiler
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from concurrent.futures import ThreadPoolExecutor
+
+
+_told: list[Callable[[bool], None]] = []
+
+
+def tell_of_compiling(tell: Callable[[bool], None]) -> None:
+    """Call `tell` with True before and False after this process compiles a loop."""
+    _told[:] = [tell]
+
+
+def listen_to_compiler() -> None:
+    """Report compilations to the listeners; code loaded from disk causes no report."""
+    from numba.core import event  # noqa: PLC0415 - a third of a second, of which the compiler's user has paid already
+
+    class CompileListener(event.Listener):
+        """Counts nested compilations."""
+
+        def __init__(self) -> None:
+            self.depth = 0
+
+        def on_start(self, _: object) -> None:
+            self.depth += 1
+            if self.depth == 1:
+                for tell in _told:
+                    tell(True)  # noqa: FBT003 - begun
+
+        def on_end(self, _: object) -> None:
+            self.depth -= 1
+            if self.depth == 0:
+                for tell in _told:
+                    tell(False)  # noqa: FBT003 - ended
+
+    event.register("numba:compile", CompileListener())  # type: ignore[no-untyped-call]
+
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -88,6 +119,8 @@ _listen = cache(listen_to_compiler)
 
 @cache
 def _say_not_kept() -> None:
+    import multiprocessing  # noqa: PLC0415 - the same
+
     if multiprocessing.parent_process() is None:
         warnings.warn(NOT_KEPT, NotKeptWarning, stacklevel=2)
 
@@ -122,6 +155,8 @@ def in_parallel(work: Callable[[Item], Result], items: Iterable[Item], poses: in
 
 @cache
 def _pool() -> ThreadPoolExecutor:
+    from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - every command imports this module
+
     return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix=_WORKER)
 
 

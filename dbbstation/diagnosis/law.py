@@ -9,26 +9,25 @@ import numpy as np
 from dbbstation.inference.channel import Law
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from dbbstation.computing.arrays import Floats
-    from dbbstation.sources.contract import Parameter
+    from dbbstation.laws.contract import SourceForm
 
 
 def law_of(
     name: str,
-    parameters: Sequence[Parameter],
+    form: SourceForm,
     columns: Callable[[tuple[float, ...]], Floats],
     **further: Any,  # noqa: ANN401 - fields of `Law`
 ) -> Law:
     """Return a law.
 
     Args:
-        parameters: amplitudes, and nonlinear parameters with a `grid`.
         columns: function from nonlinear parameters to columns of amplitudes, shape (n, p).
         further: other fields of `Law`.
     """
-    amplitudes, shapes = [p for p in parameters if not p.grid], [p for p in parameters if p.grid]
+    amplitudes, shapes = form.amplitudes, form.shapes
     return Law(
         name=name,
         columns=columns,

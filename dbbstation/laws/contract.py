@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from dbbstation.computing.arrays import Floats
 
@@ -140,6 +140,11 @@ class SourceForm:
         """Return the nonlinear parameters."""
         return tuple(p for p in self.parameters if p.grid)
 
+    def at(self, variables: Mapping[str, Floats], point: Iterable[float]) -> Floats:
+        """Return the effect of unit amplitudes at nonlinear parameters, shape (n, p)."""
+        named = zip((p.name for p in self.shapes), point, strict=True)
+        return np.asarray(self.columns(variables, dict(named)), dtype=np.float64)
+
 
 class PortSource(ABC):
     """A physical cause at a port of a simulator; instances have no state."""
@@ -198,13 +203,16 @@ class TableSource(PortSource):
     def value(self, t: float, signals: Mapping[str, float], parameters: Mapping[str, float]) -> float:
         """Return the value at the port, the effect over one row."""
         row = {name: np.array([t if name == "t_s" else signals[name]]) for name in self.needs}
-        sizes = [parameters[p.name] for p in self.parameters() if not p.grid]
-        shapes = {p.name: parameters[p.name] for p in self.parameters() if p.grid}
-        return float(self.columns(row, shapes)[0] @ sizes)
+        form = SourceForm(self.parameters(), self.columns)
+        sizes = [parameters[p.name] for p in form.amplitudes]
+        return float(form.at(row, [parameters[p.name] for p in form.shapes])[0] @ sizes)
 
 
 class ScaledSource(TableSource):
-    """A law whose sizes follow from a drive's recordings; elsewhere they are those of a usual drive."""
+    """A law whose sizes follow from a drive's recordings; elsewhere they are those of a usual drive.
+
+    Only its first form acts elsewhere; a law without a form acts in drives only.
+    """
 
     @abstractmethod
     def forms(self, scale: Scale) -> tuple[SourceForm, ...]:

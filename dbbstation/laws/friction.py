@@ -149,12 +149,12 @@ class StribeckFriction(ScaledSource):
         size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True)
         speeds = tuple(share * scale.speed_m_s for share in STRIBECK_SHARES)
         speed = Parameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left", speeds)
-
-        def columns(v: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
-            share = np.exp(-1e-3 * np.abs(v["speed_mm_s"]) / shapes[speed.name])
-            return (v["direction"] * share)[:, None]
-
-        return (SourceForm((size, speed), columns),)
+        return (
+            SourceForm(
+                (size, speed),
+                lambda v, k: (v["direction"] * np.exp(-1e-3 * np.abs(v["speed_mm_s"]) / k[speed.name]))[:, None],
+            ),
+        )
 
 
 POWERS = (1.5, 2.0, 2.5, 3.0)
@@ -185,10 +185,12 @@ class PowerLawFriction(ScaledSource):
         power = Parameter("power", "1", 1.0, "exponent of the speed", POWERS)
         top = 1e3 * scale.speed_m_s
 
-        def columns(v: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
-            return (v["direction"] * (np.abs(v["speed_mm_s"]) / top) ** shapes[power.name])[:, None]
-
-        return (SourceForm((size, power), columns),)
+        return (
+            SourceForm(
+                (size, power),
+                lambda v, k: (v["direction"] * (np.abs(v["speed_mm_s"]) / top) ** k[power.name])[:, None],
+            ),
+        )
 
 
 DRIFT_SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 5.0)

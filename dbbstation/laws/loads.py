@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm, TableSource, Texts
+from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -102,7 +102,7 @@ def _wave(variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Float
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-class TransientForce(TableSource):
+class TransientForce(ScaledSource):
     """Pulses and steps: F = sum of a_k over t_k to t_k + d_k.
 
     The source has no form, because the comparison searches for stretches (`dbbstation/inference/stretches.py`).
@@ -124,9 +124,3 @@ class TransientForce(TableSource):
 
     def forms(self, scale: Scale) -> tuple[SourceForm, ...]:  # noqa: ARG002
         return ()
-
-    def parameters(self) -> tuple[Parameter, ...]:
-        return ()
-
-    def columns(self, variables: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:  # noqa: ARG002
-        return np.zeros((len(variables["t_s"]), 0))

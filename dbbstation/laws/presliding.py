@@ -55,11 +55,12 @@ class Presliding(ScaledSource):
         lengths = tuple(1e3 * share * scale.travel_m for share in LENGTH_SHARES)
         meaning = "travel after which 37 % are left of it"
         length = Parameter("length_mm", "mm", 1e3 * 0.01 * scale.travel_m, meaning, lengths)
-
-        def columns(v: Mapping[str, Floats], shapes: Mapping[str, float]) -> Floats:
-            return -2.0 * (v["direction"] * to_turn(v["since_reversal_mm"], shapes[length.name]))[:, None]
-
-        return (SourceForm((size, length), columns),)
+        return (
+            SourceForm(
+                (size, length),
+                lambda v, k: -2.0 * (v["direction"] * to_turn(v["since_reversal_mm"], k[length.name]))[:, None],
+            ),
+        )
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)

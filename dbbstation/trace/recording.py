@@ -61,24 +61,6 @@ class Recording(WithLogged):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class DriveRecording:
-    """Samples of one drive, in time order.
-
-    Attributes:
-        position_mm: along the axis, shape (n,).
-        force_n: driving, positive towards greater positions, shape (n,).
-    """
-
-    name: str
-    t_s: Floats
-    position_mm: Floats
-    force_n: Floats
-
-    def __len__(self) -> int:
-        return len(self.t_s)
-
-
 _OFF = 0.25
 """Largest deviation of a spacing from a whole number of periods [periods]; a device's clock deviates by hundredths."""
 

@@ -109,7 +109,7 @@ def test_compiling_is_said_once_with_a_bar_that_goes(monkeypatch):
 
 SOME_KERNEL = """
 import sys
-from dbbstation.computing.compiling import tell_of_compiling
+from dbbstation.computing.compiled import tell_of_compiling
 from dbbstation.computing.compiled import compiled
 told = []
 tell_of_compiling(told.append)

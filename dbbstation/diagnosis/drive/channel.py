@@ -177,7 +177,7 @@ def _law(
     along = "time" if variable.startswith("time") else "position"
     return law_of(
         name,
-        form.parameters,
+        form,
         columns,
         form_uncertainty=source.form_uncertainty,
         discrepancy=lambda effect, _, __: _departure(effect, variables[along].values),

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.computing.threads import with_one_thread
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS, METHOD_SHARE, VISCOUS
-from dbbstation.diagnosis.drive.explain import explain
+from dbbstation.diagnosis.drive.explain import explain, held_out, locate
 from dbbstation.diagnosis.drive.findings import (
     DriveFinding,
     DriveFindings,
@@ -23,12 +23,9 @@ from dbbstation.diagnosis.drive.findings import (
     UnexplainedForces,
 )
 from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
-from dbbstation.diagnosis.drive.held_out import held_out
-from dbbstation.diagnosis.drive.limits import VAGUE, DriveLimits, limits_of, mass_is_known, sentences
-from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.sources import force, variable_of
-from dbbstation.diagnosis.drive.verdicts import Verdicts
+from dbbstation.diagnosis.drive.verdicts import VAGUE, DriveLimits, Verdicts, limits_of, mass_is_known, sentences
 from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import cancelling_of
 from dbbstation.inference.bounds import BOUNDS
@@ -46,7 +43,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.findings import UnexplainedForce
     from dbbstation.diagnosis.drive.recordings import Recordings
     from dbbstation.laws.contract import TableSource
-    from dbbstation.trace.recording import DriveRecording
+    from dbbstation.trace.drive import DriveRecording
 
 HELD_BACK = 0.25
 """Final share of the recordings, held out to judge predictions."""

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.moving import impulse_response
-from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
+from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, impulse_response, signals_of
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.square_root import slices
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
     from dbbstation.diagnosis.drive.signals import Signals
-    from dbbstation.trace.recording import DriveRecording
+    from dbbstation.trace.drive import DriveRecording
 
 AGAINST = 0.3
 """Negative correlation with speed that proves a wrong sign: a tenth of the squared force. A delay in a drive with

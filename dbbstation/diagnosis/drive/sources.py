@@ -55,10 +55,4 @@ def variable_of(source: TableSource) -> str:
 
 def force(source: TableSource, form: SourceForm, shapes: tuple[float, ...] = ()) -> Callable[[Signals], Floats]:
     """Return the function from a recording to forces per amplitude, shape (n, p) [N], for nonlinear parameters."""
-    named = {p.name: value for p, value in zip(form.shapes, shapes, strict=True)}
-
-    def of(signals: Signals) -> Floats:
-        given = {name: COLUMNS[name](signals) for name in source.needs}
-        return np.asarray(form.columns(given, named), dtype=np.float64)
-
-    return of
+    return lambda signals: form.at({name: COLUMNS[name](signals) for name in source.needs}, shapes)

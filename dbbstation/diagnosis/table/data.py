@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from dbbstation.inference.bent import bent_laws, grows_with, is_same, memory_law
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.triangle import rms
 from dbbstation.inference.variables import STILL, Kind, Variable
+from dbbstation.laws.contract import SourceForm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -124,18 +126,16 @@ class Table:
         return bool(np.ptp(self.simulated) > 0.0) and not any(is_same(v.values, self.simulated) for v in self.variables)
 
     def _law(self, source: TableSource) -> Law:
-        parameters = source.parameters()
-        shaped = [p.name for p in parameters if p.grid]
+        form = SourceForm(source.parameters(), source.columns)
         given = {name: self.columns[name] for name in source.needs}
         along = source.follows or (source.needs[0] if source.needs else "")
         follows = next((v for v in self.variables if v.name == along), None)
         if follows is None and along in self.columns:
             follows = Variable(along, "", Kind.ANY, self.columns[along])
 
-        def columns(point: tuple[float, ...]) -> Floats:
-            return np.asarray(source.columns(given, dict(zip(shaped, point, strict=True))), dtype=np.float64)
-
-        return law_of(source.name, parameters, columns, form_uncertainty=source.form_uncertainty, follows=follows)
+        return law_of(
+            source.name, form, partial(form.at, given), form_uncertainty=source.form_uncertainty, follows=follows
+        )
 
 
 def _sizes_of_noise(

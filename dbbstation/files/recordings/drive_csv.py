@@ -13,7 +13,7 @@ from dbbstation.errors import MOST_FAULTS, Faults, InputError, Problem, refuse
 from dbbstation.files.formats.number_language import PLAIN
 from dbbstation.files.recordings.table_csv import given_table, parse_table
 from dbbstation.files.source_text import LARGEST_TABLE, first_line, numbered_lines, shortened, text_of
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -18,7 +18,7 @@ from scipy.signal import butter, sosfilt
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.results.drive import drive_result
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 from tests.diagnosis.drive.plant import RATE_HZ, Truth, record, to_and_fro
 
 if TYPE_CHECKING:

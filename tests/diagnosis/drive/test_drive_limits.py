@@ -15,7 +15,7 @@ from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources import drive_sources_named, known_drive_sources
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.results.drive import drive_result
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 from tests.diagnosis.drive.plant import Truth, at_constant_speed, record, to_and_fro
 
 DRY = Truth(mass_kg=80.0, viscous=200.0, coulomb=20.0)

@@ -15,7 +15,7 @@ from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.results.drive import drive_result
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 
 pytestmark = pytest.mark.slow
 

@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_coeffs
 
-from dbbstation.diagnosis.drive.moving import (
+from dbbstation.diagnosis.drive.signals import (
+    LEAST_SHARE,
+    derivatives,
     edge_noise_m_s2,
     half_window,
     impulse_response,
     low_passed,
     rise_of_weights,
+    signals_of,
     speed_noise_m_s,
     weights,
     within,
 )
-from dbbstation.diagnosis.drive.signals import LEAST_SHARE, derivatives, signals_of
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 RATE_HZ, CUTOFF_HZ = 1000.0, 40.0

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from dbbstation.diagnosis.drive.pulses import Edges
 from dbbstation.diagnosis.drive.signals import signals_of
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 

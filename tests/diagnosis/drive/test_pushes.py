@@ -12,7 +12,7 @@ from dbbstation.diagnosis.drive.sources import known_drive_sources
 from dbbstation.facts.value import Value
 from dbbstation.inference.levels import pooled
 from dbbstation.results.drive import drive_result
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.drive.recordings import EACH_WAY, recordings_of
+from dbbstation.diagnosis.drive.sampling import resolution_of, turning_points, ways
 from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources import known_drive_sources
-from dbbstation.diagnosis.drive.travel import resolution_of, turning_points, ways
-from dbbstation.trace.recording import DriveRecording
+from dbbstation.trace.drive import DriveRecording
 
 RATE_HZ = 100.0
 

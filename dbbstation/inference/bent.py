@@ -8,12 +8,14 @@ from itertools import permutations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Law
-from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, odds_of_driven, one_of, play
+from dbbstation.inference.patterns import DISTINCT, TRANSITS, Family, log_odds, odds_of_driven, one_of
 from dbbstation.inference.variables import TRAVELS, Kind
+from dbbstation.laws.memory import lagging
+from dbbstation.laws.play import within
+from dbbstation.laws.time_skew import delayed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -122,28 +124,13 @@ def _delay(variable: Variable, time: Floats, blocks: Sequence[slice], point: tup
     found = np.zeros((len(time), 2))
     for rows in blocks:
         values, at = variable.travel(rows), time[rows]
-        ago = np.interp(at - point[0], at, values)
-        found[rows] = np.column_stack([ago - _middle(variable), ago - values])
+        behind = delayed(values, at, point[0])
+        found[rows] = np.column_stack([values - _middle(variable) + behind, behind])
     return found
 
 
 def _middle(variable: Variable) -> float:
     return 0.5 * (variable.low + variable.high)
-
-
-def lagging(values: Floats, time: Floats, constant: float) -> Floats:
-    """Return values after a first-order lag minus values before it, shape (n,); the initial state is steady.
-
-    Args:
-        constant: in `time`'s unit.
-    """
-    # The result is exact for linear interpolation [triangle-hold equivalent: Franklin, Powell and Workman, Digital
-    # Control of Dynamic Systems, 3rd ed., sec. 6.3.2].
-    steps = np.diff(time)
-    fades = np.exp(-steps / constant)
-    falls = np.diff(values) * (constant / steps) * -np.expm1(-steps / constant)
-    recursion = np.vstack([np.ones(len(values)), np.append(-fades, 0.0)])
-    return solve_banded((1, 0), recursion, np.append(0.0, -falls))
 
 
 WIDTHS = {
@@ -373,7 +360,7 @@ def _integral(
 
 
 def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, unit: str, members: int) -> Law:
-    turned = [one.directions(blocks), *(play(one.values, blocks, share * one.extent) for share in TRANSITS[:-1])]
+    turned = [one.directions(blocks), *(within(one.values, blocks, share * one.extent) for share in TRANSITS[:-1])]
     labels = ("at once", *(f"over {share * one.extent:.3g} {one.unit}".strip() for share in TRANSITS[:-1]))
     samples = np.column_stack(turned) * by.values[:, None]
     return Law(

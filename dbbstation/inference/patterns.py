@@ -11,6 +11,7 @@ import numpy as np
 
 from dbbstation.inference.forms import Form, Power, SignForm, Spline, Walk, Wave
 from dbbstation.inference.variables import TRAVELS, Kind
+from dbbstation.laws.play import within
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -243,7 +244,7 @@ def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: Floats) -> Pa
     # A row at a turning point may belong to the old or the new direction.
     arriving = variable.arriving(blocks)
     leaving = np.concatenate([np.append(arriving[rows][1:], arriving[rows][-1:]) for rows in blocks])
-    samples = np.column_stack([sign, arriving, leaving, *(play(variable.values, blocks, width) for width in widths)])
+    samples = np.column_stack([sign, arriving, leaving, *(within(variable.values, blocks, width) for width in widths)])
     labels = (
         "at once",
         "at once, a row later",
@@ -255,23 +256,6 @@ def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: Floats) -> Pa
 
 TRANSITS = (0.003, 0.01, 0.03, 0.1)
 """Travels after a reversal over which hysteresis changes sides, in shares of the range."""
-
-
-def play(values: Floats, blocks: Sequence[slice], width: float) -> Floats:
-    """Return the position within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; blocks start in the middle."""
-    found = np.empty(len(values))
-    for rows in blocks:
-        own = values[rows]
-        rises = np.diff(own) >= 0.0
-        turns = np.concatenate([[0], np.flatnonzero(rises[1:] != rises[:-1]) + 1])
-        # Between turning points motion is monotonic, so the position follows from the last turning point.
-        there, last = [0.0], 0.0
-        for change in np.diff(own[turns]).tolist():
-            last = min(max(last + 2.0 * change / width, -1.0), 1.0)
-            there.append(last)
-        leg = np.searchsorted(turns, np.arange(len(own)), side="right") - 1
-        found[rows] = np.clip(np.array(there)[leg] + 2.0 * (own - own[turns][leg]) / width, -1.0, 1.0)
-    return found
 
 
 def _speed(

@@ -12,7 +12,7 @@ from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm,
 from dbbstation.laws.friction import MOST_OF_COULOMB
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
 
@@ -86,15 +86,21 @@ def leaning(travel: Floats) -> PlayState:
     return PlayState(np.full(travel.shape[1], np.nan), side)
 
 
-def followed(travel: Floats, width: Floats, state: PlayState) -> tuple[Floats, Floats, PlayState]:
+def followed(
+    travel: Floats, width: Floats, state: PlayState, load: Floats | None = None, friction: float = np.inf
+) -> tuple[Floats, Floats, PlayState]:
     """Apply the play operator: y_k is y_{k-1} limited to x_k - w/2 ... x_k + w/2.
+
+    Args:
+        load: on the driven side, shape (n, m); beyond the friction, it holds the play at the end of its sign.
 
     Returns:
         Error y - x and its derivative by the width, shapes (n, m), and the state after the last row.
     """
     lag, by_width = np.empty_like(travel), np.empty_like(travel)
     place, side = state.place.copy(), state.side.copy()
-    _follow(np.ascontiguousarray(travel), width, place, side, lag, by_width)
+    load = np.zeros_like(travel) if load is None else np.ascontiguousarray(load)
+    _follow(np.ascontiguousarray(travel), load, width, friction, place, side, lag, by_width)
     return lag, by_width, PlayState(place, side)
 
 
@@ -112,7 +118,9 @@ def _lean(travel: Floats, side: Floats) -> None:
 @compiled
 def _follow(
     travel: Floats,
+    load: Floats,
     width: Floats,
+    friction: float,
     place: Floats,
     side: Floats,
     lag: Floats,
@@ -125,10 +133,33 @@ def _follow(
         if count > 0 and np.isnan(at):
             at = travel[0, i] + end * width[i]
         for k in range(count):
-            if at < travel[k, i] - half:
-                at, end = travel[k, i] - half, -0.5
-            elif at > travel[k, i] + half:
-                at, end = travel[k, i] + half, 0.5
-            lag[k, i] = at - travel[k, i]
-            by_width[k, i] = end
+            x, force = travel[k, i], load[k, i]
+            error = at - x
+            if force < -friction or (force <= friction and error < -half):
+                error, at, end = -half, x - half, -0.5
+            elif force > friction or error > half:
+                error, at, end = half, x + half, 0.5
+            lag[k, i], by_width[k, i] = error, end
         place[i], side[i] = at, end
+
+
+def limited(apart: float, half: float) -> float:
+    """Return output minus input of a play of half width `half`, from their distance had the output stood still."""
+    return half if apart > half else max(apart, -half)
+
+
+def within(values: Floats, blocks: Sequence[slice], width: float) -> Floats:
+    """Return the position within a play, -1 to 1, shape (n,) [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]; blocks start in the middle."""
+    found = np.empty(len(values))
+    for rows in blocks:
+        own = values[rows]
+        rises = np.diff(own) >= 0.0
+        turns = np.concatenate([[0], np.flatnonzero(rises[1:] != rises[:-1]) + 1])
+        # Between turning points motion is monotonic, so the position follows from the last turning point.
+        there, last = [0.0], 0.0
+        for change in np.diff(own[turns]).tolist():
+            last = limited(last + 2.0 * change / width, 1.0)
+            there.append(last)
+        leg = np.searchsorted(turns, np.arange(len(own)), side="right") - 1
+        found[rows] = np.clip(np.array(there)[leg] + 2.0 * (own - own[turns][leg]) / width, -1.0, 1.0)
+    return found

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm, Texts
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    from dbbstation.computing.arrays import Floats
 
 
 MOST_SAMPLES = 5.0
@@ -39,3 +44,31 @@ class ForceTimeSkew(ScaledSource):
 
     def possible(self, values: Mapping[str, float], scale: Scale) -> bool:
         return abs(values.get("delay_ms", 0.0)) <= MOST_SAMPLES * 1e3 * scale.sample_s
+
+
+def delayed(values: Floats, time: Floats, late: float) -> Floats:
+    """Return values delayed by `late` minus values, shape (n,); values are constant before the first row."""
+    return np.interp(time - late, time, values) - values
+
+
+def delaying(late: float) -> Callable[[float, float], float]:
+    """Return `delayed` as a function of time and value, which remembers earlier calls and forgets later ones."""
+    times: list[float] = []
+    past: list[float] = []
+
+    def step(t: float, now: float) -> float:
+        while times and times[-1] >= t:
+            times.pop()
+            past.pop()
+        ago = t - late
+        then = now if not times or late <= 0.0 else past[0]
+        if times and late > 0.0 and ago > times[0]:
+            k = bisect_left(times, ago)
+            t1, x1 = (t, now) if k == len(times) else (times[k], past[k])
+            t0, x0 = times[k - 1], past[k - 1]
+            then = x0 + (x1 - x0) * (ago - t0) / (t1 - t0)
+        times.append(t)
+        past.append(now)
+        return then - now
+
+    return step

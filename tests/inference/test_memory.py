@@ -9,13 +9,14 @@ from scipy.integrate import solve_ivp
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.bank import Bank
-from dbbstation.inference.bent import lagging, memory_laws
+from dbbstation.inference.bent import memory_laws
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.read_off import growth, moved
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
+from dbbstation.laws.memory import lagging
 from tests.diagnosis.table.nulls import moving, table_of
 
 NOISE_MM = 0.02

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.inference.patterns import play
+from dbbstation.laws.play import within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,4 +26,4 @@ def pushed(values: NDArray[np.float64], width: float) -> NDArray[np.float64]:
 def test_play_is_that_of_a_thing_in_a_gap(rng, width):
     values = np.cumsum(rng.standard_normal(300))
     values[100:110] = values[100]
-    assert play(values, (slice(0, 300),), width) == pytest.approx(pushed(values, width), abs=1e-12)
+    assert within(values, (slice(0, 300),), width) == pytest.approx(pushed(values, width), abs=1e-12)

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.simulator.model import SimulationOutcome
 from dbbstation.diagnosis.simulator.ports import Ports, SimulationFault
 from dbbstation.diagnosis.simulator.terms import evaluator
-from dbbstation.inference.bent import lagging
+from dbbstation.laws.memory import lagging
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -5,7 +5,6 @@ Terms with memory depend only on earlier times, so every integrator receives equ
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import cos, expm1, pi, sin, sqrt
@@ -14,6 +13,10 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import null_space
+
+from dbbstation.laws.memory import forgotten
+from dbbstation.laws.play import limited
+from dbbstation.laws.time_skew import delaying
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -176,7 +179,8 @@ def bends(knots: Sequence[float]) -> Floats:
 def _remembering(term: Term) -> Evaluate:
     x, a = term.signals[0], term.amplitudes[0]
     if term.form is TermForm.DELAY:
-        return _delayed(x, a)
+        late = delaying(a)
+        return lambda t, signals: late(t, float(signals[x]))
     step, gain, of_signal = _STEPS[term.form](a, term.shape)
     past: list[tuple[float, float, float]] = []  # time, signal and state
 
@@ -196,47 +200,19 @@ Step: TypeAlias = "Callable[[tuple[float, float, float], float, float], float]"
 
 
 def _lagging(constant: float) -> Step:
-    """Return a first-order lag [triangle-hold equivalent, as `inference.bent.lagging`], initially settled."""
+    """Return a first-order lag, initially settled."""
     if constant <= 0.0:
         return lambda _past, _t, _now: 0.0
 
     def step(past: tuple[float, float, float], t: float, now: float) -> float:
-        before_t, before, behind = past
-        rate = (t - before_t) / constant
-        grown = expm1(-rate)
-        return behind * (1.0 + grown) + (now - before) * grown / rate
+        kept, added = forgotten((t - past[0]) / constant, expm1)
+        return past[2] * kept + (now - past[1]) * added
 
     return step
 
 
 def _playing(half: float) -> Step:
-    def step(past: tuple[float, float, float], _t: float, now: float) -> float:
-        apart = past[2] + past[1] - now
-        return half if apart > half else max(apart, -half)
-
-    return step
-
-
-def _delayed(x: str, dead: float) -> Evaluate:
-    times: list[float] = []
-    past: list[float] = []
-
-    def value(t: float, signals: Mapping[str, float]) -> float:
-        while times and times[-1] >= t:
-            times.pop()
-            past.pop()
-        now, ago = float(signals[x]), t - dead
-        late = now if not times or dead <= 0.0 else past[0]
-        if times and dead > 0.0 and ago > times[0]:
-            k = bisect_left(times, ago)
-            t1, x1 = (t, now) if k == len(times) else (times[k], past[k])
-            t0, x0 = times[k - 1], past[k - 1]
-            late = x0 + (x1 - x0) * (ago - t0) / (t1 - t0)
-        times.append(t)
-        past.append(now)
-        return late - now
-
-    return value
+    return lambda past, _t, now: limited(past[2] + past[1] - now, half)
 
 
 _STEPS: Mapping[TermForm, Callable[[float, tuple[float, ...]], tuple[Step, float, float]]] = {

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erf
 
-from dbbstation.computing.compiled import compiled
-from dbbstation.laws.play import PlayState, leaning
+from dbbstation.laws.play import PlayState, followed, leaning
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import (
     motor_loads,
@@ -108,7 +107,7 @@ class Play(SourceWithHistory):
     ) -> tuple[Floats, Floats, PlayState]:
         tension, width = _tensions(motion, machine), MM_PER_UM * values[:STRUTS]
         friction = max(float(values[STRUTS]), 0.0)
-        place, by_width, behind = settled(motion.struts(machine).length_mm, tension, np.abs(width), friction, state)
+        place, by_width, behind = followed(motion.struts(machine).length_mm, np.abs(width), state, tension, friction)
         return np.where(width < 0.0, -place, place), by_width, behind
 
 
@@ -175,50 +174,3 @@ def _tensions(motion: Motion, machine: Machine) -> Floats:
     if machine.strut_masses is not None:
         load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
     return motor_loads(struts, strut_tensions(struts, load), machine.strut_masses)
-
-
-def settled(
-    travel: Floats,
-    tension: Floats,
-    width: Floats,
-    friction: float,
-    state: PlayState,
-) -> tuple[Floats, Floats, PlayState]:
-    """Follow each column through its play.
-
-    Returns:
-        Error y - x and its derivative by the width, shapes (n, m), and the state after the last row.
-    """
-    place, by_width = np.empty_like(tension), np.empty_like(tension)
-    at, side = state.place.copy(), state.side.copy()
-    _settle(np.ascontiguousarray(travel), np.ascontiguousarray(tension), width, friction, at, side, place, by_width)
-    return place, by_width, PlayState(at, side)
-
-
-@compiled
-def _settle(
-    travel: Floats,
-    tension: Floats,
-    width: Floats,
-    friction: float,
-    at: Floats,
-    side: Floats,
-    place: Floats,
-    by_width: Floats,
-) -> None:
-    count, columns = travel.shape
-    for i in range(columns):
-        half = 0.5 * width[i]
-        y, end = at[i], side[i]
-        if count > 0 and np.isnan(y):
-            y = travel[0, i] + end * width[i]
-        for k in range(count):
-            error = y - travel[k, i]
-            if tension[k, i] < -friction or (tension[k, i] <= friction and error < -half):
-                error, end = -half, -0.5
-            elif tension[k, i] > friction or error > half:
-                error, end = half, 0.5
-            y = travel[k, i] + error
-            place[k, i] = error
-            by_width[k, i] = end
-        at[i], side[i] = y, end

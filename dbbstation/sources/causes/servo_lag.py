@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dbbstation.computing.compiled import compiled
+from dbbstation.laws.memory import lagged
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
     SMOOTH_MM,
@@ -123,9 +123,9 @@ class ServoLag(ErrorSource):
         speed, step, constant = speed_mm_s(time_s, length), np.diff(time_s), constants.ravel()
         # Each direction of travel has its own constant; if both are equal, the sum is one loop.
         speed = np.hstack([np.minimum(speed, 0.0), np.maximum(speed, 0.0)])
-        lag, by_constant = followed(speed, step, np.abs(constant))
+        lag, by_constant = lagged(speed, step, np.abs(constant))
         if (constant < 0.0).any():
-            ahead, by_ahead = followed(-speed[::-1], step[::-1], np.abs(constant))
+            ahead, by_ahead = lagged(-speed[::-1], step[::-1], np.abs(constant))
             lag = np.where(constant < 0.0, ahead[::-1], lag)
             by_constant = np.where(constant < 0.0, -by_ahead[::-1], by_constant)
         shape = len(place), 2, STRUTS
@@ -151,41 +151,3 @@ class _ByDirection(ServoLag):
 
 USUAL_MS = 0.3
 """Usual difference d of a lag from its mean: three tenths of a usual lag."""
-
-
-def followed(speed: Floats, step_s: Floats, constant_s: Floats) -> tuple[Floats, Floats]:
-    """Return errors e of loops, with tau de/dt = -e - tau dx/dt, and derivatives by tau, shapes (m, k)."""
-    lag, by_constant = np.zeros_like(speed), np.zeros_like(speed)
-    _follow(np.ascontiguousarray(speed), np.ascontiguousarray(step_s), constant_s, lag, by_constant)
-    return lag, by_constant
-
-
-FORGOTTEN = 50.0
-"""Time constants after which an error has vanished."""
-
-
-@compiled
-def _follow(
-    speed: Floats,
-    step: Floats,
-    constant: Floats,
-    lag: Floats,
-    by_constant: Floats,
-) -> None:
-    """Solve each column exactly, with speeds linear between rows."""
-    # e = -tau dx/dt + tau² d²x/dt² is a solution; the difference decays as exp(-t / tau).
-    rows, columns = speed.shape
-    for k in range(rows if rows > 1 else 0):
-        last = max(k, 1) - 1
-        h = step[last]
-        for i in range(columns):
-            tau, gain = constant[i], (speed[last + 1, i] - speed[last, i]) / h
-            # At first the solution that has forgotten how it began.
-            lag[k, i] = -tau * speed[k, i] + tau * tau * gain
-            by_constant[k, i] = -speed[k, i] + 2.0 * tau * gain
-            if k > 0 and h < FORGOTTEN * tau:
-                kept = np.exp(-h / tau)
-                beside = lag[last, i] + tau * speed[last, i] - tau * tau * gain
-                by_beside = by_constant[last, i] + speed[last, i] - 2.0 * tau * gain
-                lag[k, i] += kept * beside
-                by_constant[k, i] += kept * (by_beside + beside * h / (tau * tau))

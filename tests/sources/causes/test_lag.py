@@ -10,12 +10,13 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from dbbstation.errors import ModelError
+from dbbstation.laws.memory import lagged
 from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.base_joints import BaseJoints
-from dbbstation.sources.causes.servo_lag import ServoLag, followed
+from dbbstation.sources.causes.servo_lag import ServoLag
 from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
 from dbbstation.sources.causes.time_skew import TimeSkew
 from dbbstation.sources.contract import Fitted, Motion
@@ -47,7 +48,7 @@ def shifted_by(motion, late_s, clockwise):
 def test_the_lag_solves_the_loops_equation(tau_s):
     time_s = np.linspace(0, 12, 601)
     speed = np.cos(time_s) + 0.3 * np.sin(2.7 * time_s)
-    lag, _ = followed(speed[:, None], np.diff(time_s), np.array([tau_s]))
+    lag, _ = lagged(speed[:, None], np.diff(time_s), np.array([tau_s]))
     solved = solve_ivp(
         lambda t, e: -e / tau_s - np.cos(t) - 0.3 * np.sin(2.7 * t),
         (0, 12),
@@ -63,7 +64,7 @@ def test_the_lag_solves_the_loops_equation(tau_s):
 
 
 def test_at_constant_speed_a_strut_is_behind_by_speed_times_time():
-    lag, by_constant = followed(np.full((50, 2), 16.0), np.full(49, 0.01), np.array([0.0, 0.004]))
+    lag, by_constant = lagged(np.full((50, 2), 16.0), np.full(49, 0.01), np.array([0.0, 0.004]))
     assert np.allclose(lag, [0.0, -0.064])
     assert np.allclose(by_constant, -16.0)
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import ModelError
-from dbbstation.laws.play import leaning
+from dbbstation.laws.play import followed, leaning
 from dbbstation.machine.geometry import Compliance, Frames, StrutMasses
 from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.gravity import Gravity
-from dbbstation.sources.causes.play import Play, settled
+from dbbstation.sources.causes.play import Play
 from dbbstation.sources.contract import Fitted
 from tests.sources.runs import BORES_MM, JIG_TESTS, LEVELS_MM, random_machine, random_run, run
 
@@ -54,7 +54,7 @@ def test_two_stops_a_load_and_friction(friction):
     travel, tension = 0.15 * np.sin(2 * t - 0.4), 20.0 + 300.0 * np.cos(t)
     width = 0.02
     begins = leaning(travel[:, None])
-    place, _, _ = settled(travel[:, None], tension[:, None], np.array([width]), friction, begins)
+    place, _, _ = followed(travel[:, None], np.array([width]), begins, tension[:, None], friction)
     expected = simulated(travel, tension, width, friction)
     # The simulated body dips into its stops by force over stiffness, and needs time to cross the play.
     dip = (320.0 + friction) / 3e5

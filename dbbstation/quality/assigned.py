@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, takewhile
+from heapq import nlargest
+from itertools import combinations
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
@@ -96,8 +97,7 @@ class Assigned:
 
     def odds(self, one: Seen) -> float:
         """Return the log odds against a run's planned circle."""
-        others, own = _odds(_ranked(self._looked_up), self.runs.index(one))
-        return others - own
+        return self._looked_up.odds(self.runs.index(one))
 
     def finding(self, one: Seen, undecided: Finding) -> Finding:
         """Return a good finding if all runs together show that a run is its planned circle, else `undecided`."""
@@ -109,7 +109,7 @@ class Assigned:
 
     def suspects(self) -> dict[Seen, Finding]:
         """Return the runs that contradict the others, with findings that name the circles shown instead."""
-        likely = [dict(changes) for changes in _likely(_ranked(self._looked_up), self._looked_up[()])]
+        likely = [dict(changes) for changes in self._looked_up.likely()]
         found = {}
         for at, one in enumerate(self.runs):
             changed = [labels[at] for labels in likely if at in labels]
@@ -138,26 +138,25 @@ class Assigned:
         return MISTAKE + float(np.log(len(self.circles)))
 
     @cached_property
-    def _looked_up(self) -> Mapping[_Changes, float]:
-        known: dict[_Changes, float] = {}
+    def _looked_up(self) -> _Known:
+        known = _Known(len(self.runs))
         followed: set[_Changes] = set()
         best: list[_Changes] = [()]
         while any(changes not in followed for changes in best):
             for changes in [each for each in best if each not in followed]:
                 followed.add(changes)
                 self._follow(changes, known)
-            best = sorted(known, key=known.__getitem__, reverse=True)[:WIDE]
             # If one mistake alone loses more than its cost, a further one cannot repay it.
-            best = [changes for changes in best if known[changes] >= known[()] - self.cost]
+            best = [changes for changes, log in known.best() if log >= known.planned - self.cost]
         return known
 
-    def _follow(self, base: _Changes, known: dict[_Changes, float]) -> None:
+    def _follow(self, base: _Changes, known: _Known) -> None:
         """Add assignments near a given one, the most probable first, until further ones cannot affect a decision."""
         beside = NearAssignments(
             self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels)
         )
-        known.setdefault(base, beside.log - self._mistakes(base))
-        least = known[()] - max(self.cost, 2.0 * LOG_ODDS_LIMIT)
+        known.add(base, beside.log - self._mistakes(base))
+        least = known.planned - max(self.cost, 2.0 * LOG_ODDS_LIMIT)
         asked = [_Asked(self, base, beside, *each, least) for each in self._changes]
         self._bounds[base] = {tuple(run): row for each in asked for run, row in each.bounds}
         while True:
@@ -171,7 +170,7 @@ class Assigned:
                 places = np.nonzero(most >= first)
                 for runs, instead, log in each.scored(places) if len(places[0]) else ():
                     changes = self._with(base, runs, instead)
-                    known.setdefault(changes, log - self._mistakes(changes))
+                    known.add(changes, log - self._mistakes(changes))
 
     def bounds(self, base: _Changes, runs: Integers, labels: int) -> Floats:
         """Return upper bounds of log densities near an assignment from before the last run; infinite if unknown.
@@ -376,41 +375,59 @@ class _Limits:
     new: float
 
     @classmethod
-    def of(cls, known: Mapping[_Changes, float], cost: float, new: int) -> _Limits:
+    def of(cls, known: _Known, cost: float, new: int) -> _Limits:
         """Return the limits that follow from known log posterior densities."""
-        ranked, floor = _ranked(known), known[()]
-        followed = ranked[WIDE - 1][1] if len(ranked) >= WIDE else -np.inf
-        suspects = {run for changes in _likely(ranked, floor) for run, _ in changes}
-        others, own = _odds(ranked, new)
+        best, floor = known.best(), known.planned
+        followed = best[-1][1] if len(best) == WIDE else -np.inf
+        suspects = {run for changes in known.likely() for run, _ in changes}
         return cls(
-            max(floor - cost, min(followed, max(floor, ranked[0][1] - LOG_ODDS_LIMIT))),
-            {run: _greatest(ranked, run, own=True) for run in suspects},
-            max(others, own - 2.0 * LOG_ODDS_LIMIT),
+            max(floor - cost, min(followed, max(floor, best[0][1] - LOG_ODDS_LIMIT))),
+            {run: known.kept[run] for run in suspects},
+            max(known.changed[new], known.kept[new] - 2.0 * LOG_ODDS_LIMIT),
         )
 
 
-_Ranked = list[tuple[_Changes, float]]
-"""Assignments with their log posterior densities, in descending order."""
+class _Known:
+    """Known assignments with their log posterior densities.
 
+    Attributes:
+        kept: greatest density of an assignment that keeps a run's planned circle, shape (n,).
+        changed: of one that changes it, shape (n,).
+    """
 
-def _ranked(known: Mapping[_Changes, float]) -> _Ranked:
-    return sorted(known.items(), key=itemgetter(1), reverse=True)
+    def __init__(self, runs: int) -> None:
+        self._logs: dict[_Changes, float] = {}
+        self.kept, self.changed = np.full(runs, -np.inf), np.full(runs, -np.inf)
 
+    @property
+    def planned(self) -> float:
+        """Return the log posterior density of the plan."""
+        return self._logs[()]
 
-def _odds(ranked: _Ranked, run: int) -> tuple[float, float]:
-    """Return the greatest log posterior density with another circle for a run, and with its planned circle."""
-    return _greatest(ranked, run, own=False), _greatest(ranked, run, own=True)
+    def add(self, changes: _Changes, log: float) -> None:
+        """Add an assignment if it is not known."""
+        if changes in self._logs:
+            return
+        self._logs[changes] = log
+        runs = [run for run, _ in changes]
+        changed = np.maximum(self.changed[runs], log)
+        kept = self.kept[runs]
+        np.maximum(self.kept, log, out=self.kept)
+        self.kept[runs], self.changed[runs] = kept, changed
 
+    def odds(self, run: int) -> float:
+        """Return the log odds against a run's planned circle."""
+        return float(self.changed[run] - self.kept[run])
 
-def _greatest(ranked: _Ranked, run: int, *, own: bool) -> float:
-    keeps = (score for changes, score in ranked if all(other != run for other, _ in changes) is own)
-    return next(keeps, -np.inf)
+    def best(self) -> list[tuple[_Changes, float]]:
+        """Return the most probable assignments, in descending order."""
+        return nlargest(WIDE, self._logs.items(), key=itemgetter(1))
 
-
-def _likely(ranked: _Ranked, floor: float) -> list[_Changes]:
-    """Return assignments more probable than the plan, whose log density is `floor`, and nearly as probable as the best."""
-    least = ranked[0][1] - LOG_ODDS_LIMIT
-    return [changes for changes, score in takewhile(lambda one: one[1] > floor and one[1] >= least, ranked)]
+    def likely(self) -> list[_Changes]:
+        """Return assignments more probable than the plan, and nearly as probable as the best, in descending order."""
+        floor, least = self.planned, self.best()[0][1] - LOG_ODDS_LIMIT
+        found = [each for each in self._logs.items() if each[1] > floor and each[1] >= least]
+        return [changes for changes, _ in sorted(found, key=itemgetter(1), reverse=True)]
 
 
 _OTHERWISE = {

@@ -138,19 +138,19 @@ class Assigned:
         return MISTAKE + float(np.log(len(self.circles)))
 
     @cached_property
-    def _looked_up(self) -> _Known:
-        known = _Known(len(self.runs))
+    def _looked_up(self) -> Known:
+        known = Known(len(self.runs))
         followed: set[_Changes] = set()
         best: list[_Changes] = [()]
         while any(changes not in followed for changes in best):
             for changes in [each for each in best if each not in followed]:
                 followed.add(changes)
                 self._follow(changes, known)
-            # If one mistake alone loses more than its cost, a further one cannot repay it.
-            best = [changes for changes, log in known.best() if log >= known.planned - self.cost]
+            # Of k mistakes that repay k - 1 of their costs, one repays half of its own or more.
+            best = [changes for changes, log in known.best() if log >= known.planned - 0.5 * self.cost]
         return known
 
-    def _follow(self, base: _Changes, known: _Known) -> None:
+    def _follow(self, base: _Changes, known: Known) -> None:
         """Add assignments near a given one, the most probable first, until further ones cannot affect a decision."""
         beside = NearAssignments(
             self.effects, self.readings, self.information(labels := self._labels(base)), np.array(labels)
@@ -375,7 +375,7 @@ class _Limits:
     new: float
 
     @classmethod
-    def of(cls, known: _Known, cost: float, new: int) -> _Limits:
+    def of(cls, known: Known, cost: float, new: int) -> _Limits:
         """Return the limits that follow from known log posterior densities."""
         best, floor = known.best(), known.planned
         followed = best[-1][1] if len(best) == WIDE else -np.inf
@@ -387,7 +387,7 @@ class _Limits:
         )
 
 
-class _Known:
+class Known:
     """Known assignments with their log posterior densities.
 
     Attributes:

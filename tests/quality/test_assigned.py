@@ -17,7 +17,7 @@ from dbbstation.files.recordings.judged import circles_of_plan
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Direction
-from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, effects_of
+from dbbstation.quality.assigned import WIDE, Assigned, FormerSitting, Known, effects_of
 from dbbstation.quality.beside import SIZES, NearAssignments, mean_of
 from dbbstation.quality.finding import FindingVerdict, Name, undecided
 from dbbstation.quality.knowledge import Run, seen
@@ -156,7 +156,9 @@ def test_answers_are_those_of_all_assignments_written_out(sitting, instead) -> N
     for count in range(1, 5):
         assigned = shown(sitting, instead, count)
         written = shown(sitting, instead, count)
-        written.__dict__["_looked_up"] = every_score(written)
+        written.__dict__["_looked_up"] = known = Known(count)
+        for changes, log in every_score(written).items():
+            known.add(changes, log)
         assert suspected(assigned) == suspected(written)
         one = assigned.runs[-1]
         for name in (Name.TEST, Name.DIRECTION):
@@ -205,7 +207,7 @@ def test_the_cholesky_score_is_the_normal_density(sitting) -> None:
             whole[rows, rows] += assigned.effects.own[labels[k]] + one.u_um**2 * np.eye(7)
         logs.append(multivariate_normal(np.zeros(len(off)), whole, allow_singular=True).logpdf(off))
     wanted = logsumexp(logs) - np.log(len(SIZES)) + 0.5 * len(off) * np.log(2.0 * np.pi)
-    assert assigned._looked_up[()] == pytest.approx(wanted, abs=1e-3)
+    assert assigned._looked_up.planned == pytest.approx(wanted, abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(4))

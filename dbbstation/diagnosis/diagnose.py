@@ -19,7 +19,6 @@ from dbbstation.diagnosis.limits import limits_of, shifts_between, where_left
 from dbbstation.diagnosis.locate import after_reversals, locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shapes import Follows
-from dbbstation.diagnosis.thinned import sectors_for, thinned
 from dbbstation.diagnosis.unexplained import curve_of, with_exact_wave
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.errors import ModelError
@@ -40,6 +39,7 @@ from dbbstation.inference.settle import BETTER
 from dbbstation.inference.square_root import solve
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.temperature import not_given
+from dbbstation.trace.recording import averaged, means, sector_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -328,3 +328,37 @@ def _single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_
     samples = float(np.mean([len(o.raw) for o in observations]))
     low = min((2 * LOW + 1) / samples, 1.0)
     return float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))
+
+
+MOST_SAMPLES = 30 * BOUNDS.samples_per_turn
+"""Most samples of all runs in a diagnosis, as for thirty circles. Columns of all causes then take 0.9 GB, most of its memory."""
+
+LEAST_SECTORS = BOUNDS.samples_per_turn // 2
+"""Least samples per turn for any number of runs; with fewer, noise cannot be estimated far above the low harmonics."""
+
+
+FINER = 4
+"""Most samples per sector at which sharp effects are evaluated: a step's share of a sector is known to an eighth."""
+
+
+def sectors_for(runs: int) -> int:
+    """Return the number of samples per turn for a number of runs."""
+    return max(min(BOUNDS.samples_per_turn, MOST_SAMPLES // max(runs, 1)), LEAST_SECTORS)
+
+
+def thinned(observation: Observation, most: int = BOUNDS.samples_per_turn) -> Observation:
+    """Return the run averaged over sectors, with its commands; short runs are unchanged."""
+    raw = observation.raw
+    if len(raw) <= most:
+        return observation
+    sectors = min(most, max(len(raw) // BOUNDS.samples_per_sector, 1))
+    finer = _averaged(observation, FINER * sectors) if len(raw) > FINER * sectors else observation
+    return replace(_averaged(finer, sectors), finer=(finer, sector_of(finer.raw, sectors)))
+
+
+def _averaged(observation: Observation, sectors: int) -> Observation:
+    raw, commanded = observation.raw, observation.commanded
+    if commanded is not None:
+        before = len(observation.lead_in_deg)
+        commanded = np.vstack([commanded[:before], means(commanded[before:], sector_of(raw, sectors))])
+    return replace(observation, raw=averaged(raw, sectors), commanded=commanded)

@@ -23,8 +23,8 @@ from dbbstation.inference.forms import (
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
+from dbbstation.sources.laws.motion import since_turning
 from dbbstation.sources.laws.temperature import FOLLOWED_K, known_thermometers, logged_degc
-from dbbstation.sources.laws.turning import since_turning
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

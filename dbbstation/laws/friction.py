@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 COULOMB_SHARE = 0.5
 """Usual size, one standard deviation, relative to the force's rms."""
 
-MOST_OF_COULOMB = 1.5
-"""Largest friction after a reversal over Coulomb friction: 2.5 standard deviations of the formula's inaccuracy."""
-
 
 class CoulombFriction(ScaledSource):
     """Friction independent of speed: F = F_c sign(v)."""

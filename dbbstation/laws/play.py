@@ -9,12 +9,14 @@ import numpy as np
 
 from dbbstation.computing.compiled import compiled
 from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm, Texts
-from dbbstation.laws.friction import MOST_OF_COULOMB
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.computing.arrays import Floats
+
+MOST_OF_COULOMB = 1.5
+"""Largest friction after a reversal over Coulomb friction: 2.5 standard deviations of the formula's inaccuracy."""
 
 GAP_SHARES = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
 """Tried plays, over the travel."""

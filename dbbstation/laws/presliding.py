@@ -12,8 +12,7 @@ import numpy as np
 
 from dbbstation.computing.compiled import compiled, inlined
 from dbbstation.laws.contract import Parameter, Scale, ScaledSource, SourceForm, Texts
-from dbbstation.laws.friction import MOST_OF_COULOMB
-from dbbstation.laws.play import leaning
+from dbbstation.laws.play import MOST_OF_COULOMB, leaning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from dbbstation.laws.contract import MOVING, TableSource
+from dbbstation.laws.memory import SHORTEST_S
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Need, Owner, Parameter
-from dbbstation.sources.laws.rates import SHORTEST_S
-from dbbstation.sources.laws.turning import since_turning
+from dbbstation.sources.laws.motion import since_turning
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from dbbstation.diagnosis.diagnose import thinned
 from dbbstation.diagnosis.effects import effects_of
-from dbbstation.diagnosis.thinned import thinned
 from dbbstation.errors import InputError, StationError
 from dbbstation.files.source_text import read_bytes, without_faults
 from dbbstation.report.content import Modelled

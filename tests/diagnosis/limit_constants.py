@@ -15,8 +15,7 @@ from typing import Any
 from unittest import mock
 
 from dbbstation.diagnosis import explain, shapes, unmodelled
-from dbbstation.diagnosis.diagnose import usable_sources, without_doubtful
-from dbbstation.diagnosis.thinned import sectors_for, thinned
+from dbbstation.diagnosis.diagnose import sectors_for, thinned, usable_sources, without_doubtful
 from dbbstation.sources.causes import servo_lag
 from dbbstation.sources.laws import unlike_struts
 from dbbstation.sources.registry import known_sources, sources_named

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from dbbstation.calibration.reporting.prediction import smooth_circularities_um
-from dbbstation.diagnosis.thinned import thinned
+from dbbstation.diagnosis.diagnose import thinned
 from dbbstation.tasks.diagnose import diagnose
 from dbbstation.tasks.load import load
 from tests.plant.mechanisms.backlash import Backlash

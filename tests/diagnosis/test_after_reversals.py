@@ -8,10 +8,10 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosis.channel import CircleChannel
+from dbbstation.diagnosis.diagnose import thinned
 from dbbstation.diagnosis.explain import SettledCircles
 from dbbstation.diagnosis.locate import after_reversals
 from dbbstation.diagnosis.shapes import samples_of
-from dbbstation.diagnosis.thinned import thinned
 from dbbstation.tasks.load import load_sessions
 from studies.diagnosed import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BumpedJig, RingingStrut

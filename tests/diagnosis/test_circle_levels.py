@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from dbbstation.diagnosis.diagnose import without_doubtful, without_tests
+from dbbstation.diagnosis.diagnose import thinned, without_doubtful, without_tests
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.chosen_anew import chosen_anew
 from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.diagnosis.diagnose import doubtful, without_doubtful
+from dbbstation.diagnosis.diagnose import doubtful, thinned, without_doubtful
 from dbbstation.diagnosis.explain import explain
-from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.verdict import Verdict

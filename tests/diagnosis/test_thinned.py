@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.thinned import FINER, thinned
+from dbbstation.diagnosis.diagnose import FINER, thinned
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.screw_cyclic import ScrewCyclic

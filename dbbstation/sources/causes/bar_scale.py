@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import MM_PER_UM, Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.laws.encoder import reading_without_noise_mm
+from dbbstation.sources.laws.motion import reading_without_noise_mm
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.laws.play import followed, leaning
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
+from dbbstation.sources.laws.motion import driven_in_time, speed_mm_s
 from dbbstation.sources.laws.weights import platform_masses, stated_loads
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.turning import TURNED_MM, since_turning_in_time
+from dbbstation.sources.laws.motion import TURNED_MM, since_turning_in_time
 from dbbstation.sources.laws.unlike_struts import of_own_lengths
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class ReversalSpike(ErrorSource):
     is monotonic and can be compensated. Near a = 0 the error is proportional to a.
 
     A run has no spike before its first turning point. A straight path reverses at its extreme row, a smooth path
-    between rows (`laws.turning`). The remainder of a spike decays over c|a| after the next reversal. Reversals of less
+    between rows (`laws.motion`). The remainder of a spike decays over c|a| after the next reversal. Reversals of less
     than a micrometre do not count.
     """
 

@@ -19,7 +19,7 @@ from dbbstation.sources.contract import (
     Parameter,
     Texts,
 )
-from dbbstation.sources.laws.screws import screw_lead_mm
+from dbbstation.sources.laws.weights import screw_lead_mm
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dbbstation.laws.memory import lagged
+from dbbstation.laws.memory import LoopState, driven, lagged, undone
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
     SMOOTH_MM,
@@ -19,8 +19,7 @@ from dbbstation.sources.contract import (
     of_each_strut,
     of_own_strut,
 )
-from dbbstation.sources.laws.loop import STANDING, LoopState, driven, undone
-from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
+from dbbstation.sources.laws.motion import driven_in_time, speed_mm_s
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -33,11 +32,15 @@ OF_SECOND = 0.5
 """Usual relative departure of the second term: a pure delay has half that of a loop of first order."""
 
 
+STANDING = LoopState(0, 0.0, 0.0, np.zeros((8, STRUTS)))
+"""State before a program, at rest."""
+
+
 class ServoLag(ErrorSource):
     """A strut follows its command as a position loop with gain 1/tau: tau_i dy_i/dt = x_i - y_i.
 
     The error y - x = -tau dx/dt + tau² d²x/dt² - ... is a lag and a shortened path. A run begins in motion. Negative
-    tau is a lead, as by feed-forward. Along straight programs the loop is solved row by row (`laws.loop`); a lead is
+    tau is a lead, as by feed-forward. Along straight programs the loop is solved row by row (`laws.memory`); a lead is
     -tau dx/dt.
 
     To first order a common lag equals `time-skew`. About a centred ball it causes only the shrinkage (v tau)² / 2R: 0.2

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.laws.time_skew import advanced
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.laws.rates import driven_in_time
+from dbbstation.sources.laws.motion import driven_in_time
 
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
@@ -70,12 +70,5 @@ class TimeSkew(ErrorSource):
     def _gone_on(self, motion: Motion, machine: Machine, late_s: float) -> tuple[Floats, Floats]:
         self.require(motion)
         time_s, length, place = driven_in_time(motion, machine)
-        if len(time_s) == 1:
-            nothing = np.zeros((len(motion), STRUTS))
-            return nothing, nothing
-        from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
-
-        spline = CubicSpline(time_s, length)
-        gone: Floats = spline(time_s + late_s) - spline(time_s)
-        speed: Floats = spline(time_s + late_s, 1)
+        gone, speed = advanced(length, time_s, late_s)
         return gone[place], speed[place]

@@ -10,7 +10,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.travel import middle
 from dbbstation.sources.contract import SMOOTH_MM, CForm, Effect, LinearSource, Motion, Owner, Parameter, Texts
-from dbbstation.sources.laws.screws import screw_lead_mm
+from dbbstation.sources.laws.weights import screw_lead_mm
 
 if TYPE_CHECKING:
     from collections.abc import Collection

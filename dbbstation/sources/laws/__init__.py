@@ -1,1 +1,1 @@
-"""What causes share: warm-up, thermometers, turning points, speed, screws, weights."""
+"""What causes of circles share: warm-up, thermometers, turning points, speeds, screws, weights."""

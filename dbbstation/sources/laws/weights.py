@@ -1,4 +1,4 @@
-"""Weights of the machine file, with defaults."""
+"""Weights and screws of the machine file, with defaults."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
     from dbbstation.machine.geometry import Frames, Hexapod, Machine, Masses
     from dbbstation.machine.kinematics import Struts
+
 
 MM_PER_N = 1e-6
 """One µm/kN in mm/N."""
@@ -74,3 +75,14 @@ def masses_for_c(masses: StrutMasses | None) -> Floats:
     none = StrutMasses(strut_kg=0.0, motor_kg=0.0, motor_length_mm=0.0)
     own = masses or none
     return np.array([own.strut_kg, own.motor_kg, own.motor_length_mm, own.screw_kg, own.screw_length_mm])
+
+
+def screw_lead_mm(source: str, machine: Machine) -> float:
+    """Return a strut's travel per screw turn [mm]."""
+    if machine.screw_lead_mm is None:
+        raise ModelError(
+            f"the error source {source} needs the lead of the struts' screws, and the machine {machine.name!r} has no "
+            "`screw_lead_mm`",
+            remedy="add `screw_lead_mm: ...` to the machine file, or leave this source out",
+        )
+    return machine.screw_lead_mm

@@ -16,7 +16,7 @@ from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.reversal_spike import DECAY_MM, ReversalSpike
 from dbbstation.sources.contract import Effect, Fitted
-from dbbstation.sources.laws.turning import since_turning
+from dbbstation.sources.laws.motion import since_turning
 from tests.sources.runs import DEG_PER_S, circle, concealed_share, jig_runs, random_run, run
 
 SPIKE = ReversalSpike()

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import savgol_filter
 
 from dbbstation.sources.contract import Motion
-from dbbstation.sources.laws.encoder import CUBIC, WINDOWS, reading_without_noise_mm
+from dbbstation.sources.laws.motion import CUBIC, WINDOWS, reading_without_noise_mm
 
 
 @pytest.mark.parametrize("count", [170, 720, 4001])

@@ -9,7 +9,7 @@ from dbbstation.machine.geometry import Frames
 from dbbstation.machine.kinematics import inverse
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.reversal_spike import ReversalSpike
-from dbbstation.sources.laws.turning import since_turning
+from dbbstation.sources.laws.motion import since_turning
 from dbbstation.sources.laws.unlike_struts import HALVES
 from tests.sources.runs import run
 

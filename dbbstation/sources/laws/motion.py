@@ -1,4 +1,4 @@
-"""Turning points of struts along a smooth path."""
+"""Struts along a motion: speeds and turning points; readings without noise."""
 
 from __future__ import annotations
 
@@ -7,9 +7,40 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.computing.compiled import compiled, inlined
+from dbbstation.laws.memory import SHORTEST_S
 
 if TYPE_CHECKING:
-    from dbbstation.computing.arrays import Floats
+    from dbbstation.computing.arrays import Floats, Integers
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Motion
+
+
+def driven_in_time(motion: Motion, machine: Machine) -> tuple[Floats, Floats, Integers]:
+    """Return commanded strut lengths at strictly ascending times.
+
+    Returns:
+        Times, shape (m,) [s], lengths at these times, shape (m, 6) [mm], and each row's index among them, shape (n,).
+        Of several rows at one time the last one counts.
+    """
+    time_s = np.asarray(motion.time_s)
+    length = motion.struts(machine).length_mm
+    later = np.diff(time_s) > SHORTEST_S
+    return (
+        time_s[np.append(later, True)],
+        length[np.append(later, True)],
+        np.concatenate([[0], np.cumsum(later)]),
+    )
+
+
+def speed_mm_s(time_s: Floats, length_mm: Floats) -> Floats:
+    """Return speeds at ascending times, exact to second order, shape (m, 6) [mm/s]; zero for one row."""
+    rows = len(time_s)
+    if rows == 1:
+        return np.zeros_like(length_mm)
+    # At the ends, use a parabola through three rows.
+    speed: Floats = np.gradient(length_mm, time_s, axis=0, edge_order=1 if rows == 2 else 2)  # noqa: PLR2004
+    return speed
+
 
 TURNED_MM = 1e-3
 """A strut has reversed once it has come back this far; less is rounding of programs or recorded angles [mm]."""
@@ -102,3 +133,35 @@ def _since(
                 way, low, high = new, k, k
             if has_turned:
                 since[k, i], late[k, i] = x - turn, time[k] - then
+
+
+WINDOWS = 40
+"""Pieces of a run on which readings are fitted by a cubic: nine degrees of a circle."""
+
+CUBIC = 3
+
+
+def reading_without_noise_mm(motion: Motion) -> Floats:
+    """Return the reading without most of its noise, shape (n,) [mm].
+
+    An error evaluated at noisy readings would itself look like noise and be misidentified.
+    """
+    return motion.once("reading without noise", None, lambda: _smoothed(motion))
+
+
+def _smoothed(motion: Motion) -> Floats:
+    reading = np.array(motion.reading_mm, dtype=np.float64)
+    own = reading[motion.kept]
+    window = 2 * (len(own) // (2 * WINDOWS)) + 1
+    if motion.reading_is_measured and window > CUBIC:
+        from scipy.linalg import lstsq  # noqa: PLC0415
+        from scipy.ndimage import convolve1d  # noqa: PLC0415 - few commands filter
+
+        # The filter of Savitzky and Golay [Anal. Chem. 36 (1964) 1627] as in SciPy's signals, which take half a second to import.
+        half, places = window // 2, np.arange(window)
+        weights = lstsq((half - places) ** np.arange(CUBIC + 1)[:, None], np.eye(CUBIC + 1)[0])[0]
+        smooth = convolve1d(own, weights, mode="constant")
+        smooth[:half] = np.polyval(np.polyfit(places, own[:window], CUBIC), places[:half])
+        smooth[-half:] = np.polyval(np.polyfit(places, own[-window:], CUBIC), places[-half:])
+        reading[motion.kept] = smooth
+    return reading

@@ -15,6 +15,13 @@ if TYPE_CHECKING:
 
     from dbbstation.computing.arrays import Floats
 
+EQUATION = "y_k = min(max(y_k-1, x_k - w/2), x_k + w/2)"
+"""The play operator [hysteresis of play, Krasnosel'skii and Pokrovskii 1983]."""
+
+FORM_UNCERTAINTY = 0.2
+"""Relative standard deviation of real plays: contacts close gradually, friction and wear differ along the travel, between
+directions and with the load, and play is seldom the same at both ends."""
+
 MOST_OF_COULOMB = 1.5
 """Largest friction after a reversal over Coulomb friction: 2.5 standard deviations of the formula's inaccuracy."""
 
@@ -34,7 +41,7 @@ class LostMotion(ScaledSource):
 
     name = "lost-motion"
     needs = ("since_reversal_mm", "direction")
-    form_uncertainty = 0.2  # contacts close gradually, and play is seldom the same at both ends of a travel
+    form_uncertainty = FORM_UNCERTAINTY
     texts = Texts(
         what="Between drive and load there is play or an elastic lash: after a reversal the drive moves over it before "
         "the load, or its friction, is felt.",

@@ -1,7 +1,4 @@
-"""Motion before sliding, with memory: Dahl's law.
-
-[Dahl, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1 (1968), eq 1 with exponent 1]
-"""
+"""Motion before sliding, with memory: Dahl's law."""
 
 from __future__ import annotations
 
@@ -18,6 +15,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dbbstation.computing.arrays import Floats
+
+DAHL = "Dahl, A solid friction model, Aerospace Corporation TOR-158 (1968)"
+
+WIND_UP = "dz = -(s/2 + z) |dx| / l, s the direction"
+"""Dahl's law with exponent 1 [eq 1]; at the distance d after a reversal of what is fully wound, z = -s (1/2 - exp(-d / l))."""
 
 LENGTH_SHARES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
 """Tried lengths of the build-up, over the travel."""
@@ -41,8 +43,7 @@ class Presliding(ScaledSource):
         "rounded at their corners.",
         cure="A stiffer support of seals and bearings; in the control a reversal compensation that depends on travel.",
         equation="F = -2 F_p sign(v) exp(-d / d_0), d the travel since the reversal",
-        origin="Dahl, A solid friction model, Aerospace Corporation TOR-158 (1968); Armstrong-Hélouvry, Dupont and "
-        "Canudas de Wit, Automatica 30 (1994) 1083",
+        origin=f"{DAHL}; Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083",
     )
 
     def forms(self, scale: Scale) -> tuple[SourceForm, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from dbbstation.laws.contract import MOVING, TableSource
+from dbbstation.laws.contract import MOVING, SourceForm, TableSource
 from dbbstation.laws.memory import SHORTEST_S
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.sources.contract import MM_PER_UM, Effect, ErrorSource, Need, Owner, Parameter
@@ -57,34 +57,30 @@ class _OfStruts(ErrorSource):
     belongs_to = Owner.MACHINE
 
     def __init__(self) -> None:
-        self._law = self.of()
+        law = self.of()
+        self._form = SourceForm(law.parameters(), law.columns)
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         sizes = [
             replace(p, name=f"strut_{k}_{p.name}", meaning=f"{p.meaning}, strut {k}", strut=k)
-            for p in self._law.parameters()
-            if not p.grid
+            for p in self._form.amplitudes
             for k in STRUT_NUMBERS
         ]
-        return (*sizes, *self._shapes)
+        return (*sizes, *self._form.shapes)
 
     def effect(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         self.require(motion)
-        count = len(values) - len(self._shapes)
+        count = len(values) - len(self._form.shapes)
         effects = self._effects(motion, machine, values[count:])
         return Effect(strut_mm=np.einsum("nsp,ps->ns", effects, values[:count].reshape(-1, STRUTS)))
 
     def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
         self.require(motion)
-        count = len(values) - len(self._shapes)
+        count = len(values) - len(self._form.shapes)
         effects = self._effects(motion, machine, values[count:])
         by_size = (effects[:, :, :, None] * np.eye(STRUTS)[:, None, :]).reshape(len(motion), STRUTS, count)
-        by_shape = [self._by_shape(motion, machine, values, count + k) for k in range(len(self._shapes))]
+        by_shape = [self._by_shape(motion, machine, values, count + k) for k in range(len(self._form.shapes))]
         return Effect(strut_mm=np.concatenate([by_size, *(each[:, :, None] for each in by_shape)], axis=2))
-
-    @property
-    def _shapes(self) -> tuple[Parameter, ...]:
-        return tuple(p for p in self._law.parameters() if p.grid)
 
     def _by_shape(self, motion: Motion, machine: Machine, values: Floats, which: int) -> Floats:
         step = np.zeros(len(values))
@@ -95,9 +91,9 @@ class _OfStruts(ErrorSource):
     def _effects(self, motion: Motion, machine: Machine, shapes: Floats) -> Floats:
         """Return the effect of unit amplitudes, shape (n, 6, p) [mm]; parameters beyond a limit are set to it."""
         columns = motion.once("moving columns", machine, lambda: moving_columns(motion, machine))
-        numbers = {p.name: float(np.clip(value, *p.limits)) for p, value in zip(self._shapes, shapes, strict=True)}
-        needed = [{name: columns[name][:, k] for name in self._law.needs} for k in range(STRUTS)]
-        return MM_PER_UM * np.stack([self._law.columns(one, numbers) for one in needed], axis=1)
+        point = [float(np.clip(value, *p.limits)) for p, value in zip(self._form.shapes, shapes, strict=True)]
+        needed = [{name: columns[name][:, k] for name in self.of.needs} for k in range(STRUTS)]
+        return MM_PER_UM * np.stack([self._form.at(one, point) for one in needed], axis=1)
 
 
 def moving_columns(motion: Motion, machine: Machine) -> dict[str, Floats]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.laws.play import PlayState, followed, leaning
-from dbbstation.laws.presliding import WoundState, wound, wound_up
+from dbbstation.laws.play import EQUATION, FORM_UNCERTAINTY, PlayState, followed, leaning
+from dbbstation.laws.presliding import DAHL, WIND_UP, WoundState, wound, wound_up
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import (
     MM_PER_UM,
@@ -46,7 +46,7 @@ class Backlash(SourceWithHistory):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
-    form_uncertainty = 0.2  # friction and wear differ along the screw and between directions, as play does
+    form_uncertainty = FORM_UNCERTAINTY
     texts = Texts(
         what="A strut's drive has play, or winds up against friction, each time the strut turns from growing to "
         "shrinking.",
@@ -55,10 +55,9 @@ class Backlash(SourceWithHistory):
         confirm="Put a dial gauge or a linear scale on that strut, move it by 0.1 mm to and fro and compare with its "
         "encoder.",
         cure="Tighten or exchange nut, bearing or joint of that strut; until then enter its backlash in the control.",
-        equation="actual minus driven length: y - x, y_k = min(max(y_k-1, x_k - w/2), x_k + w/2); or, where a drive winds "
-        "up over a length l, w z, dz = -(s/2 + z) |dx| / l, s the direction",
-        origin="play operator (hysteresis of play, Krasnosel'skii and Pokrovskii 1983), of each strut's travel; wind-up: Dahl, A "
-        "solid friction model, Aerospace Corporation TOR-158 (1968)",
+        equation=f"actual minus driven length: y - x, {EQUATION}; or, where a drive winds up over a length l, w z, {WIND_UP}",
+        origin="play operator (hysteresis of play, Krasnosel'skii and Pokrovskii 1983), of each strut's travel; wind-up: "
+        + DAHL,
     )
 
     def other_laws(self) -> tuple[ErrorSource, ...]:

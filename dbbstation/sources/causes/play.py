@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import erf
 
-from dbbstation.laws.play import PlayState, followed, leaning
+from dbbstation.laws.play import EQUATION, FORM_UNCERTAINTY, PlayState, followed, leaning
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import (
     motor_loads,
@@ -62,7 +62,7 @@ class Play(SourceWithHistory):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-force"
-    form_uncertainty = 0.2  # play differs with load and place
+    form_uncertainty = FORM_UNCERTAINTY
     texts = Texts(
         what="Nut, bearing or joint of a strut has play that the platform's weight keeps closed. Where the force in the "
         "strut changes from pull to push, the strut gives way by the play.",
@@ -73,8 +73,8 @@ class Play(SourceWithHistory):
         "strut with a dial gauge: it jumps by the play.",
         cure="Preload or exchange the part; until then balance the platform so that the struts' forces keep their sign "
         "in the work.",
-        equation="actual minus driven length = +w/2 where T > R, -w/2 where T < -R; between, y_k - x_k with y_k = "
-        "min(max(y_k-1, x_k - w/2), x_k + w/2); or, where drives shake the strut with a force N, w/2 erf(T / (sqrt(2) N))",
+        equation=f"actual minus driven length = +w/2 where T > R, -w/2 where T < -R; between, y_k - x_k with {EQUATION}; "
+        "or, where drives shake the strut with a force N, w/2 erf(T / (sqrt(2) N))",
         origin="play closed by the load, held by Coulomb's friction; T from the platform's equilibrium "
         "[GRAV eq 1, 6], whose signs turn in 12 of the 15 circles of [CAL Table II] on the reference machine; shaken: a relay with "
         "Gaussian dither (Gelb and Vander Velde, Multiple-Input Describing Functions, 1968)",

@@ -20,13 +20,12 @@ from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.perturbed_forms import GradualBacklash
 from tests.plant.mechanisms.reversal_forms import StickSlip
 from tests.plant.noise import Noise
-from tests.plant.plan import EIGHT, subset, table_ii_plan
+from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 RINGS = RingingStrut(strut=6, height_um=1.5, period_s=0.5, decay_s=1.2)
 WINDS_UP = GradualBacklash((2.0, 1.0, 2.5, 1.5, 2.0, 1.0), (150.0, 80.0, 200.0, 120.0, 250.0, 100.0))
-ALL = "abcdefghijklmno"
 REMEMBERING = Noise(white_um=0.3, correlated_um=0.24, correlation=0.6)
 
 

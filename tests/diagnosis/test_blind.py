@@ -20,8 +20,10 @@ from tests.plant.mechanisms.outsiders import OddGearWobble
 from tests.plant.mechanisms.thermal import ThermalStruts
 from tests.plant.mechanisms.warming import Warming
 from tests.plant.noise import Noise
+from tests.plant.plan import EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.slow
 NAMES = ("gravity", "backlash", "thermal-struts", "bar-drift")
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
@@ -176,7 +178,8 @@ def test_a_warm_up_with_a_law_of_its_own_lends_no_second_name(tmp_path):
 
 def test_silent_when_clean_under_correlated_noise(tmp_path):
     noise = Noise(white_um=0.3, correlated_um=0.3, correlation=0.9)
-    record(tmp_path / "s", seed=33, mechanisms=[KINEMATICS], rate_hz=25.0, noise=noise, angles=True)
+    plan = subset(table_ii_plan(33), EIGHT)
+    record(tmp_path / "s", seed=33, plan=plan, mechanisms=[KINEMATICS], rate_hz=25.0, noise=noise, angles=True)
     recorded = load_sessions([tmp_path / "s"])
     diagnosis = diagnose(recorded.machine, recorded.observations, sources_named(NAMES))
     assert not diagnosis.mismatch

@@ -25,8 +25,10 @@ from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.outsiders import DentedScrew, OddGearWobble, SoftFloor
+from tests.plant.plan import ALL, EIGHT, subset, table_ii_plan
 from tests.plant.session import record
 
+pytestmark = pytest.mark.slow
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 
@@ -60,8 +62,9 @@ def wobble_um(mechanism, length_mm):
     return mechanism.amplitude_um * np.sin(2 * np.pi * turns + np.radians(mechanism.phase_deg))
 
 
-def diagnosed(folder, seed, mechanism):
-    truth = record(folder, seed=seed, mechanisms=[KINEMATICS, mechanism], rate_hz=10.0)
+def diagnosed(folder, seed, mechanism, tests=EIGHT):
+    plan = subset(table_ii_plan(seed), tests)
+    truth = record(folder, seed=seed, plan=plan, mechanisms=[KINEMATICS, mechanism], rate_hz=10.0)
     recorded = load_sessions([folder])
     sources = sources_named(["backlash", "bar-drift"])
     return truth, diagnose(recorded.machine, recorded.observations, sources)
@@ -74,7 +77,7 @@ def wave(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hollow(tmp_path_factory):
-    return diagnosed(tmp_path_factory.mktemp("unexplained") / "hollow", 27, HOLLOW)
+    return diagnosed(tmp_path_factory.mktemp("unexplained") / "hollow", 27, HOLLOW, ALL)
 
 
 @pytest.fixture(scope="module")

@@ -164,6 +164,7 @@ def gravity_plan(
     return Plan(tuple(tests), tuple(balls.values()), path or Path(radius_mm=144.0), name="gravity conditions")
 
 
+ALL = "abcdefghijklmno"
 EIGHT = "abdfhjkn"
 """Of the fifteen of [CAL Table II]: all three heights, tilted and level."""
 

@@ -101,7 +101,7 @@ TABLE = (
     *ENGINE,
     Constant("diagnosis.table.data", "REFITTED"),
     Constant("diagnosis.table.mismatch", "FAR_STATED"),
-    Constant("inference.bent", "LATE"),
+    Constant("inference.bent", "DEPARTS"),
     Constant("inference.bent", "AT_ONCE", (0.25, 0.75)),
     *SAID,
     Constant("inference.bank", "HARDLY_TAKEN", (0.9, 0.975)),

@@ -31,9 +31,8 @@ from dbbstation.inference.chosen_anew import (
     rows_of_groups,
     selection_frequency,
 )
-from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, HeldOut, held_out, in_turn, numbered, widening
+from dbbstation.inference.folds import HeldOut, held_out, in_turn, numbered, widening
 from dbbstation.inference.harmonics import LOW
-from dbbstation.inference.hypotheses import CLOSE
 from dbbstation.inference.model_comparison import all_columns
 from dbbstation.inference.settle import BETTER
 from dbbstation.inference.square_root import solve
@@ -255,7 +254,7 @@ def _held_out(
     channel, settled, variants = explained.channel, explained.settled, [member.variant for member in members]
     known, base = channel.known_with(variants), len(channel.base.prior)
     blocks = channel.blocks(all_columns(variants), channel.target(settled.after))
-    groups = in_turn([o.test for o in channel.observations], FOLDS_OF_AN_ERROR)
+    groups = in_turn([o.test for o in channel.observations], BOUNDS.folds_of_an_error)
 
     def but_for(some: Sequence[Member]) -> HeldOut:
         out = np.concatenate([np.zeros(base, dtype=bool), *(np.full(m.width, m in some) for m in members)])
@@ -277,7 +276,7 @@ def without_tests(explained: Explained, outcome: Settled) -> KnownGains | None:
         partial(predicted_without, explained),
         lambda cause: cause.named,
         most_members=BOUNDS.members,
-        likely=CLOSE,
+        likely=BOUNDS.close,
         thorough=False,
     )
 
@@ -337,10 +336,6 @@ LEAST_SECTORS = BOUNDS.samples_per_turn // 2
 """Least samples per turn for any number of runs; with fewer, noise cannot be estimated far above the low harmonics."""
 
 
-FINER = 4
-"""Most samples per sector at which sharp effects are evaluated: a step's share of a sector is known to an eighth."""
-
-
 def sectors_for(runs: int) -> int:
     """Return the number of samples per turn for a number of runs."""
     return max(min(BOUNDS.samples_per_turn, MOST_SAMPLES // max(runs, 1)), LEAST_SECTORS)
@@ -352,7 +347,11 @@ def thinned(observation: Observation, most: int = BOUNDS.samples_per_turn) -> Ob
     if len(raw) <= most:
         return observation
     sectors = min(most, max(len(raw) // BOUNDS.samples_per_sector, 1))
-    finer = _averaged(observation, FINER * sectors) if len(raw) > FINER * sectors else observation
+    finer = (
+        _averaged(observation, BOUNDS.samples_of_sharp * sectors)
+        if len(raw) > BOUNDS.samples_of_sharp * sectors
+        else observation
+    )
     return replace(_averaged(finer, sectors), finer=(finer, sector_of(finer.raw, sectors)))
 
 

@@ -19,7 +19,7 @@ from dbbstation.diagnosis.unmodelled import EACH, Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of, named_already
 from dbbstation.inference.bounds import BOUNDS, CIRCLES
-from dbbstation.inference.hypotheses import CLOSE, LIKELY, Hypothesis, other_laws, search
+from dbbstation.inference.hypotheses import Hypothesis, other_laws, search
 from dbbstation.inference.model_comparison import SCALES, all_columns
 from dbbstation.inference.settled import Outcome
 from dbbstation.inference.verdict import SURE
@@ -57,7 +57,7 @@ class SettledCircles(Outcome):
 
     def second_start_agrees(self) -> bool:
         """Return whether a search without seeds agrees."""
-        anew = search(self.comparison, self.causes, most_members=BOUNDS.members, likely=CLOSE)
+        anew = search(self.comparison, self.causes, most_members=BOUNDS.members, likely=BOUNDS.close)
         return anew.best.names == max(self.posterior.weights, key=self.posterior.weights.__getitem__)
 
     @property
@@ -173,7 +173,7 @@ class _Settling:
         self._tried: set[frozenset[tuple[str, str]]] = set()
         self._seeds: dict[frozenset[str], tuple[Member, ...]] = {}
         self._given_up: set[tuple[str, str]] = set()
-        self._likely = CLOSE  # until the result is stable only the most probable set is needed
+        self._likely = BOUNDS.close  # until the result is stable only the most probable set is needed
 
     def run(self, *, until_interrupted: bool) -> SettledCircles:
         """Run until the result is stable or an interruption comes.
@@ -187,7 +187,7 @@ class _Settling:
             for left in reversed(range(CIRCLES.rounds - 1)):
                 if self._is_done(settled):
                     break
-                self._likely = self._likely if left else LIKELY
+                self._likely = self._likely if left else BOUNDS.likely
                 del settled  # free its products before the next ones need as much memory
                 settled = self._compared()
         except KeyboardInterrupt:
@@ -227,7 +227,7 @@ class _Settling:
         best = settled.best if self._fitted else loud(settled.best)
         named = frozenset((m.name, m.variant.law) for m in best.members if m.cause.named)
         if named == self._fitted or named in self._tried:
-            done, self._likely = self._likely == LIKELY, LIKELY
+            done, self._likely = self._likely == BOUNDS.likely, BOUNDS.likely
             return done
         self._tried.add(named)
         self._progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
@@ -335,7 +335,7 @@ def _fitted_as_named(channel: CircleChannel, settled: SettledCircles) -> Settled
 def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
     top = posterior.best.log_posterior
     for hypothesis in posterior.hypotheses:
-        if hypothesis.log_posterior < top - CLOSE:  # exact fits would not change the decision
+        if hypothesis.log_posterior < top - BOUNDS.close:  # exact fits would not change the decision
             break
         if frozenset((m.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
             return hypothesis

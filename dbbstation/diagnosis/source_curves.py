@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Motion
 
 
-WAVE_PIECE_MM = 1.0
-"""Bins of strut length for waves, down to periods of 4 mm [mm]."""
-
 SEEN = 2.5
 """Fine bins with more than this multiple of the usual uncertainty are omitted, because they would dominate the figure."""
 
@@ -179,7 +176,7 @@ def _branch(
     fine: bool,
 ) -> Branch:
     over, gain = samples.variable[:, column], samples.gain[:, column]
-    pieces = int(np.ceil(np.ptp(over) / WAVE_PIECE_MM)) if fine else BOUNDS.curve_pieces
+    pieces = int(np.ceil(np.ptp(over) / (BOUNDS.wave_mm / 4.0))) if fine else BOUNDS.curve_pieces
     edges = np.linspace(over.min(), over.max(), pieces + 1)
     piece = np.clip(np.searchsorted(edges, over[rows], side="right") - 1, 0, pieces - 1)
     _, piece, count = np.unique(piece, return_inverse=True, return_counts=True)

@@ -50,15 +50,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Columns
 
 
-PIECE_MM = 0.5
-"""Bins of strut length, for waves down to 4 mm [mm]."""
-
-SHORTEST_MM = 4.0
-"""Shortest searched wave of strut length [mm]."""
-
-SHORTEST_S = 3.0
-"""Shortest searched wave of time [s]; four bins in recordings too long for it."""
-
 WIDTHS_MM = (3.0, 5.0, 8.0, 13.0, 20.0)
 """Standard deviations of bumps of strut length: dents and bent covers [mm]."""
 
@@ -84,15 +75,6 @@ RINGS = tuple(
     for period_s in RINGING_PERIODS_S
     if period_s <= decay_s
 )
-
-RINGING_PIECE_S = 0.02
-"""A tenth of the shortest period."""
-
-RINGING_S = 12.0
-"""Longest time of a ringing after a reversal."""
-
-PLACE_MM = 5.0
-"""Bins of the platform's position in each coordinate [mm]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +175,8 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
     found: list[Shape] = []
     for strut in STRUT_NUMBERS:
         low, high = extent.of("strut-length", strut)
-        lengths = look.over("strut-length", strut, EVERY, (low, PIECE_MM))
-        grid = np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low)
+        lengths = look.over("strut-length", strut, EVERY, (low, BOUNDS.wave_mm / 8.0))
+        grid = np.arange(0.5, (high - low) / BOUNDS.wave_mm, 0.5) / (high - low)
         found += lengths.waves(grid, lengths.sums.of_forms([Wave(float(frequency)) for frequency in grid]))
         found += lengths.best("bump", bumps(low, high, WIDTHS_MM), _BUMPS_APART)
         found += lengths.best("step", steps(low, high, _STEPS))
@@ -204,7 +186,7 @@ def looked_for(look: TemplateScan, extent: Ranges) -> list[Shape]:
             found += forces.best("step", steps(low, high, _STEPS))
     if "time" in extent.low:
         low, high = extent.of("time")
-        wide = max(SHORTEST_S / 4.0, (high - low) / BOUNDS.pieces_of_travel)
+        wide = max(BOUNDS.wave_s / 4.0, (high - low) / BOUNDS.pieces_of_travel)
         movers: list[tuple[int | None, str]] = [(None, READING), (None, BALL)]
         for own, moves in (*movers, *((strut, EVERY) for strut in STRUT_NUMBERS)):
             times = look.over("time", own, moves, (low, wide))
@@ -266,11 +248,12 @@ def _piece(values: Floats, low: float, width: float) -> Integers:
 
 
 def _since(values: Floats) -> Integers:
-    return np.round(np.clip(values, -RINGING_S, RINGING_S) / RINGING_PIECE_S).astype(np.int64)
+    most, piece = BOUNDS.ringing_s, RINGING_PERIODS_S[0] / 10.0
+    return np.round(np.clip(values, -most, most) / piece).astype(np.int64)
 
 
 def _place(values: Floats) -> Integers:
-    x, y = np.floor(values / PLACE_MM).astype(np.int64).T
+    x, y = np.floor(values / BOUNDS.place_mm).astype(np.int64).T
     return x * 100_000 + y
 
 
@@ -279,7 +262,7 @@ def _lines(places: Floats) -> list[Form]:
     for across in ACROSS_DEG:
         along = PlaneStep(float(across), 0.0, 1.0).along(places)
         for width in LINE_WIDTHS_MM:
-            lines = np.arange(along.min() + 2 * width, along.max() - 2 * width, max(width, 2 * PLACE_MM))
+            lines = np.arange(along.min() + 2 * width, along.max() - 2 * width, max(width, 2 * BOUNDS.place_mm))
             found += [PlaneStep(float(across), float(at), width) for at in lines]
     return found
 

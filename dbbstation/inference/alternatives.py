@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.hypotheses import NEGLIGIBLE
-from dbbstation.inference.triangle import RANK, root
+from dbbstation.inference.triangle import ROUNDING, root
 from dbbstation.inference.verdict import OUT, SURE
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class Alternatives:
         formulas = np.hypot(member.variant.form_uncertainty, in_place.best[0].variant.form_uncertainty)
         if np.sqrt(1.0 - cosine**2) <= formulas:
             return False
-        return self._best.log_factor(member.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
+        return self._best.log_factor(member.name) - float(in_place.log_factor[0]) > BOUNDS.negligible
 
     def _cosine(self, one: Integers, other: Integers, others: tuple[Member, ...]) -> float:
         """Return the least cosine between two causes' spans, given base and other members; 1 means equal effects."""
@@ -94,7 +93,7 @@ def named_already(comparison: ModelComparison, nameless: Sequence[Variant], name
     found = np.zeros(len(nameless), dtype=bool)
     by_size: dict[int, list[Variant]] = {}
     for variant in named:
-        if variant.form_uncertainty > 0.0 and len(variant.columns) <= MOST_ALIKE:
+        if variant.form_uncertainty > 0.0 and len(variant.columns) <= BOUNDS.amplitudes_alike:
             by_size.setdefault(len(variant.columns), []).append(variant)
     for size, forms in by_size.items():
         alike = np.array([k for k, form in enumerate(nameless) if len(form.columns) == size], dtype=np.int64)
@@ -115,11 +114,6 @@ def named_already(comparison: ModelComparison, nameless: Sequence[Variant], name
         apart = np.sqrt(np.maximum(1.0 - shown / np.maximum(whole, 1e-300)[:, None], 0.0))
         found[alike] = (apart <= [form.form_uncertainty for form in forms]).any(axis=1)
     return found.tolist()
-
-
-MOST_ALIKE = 3
-"""Most amplitudes of an effect that is compared with forms of named causes: a shift in space has three. With 1 a bumped
-jig is ambiguous with a step over time in two of two sessions; with 6 four sessions do not change."""
 
 
 def in_place_of(name: str, settled: Outcome, causes: Sequence[Cause]) -> list[Member]:
@@ -156,7 +150,7 @@ def norm_over_sigma(products: Floats, values: Floats, covariance: Floats) -> flo
 
 def _inverse_root(products: Floats) -> Floats:
     value, axes = np.linalg.eigh(products)
-    usable = value > RANK * max(float(value[-1]), 1e-300)
+    usable = value > ROUNDING * max(float(value[-1]), 1e-300)
     return (axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T
 
 

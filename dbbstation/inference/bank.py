@@ -29,7 +29,7 @@ from dbbstation.inference.model_comparison import Cause, ModelComparison, Varian
 from dbbstation.inference.patterns import NAMED, ZERO_SD, Family, log_odds, odds_of_driven
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import compress, solve, with_random
-from dbbstation.inference.triangle import RANK, rms
+from dbbstation.inference.triangle import ROUNDING, rms
 from dbbstation.inference.uneven import (
     has_long_tails,
     log_student,
@@ -50,11 +50,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Choices, Pattern
     from dbbstation.inference.square_root import Columns
 
-TANGENT = 1e-3
-"""Step for the derivative by a nonlinear parameter, in units of its grid spacing."""
-
-QUIETEST = 1e-9
-"""Least noise relative to the residual; less is rounding."""
 
 LOOKED_FOR = frozenset({Family.WAVE, Family.BUMP, Family.STEP, Family.PULSES, Family.PULSES_BY_DIRECTION})
 """Families of patterns that were picked by a search of the residual."""
@@ -196,7 +191,7 @@ class Bank:
 
         Picked patterns count only if they outweigh their odds, because chance peaks absorb noise.
         """
-        least = max(QUIETEST * self.channel.size, self.channel.least_noise)
+        least = max(ROUNDING * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches
         for _ in range(BOUNDS.noise_rounds):
             beside = self.beside()
@@ -221,7 +216,7 @@ class Bank:
                 found = self._colour_of(left, draws, stretches, found)
             self._take(found, spread, trust)
             self.tails, self.grows_with = tails, grows_with
-            if alike(found, before) and uneven < SETTLED:
+            if alike(found, before) and uneven < BOUNDS.noise_settled:
                 break
         return self.noise
 
@@ -230,7 +225,7 @@ class Bank:
         target, innovation = self.target, self.noise.innovation
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
         seen = np.linalg.svd(self.base / innovation, compute_uv=False)
-        seen = seen[seen > RANK * seen[:1]]
+        seen = seen[seen > ROUNDING * seen[:1]]
         return self.log_level() - 0.5 * float(rest @ rest) / innovation**2 - float(np.log(seen).sum())
 
     def log_level(self) -> float:
@@ -462,9 +457,12 @@ def tangents_of(law: Law, point: Sequence[float], amplitudes: Floats, spacings: 
     """Return numerical derivatives of a law's effect by each nonlinear parameter, shape (n,) each."""
     found = []
     for k, spacing in enumerate(spacings):
-        ends = [[v + sign * TANGENT * spacing * (i == k) for i, v in enumerate(point)] for sign in (1.0, -1.0)]
+        ends = [
+            [v + sign * BOUNDS.derivative_step * spacing * (i == k) for i, v in enumerate(point)]
+            for sign in (1.0, -1.0)
+        ]
         up, down = (law.columns(tuple(values)) @ amplitudes for values in ends)
-        found.append((up - down) / (2.0 * TANGENT * spacing))
+        found.append((up - down) / (2.0 * BOUNDS.derivative_step * spacing))
     return found
 
 
@@ -478,10 +476,10 @@ def amplitudes_of(variant: Variant) -> Integers:
 def alike(one: Coloured, other: Coloured) -> bool:
     """Return whether two noise models have similar spectra and innovations."""
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
-    if any(abs(a - b) >= SETTLED * max(a, b) for a, b in pairs):
+    if any(abs(a - b) >= BOUNDS.noise_settled * max(a, b) for a, b in pairs):
         return False
     frequency = np.linspace(0.0, 0.5, BOUNDS.spectra_at)
-    return float(np.abs(one.log_power(frequency) - other.log_power(frequency)).mean()) < 2.0 * SETTLED
+    return float(np.abs(one.log_power(frequency) - other.log_power(frequency)).mean()) < 2.0 * BOUNDS.noise_settled
 
 
 HARDLY_TAKEN = 0.95
@@ -494,9 +492,6 @@ largest scale."""
 
 TIE = 1e-3
 """Difference in log odds between successive variables of a table, so that the first of two equal variables is named."""
-
-SETTLED = 0.03
-"""Negligible relative change of the noise, about its uncertainty."""
 
 
 def spacing_of(grid: Sequence[float], value: float) -> float:

@@ -25,18 +25,9 @@ if TYPE_CHECKING:
     from dbbstation.inference.variables import Variable
 
 
-SHORTEST_ROWS = 2.0
-"""Shortest time constant in rows; faster effects are no memory."""
-
-LONGEST_SHARE = 1.0 / 3.0
-"""Longest time constant over the longest block; of longer ones only the drift at the start is visible."""
-
-LONGEST_DELAY_SHARE = 0.1
-"""Longest dead time over the longest block; earlier rows contain no information on it."""
-
-LATE = 0.1
-"""Prior probability that an effect has a visible delay of either kind. Over a slow variable any delay is invisible, and
-the effect is called linear."""
+DEPARTS = 0.1
+"""Prior probability of a visible delay of either kind; also of a visible departure from a straight line or a sign in one
+of the other ways. Over a slow variable any delay is invisible, and the effect is called linear."""
 
 AT_ONCE = 0.5
 """Prior probability that the simulation contains the effect without delay; the residual is then the delayed minus the immediate effect."""
@@ -59,8 +50,8 @@ def memory_laws(
     row = float(np.median(np.concatenate(steps)))
     longest = max(float(np.sum(step)) for step in steps)
     kinds = (
-        (Family.MEMORY, "time constant", _lag, _grid(SHORTEST_ROWS * row, LONGEST_SHARE * longest)),
-        (Family.DEAD_TIME, "dead time", _delay, _grid(row, LONGEST_DELAY_SHARE * longest)),
+        (Family.MEMORY, "time constant", _lag, _grid(BOUNDS.memory_rows * row, BOUNDS.memory_share * longest)),
+        (Family.DEAD_TIME, "dead time", _delay, _grid(row, BOUNDS.delay_share * longest)),
     )
     found = []
     for family, parameter, columns, grid in kinds:
@@ -79,7 +70,7 @@ def memory_laws(
                         time_unit,
                     ),
                     grids=(grid,),
-                    log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))) + odds_of_driven([variable]),
+                    log_odds=log_odds(len(usable)) + float(np.log(DEPARTS / len(kinds))) + odds_of_driven([variable]),
                     choices=_choices(2 + starts),
                     reach=size,
                     family=family,
@@ -147,10 +138,6 @@ KNEES = (0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
 
 SPEEDS = tuple(np.geomspace(0.01, 0.5, 5).tolist())
 """Tried transition speeds of friction, over the largest speed; with smaller ones friction is hysteresis."""
-
-BENT = 0.1
-"""Prior probability that an effect visibly departs from a straight line or a sign in one of these ways; equal to
-`memory.LATE`."""
 
 MADE = 0.9
 """Share of the simulated value's squares that a linear model must explain before its slopes give directions of growth."""
@@ -304,7 +291,7 @@ def _with_width(
         parameters=(*(one for one, _, _ in amplitudes), width[0]),
         units=(*(unit for _, unit, _ in amplitudes), width[1]),
         grids=(grid,),
-        log_odds=log_odds(members) + float(np.log(0.5 * BENT)) + odds_of_driven([variable]),
+        log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven([variable]),
         choices=choices if len(choices) > 1 else (),
         reach=size,
         family=family,
@@ -351,7 +338,7 @@ def _integral(
         plausible=np.full(2 + starts, size),
         parameters=("rate", "drift", *(f"start {k + 1}" for k in range(starts))),
         units=(f"{unit}/({variable.unit or variable.name} {time_unit})", f"{unit}/{time_unit}", *[unit] * starts),
-        log_odds=log_odds(members) + float(np.log(0.5 * BENT)) + odds_of_driven([variable]),
+        log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven([variable]),
         zero_from=middle,
         reach=size,
         family=Family.INTEGRAL,
@@ -369,7 +356,7 @@ def _scaled(one: Variable, by: Variable, blocks: Sequence[slice], size: float, u
         plausible=np.full(len(labels), size),
         parameters=("size per unit",) * len(labels),
         units=(f"{unit}/{by.unit}" if by.unit else unit,) * len(labels),
-        log_odds=log_odds(members) + float(np.log(0.5 * BENT)) + odds_of_driven([one, by]),
+        log_odds=log_odds(members) + float(np.log(0.5 * DEPARTS)) + odds_of_driven([one, by]),
         choices=one_of(labels),
         reach=size,
         family=Family.SCALED,

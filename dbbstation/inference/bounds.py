@@ -287,6 +287,107 @@ class Bounds:
     arcs_told: int = 36
     """Arcs of a turn with reported mean differences: ten degrees each."""
 
+    amplitudes_alike: int = 3
+    """Most amplitudes of an effect that is compared with forms of named causes: a shift in space has three. With 1 a
+    bumped jig is ambiguous with a step over time in two of two sessions; with 6 four sessions do not change."""
+
+    noise_settled: float = 0.03
+    """Negligible relative change of the noise, about its uncertainty."""
+
+    derivative_step: float = 1e-3
+    """Step for the derivative by a nonlinear parameter, in units of its grid spacing."""
+
+    order: int = 60
+    """Largest order of a prediction of noise."""
+
+    rows_per_order: int = 5
+    """Least rows per coefficient of a prediction; Akaike's corrected criterion requires so many."""
+
+    band_frequencies: int = 6
+    """Fewest frequencies in a band of a spectrum."""
+
+    band_ratio: float = 1.2
+    """Ratio of the widths of neighbouring bands."""
+
+    rows_of_spectrum: int = 64
+    """Fewest rows of a stretch for a spectrum, if such a stretch exists."""
+
+    points_per_wave: int = 8
+    """Printed points per wave."""
+
+    points_per_width: int = 3
+    """Printed points per width of a bump or step."""
+
+    tails_shown: float = 4.0
+    """Widths before and after a bump or step, and decay times of a ringing, that are printed: 2 % of a ringing remain."""
+
+    periods_shown: float = 100.0
+    """Most periods printed point by point; of more, only one is printed."""
+
+    harmonics_averaged: int = 9
+    """Harmonics over which the remaining share is averaged."""
+
+    harmonics_at_once: int = 16
+    """Harmonics per coarse wave: the root of the usual number."""
+
+    lags: int = 201
+    """Number of lags of a correlation in samples; longer correlations are structure that a model should name."""
+
+    likely: float = 8.0
+    """Largest log odds against a hypothesis, relative to the best, whose neighbours are examined; less likely ones have
+    a probability of 3e-4."""
+
+    close: float = 1.0
+    """The same limit if only the most probable hypothesis is wanted: clearly less probable ones seldom lead to a better
+    neighbour. With 1, 3 and 8 the selections of ten groups of tests in the slowest known session were equal."""
+
+    negligible: float = 40.0
+    """Log odds against the best hypothesis above which first scores are discarded to save memory: a million such sets
+    have a total probability of 4e-12."""
+
+    rows_per_piece: int = 4
+    """Least average rows per bin of a variable; 1 for waves except over time, because four rows can be a wave."""
+
+    pieces_per_wave: int = 4
+    """Bins in the shortest wave."""
+
+    flexible: int = 12
+    """Fewest amplitudes of a form that can imitate two causes: two per strut."""
+
+    wide: int = 100
+    """Fewest amplitudes of a form for which a factorisation for each size takes less time than eigenvectors: 1.2 for 2.8
+    ms of 209 amplitudes of a wandering bar, 0.10 for 0.14 ms of 48. Only the time depends on it."""
+
+    memory_rows: float = 2.0
+    """Shortest time constant in rows; faster effects are no memory."""
+
+    memory_share: float = 1.0 / 3.0
+    """Longest time constant over the longest block; of longer ones only the drift at the start is visible."""
+
+    delay_share: float = 0.1
+    """Longest dead time over the longest block; earlier rows contain no information on it."""
+
+    folds: int = 10
+    """Largest number of held-out parts; with fewer than `folds.ENOUGH_BLOCKS` blocks the exact number."""
+
+    folds_of_an_error: int = 5
+    """Number of groups of tests for the prediction error alone, without a new selection."""
+
+    wave_mm: float = 4.0
+    """Shortest searched wave of strut length [mm]."""
+
+    wave_s: float = 3.0
+    """Shortest searched wave of time [s]; four bins in recordings too long for it."""
+
+    ringing_s: float = 12.0
+    """Longest time of a ringing after a reversal [s]."""
+
+    place_mm: float = 5.0
+    """Bins of the platform's position in each coordinate [mm]."""
+
+    samples_of_sharp: int = 4
+    """Most samples per sector at which sharp effects are evaluated: a step's share of a sector is known to an eighth."""
+
 
 BOUNDS = Bounds()
 """Limits for tables, and for all clients."""

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.folds import FOLDS, in_turn
+from dbbstation.inference.folds import in_turn
 from dbbstation.inference.followed import ClassGain, VariableProbabilities, classes_of, follow_of
-from dbbstation.inference.hypotheses import CLOSE, search
+from dbbstation.inference.hypotheses import search
 from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class KnownGains:
 
 def groups_of_tests(tests: Sequence[str]) -> list[int]:
     """Return each run's group of tests, by the runs' tests; empty for fewer than `LEAST_PARTS` groups."""
-    groups = in_turn(tests, FOLDS)
+    groups = in_turn(tests, BOUNDS.folds)
     return groups if len(set(groups)) >= LEAST_PARTS else []
 
 
@@ -160,7 +160,7 @@ def selection_frequency(
     times = dict.fromkeys((cause.name for cause in causes), 0)
     for _ in range(BOUNDS.selection_draws):
         comparison = without(~np.isin(groups, rng.choice(names, kept_groups, replace=False)))
-        found = search(comparison, causes, [begin], most_members=most_members, likely=CLOSE, thorough=not begin)
+        found = search(comparison, causes, [begin], most_members=most_members, likely=BOUNDS.close, thorough=not begin)
         for name in found.best.names:
             times[name] += 1
     return {name: count / BOUNDS.selection_draws for name, count in times.items()}

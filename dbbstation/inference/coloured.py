@@ -24,14 +24,9 @@ if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
 
-LONGEST = 60
-"""Largest order of a prediction."""
-
-ROWS_PER_ORDER = 5
-"""Least rows per coefficient of a prediction; Akaike's corrected criterion requires so many."""
-
 NOTHING = 1e-3
-"""Negligible partial autocorrelation."""
+"""Negligible partial autocorrelation, and negligible whitened rms of an effect over the noise: a million rows show either by
+one standard deviation."""
 
 STEADY = 0.999
 """Largest partial autocorrelation: noise correlated over more than a thousand rows cannot be distinguished from a trend."""
@@ -54,14 +49,6 @@ SHARES = np.geomspace(0.01, 100.0, 33)
 LOG_VARIANCE = np.pi**2 / 6.0
 """Variance of the logarithm of one power."""
 
-FEWEST = 6
-"""Fewest frequencies in a band of a spectrum."""
-
-WIDER = 1.2
-"""Ratio of the widths of neighbouring bands."""
-
-SHORTEST = 64
-"""Fewest rows of a stretch for a spectrum, if such a stretch exists."""
 
 SHORTEST_OF_ALL = 16
 """Fewest rows if all stretches are shorter, as in many short runs; at least half of the longest. A low-pass of seven
@@ -82,7 +69,7 @@ class Coloured:
 
     sigma: float
     partial: tuple[float, ...] = ()
-    told_by: int = LONGEST
+    told_by: int = BOUNDS.order
 
     @classmethod
     def first_order(cls, sigma: float, share: float, decay: float, turn_rad: float = 0.0) -> Coloured:
@@ -91,7 +78,7 @@ class Coloured:
         Args:
             decay: correlation of neighbours, or of the oscillation's envelope.
         """
-        lags = np.arange(LONGEST + 1)
+        lags = np.arange(BOUNDS.order + 1)
         correlation = np.where(lags == 0, 1.0, share * decay**lags * np.cos(turn_rad * lags))
         return cls(sigma, partial_autocorrelations(correlation), 3 if turn_rad else 2)
 
@@ -254,7 +241,7 @@ def bands_of(rows: Floats, stretches: Sequence[slice]) -> Bands | None:
     """
     frequency, power = [], []
     longest = max((stretch.stop - stretch.start for stretch in stretches), default=0)
-    least = SHORTEST if longest >= SHORTEST else max(longest // 2, SHORTEST_OF_ALL)
+    least = BOUNDS.rows_of_spectrum if longest >= BOUNDS.rows_of_spectrum else max(longest // 2, SHORTEST_OF_ALL)
     for stretch in stretches:
         own = rows[stretch]
         if len(own) >= least:
@@ -266,10 +253,10 @@ def bands_of(rows: Floats, stretches: Sequence[slice]) -> Bands | None:
     order = np.argsort(every, kind="stable")
     logs = np.log(np.maximum(np.concatenate(power)[order], 1e-300))
     every = every[order]
-    edges, width = [0], float(FEWEST)
+    edges, width = [0], float(BOUNDS.band_frequencies)
     while edges[-1] + width * 2.0 < len(every):
         edges.append(edges[-1] + int(width))
-        width *= WIDER
+        width *= BOUNDS.band_ratio
     count = np.diff([*edges, len(every)]).astype(np.float64)
     starts = np.array(edges)
     return Bands(np.add.reduceat(every, starts) / count, np.add.reduceat(logs, starts) / count + LOG_MEAN, count)
@@ -287,7 +274,7 @@ def autoregressive(rows: Floats, stretches: Sequence[slice]) -> Coloured:
     behind = [own.copy() for own in ahead]
     left, partials = 1.0, []
     best, kept = akaike_cost(0, count), 0
-    for order in range(1, min(LONGEST, count // ROWS_PER_ORDER) + 1):
+    for order in range(1, min(BOUNDS.order, count // BOUNDS.rows_per_order) + 1):
         pairs = [(a[1:], b[:-1]) for a, b in zip(ahead, behind, strict=True) if len(a) > 1]
         both = sum(float(a @ a) + float(b @ b) for a, b in pairs)
         if not both > 0.0:
@@ -362,9 +349,9 @@ def with_put_back(noise: Coloured, bands: Floats, taken: Floats, rows: int) -> C
     """
     frequency = np.linspace(0.0, 0.5, BOUNDS.frequencies + 1)
     power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))
-    covariance = np.fft.irfft(power)[: LONGEST + 1]
+    covariance = np.fft.irfft(power)[: BOUNDS.order + 1]
     variance = float(covariance[0])
-    partials = np.array(partial_autocorrelations(covariance / variance)[: rows // ROWS_PER_ORDER])
+    partials = np.array(partial_autocorrelations(covariance / variance)[: rows // BOUNDS.rows_per_order])
     costs = [akaike_cost(order, rows) for order in range(len(partials) + 1)]
     gains = np.concatenate([[0.0], np.cumsum(0.5 * rows * np.log1p(-(partials**2)))])
     return Coloured(float(np.sqrt(variance)), tuple(partials[: int(np.argmin(costs + gains))].tolist()))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import numpy as np
 
 from dbbstation.facts.serialise import AsItIs, Kept
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.followed import WithoutPart, left_without
 from dbbstation.inference.square_root import Block, Columns, Solution, compress, solve, spread
 from dbbstation.inference.triangle import rms, squares
@@ -108,9 +109,6 @@ def _left(blocks: Sequence[Block], known: Columns, x: Floats, noise: float) -> f
     return float(remaining @ remaining) + max(beyond, 0.0)
 
 
-FOLDS = 10
-"""Largest number of held-out parts; with fewer than `ENOUGH_BLOCKS` blocks the exact number."""
-
 ENOUGH_BLOCKS = 5
 """Number of blocks from which parts are whole blocks, if these have similar sizes."""
 
@@ -118,8 +116,6 @@ WIDEST_GAP = 0.5
 """Largest excluded gap on each side of a part, over its rows: even for long correlations four fifths of the rows remain
 for the selection."""
 
-FOLDS_OF_AN_ERROR = 5
-"""Number of groups of tests for the prediction error alone, without a new selection."""
 
 Kind: TypeAlias = "tuple[str, ...]"
 """Family and variables of an effect, or the name of a law."""
@@ -267,15 +263,15 @@ def parts_of(channel: Channel) -> list[tuple[str, Flags]]:
 
 def part_numbers(lengths: Sequence[int]) -> Integers:
     """Return the number of each row's part, shape (n,); parts have similar size and whole blocks."""
-    # Long blocks are split evenly. Short neighbouring blocks are joined, to at most `FOLDS` parts of at least half an
+    # Long blocks are split evenly. Short neighbouring blocks are joined, to at most `BOUNDS.folds` parts of at least half an
     # equal share.
-    share = sum(lengths) / (min(FOLDS, len(lengths)) if len(lengths) >= ENOUGH_BLOCKS else FOLDS)
+    share = sum(lengths) / (min(BOUNDS.folds, len(lengths)) if len(lengths) >= ENOUGH_BLOCKS else BOUNDS.folds)
     sizes: list[int] = []
     for length in lengths:
         pieces = max(min(round(length / share), length), 1)
         sizes += np.diff(np.arange(pieces + 1) * length // pieces).tolist()
-    while len(sizes) > 1 and (len(sizes) > FOLDS or min(sizes) < 0.5 * share):
-        short = range(len(sizes) - 1) if len(sizes) > FOLDS else _beside(int(np.argmin(sizes)), len(sizes))
+    while len(sizes) > 1 and (len(sizes) > BOUNDS.folds or min(sizes) < 0.5 * share):
+        short = range(len(sizes) - 1) if len(sizes) > BOUNDS.folds else _beside(int(np.argmin(sizes)), len(sizes))
         k = min(short, key=lambda k: sizes[k] + sizes[k + 1])
         sizes[k : k + 2] = [sizes[k] + sizes[k + 1]]
     return np.repeat(np.arange(len(sizes)), sizes)

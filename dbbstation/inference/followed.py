@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.levels import RUN, TIME
-from dbbstation.inference.model_comparison import FLEXIBLE, all_columns, belong_to
+from dbbstation.inference.model_comparison import all_columns, belong_to
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.triangle import rms, squares
@@ -201,7 +201,7 @@ def shares_of(settled: Settled, members: Collection[str], causes: Sequence[Cause
     others = [m for m in settled.best.members if m.name not in members]
     found = {}
     for cause in causes:
-        stiff = [one for one in cause.variants if len(one.columns) < FLEXIBLE] or cause.variants
+        stiff = [one for one in cause.variants if len(one.columns) < BOUNDS.flexible] or cause.variants
         most = max(len(one.columns) for one in stiff)
         found[cause.name] = max(
             share_made(settled.comparison.beside(others, np.concatenate([columns, one.columns])), values)

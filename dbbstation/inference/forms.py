@@ -14,6 +14,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.special import comb
 
+from dbbstation.inference.bounds import BOUNDS
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -22,12 +24,6 @@ if TYPE_CHECKING:
 
 SPLINES = 7
 """Points of a piecewise linear curve."""
-
-POINTS_PER_WAVE = 8
-POINTS_PER_WIDTH = 3
-"""Points per width of a bump or step, from four widths before to four after."""
-
-WIDTHS = 4.0
 
 
 HARMONICS = (2, 3, 5, 8)
@@ -120,13 +116,9 @@ class Wave(Form):
 
     def points(self, low: float, high: float) -> Floats:
         periods = (high - low) * self.frequency
-        periods = periods if periods <= _MOST_PERIODS else 1.0
+        periods = periods if periods <= BOUNDS.periods_shown else 1.0
         span = periods / self.frequency
-        return np.linspace(low, low + span, max(2, int(np.ceil(periods * self.harmonics * POINTS_PER_WAVE)) + 1))
-
-
-_MOST_PERIODS = 100.0
-"""Most periods printed point by point; of more, only one is printed."""
+        return np.linspace(low, low + span, max(2, int(np.ceil(periods * self.harmonics * BOUNDS.points_per_wave)) + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +143,7 @@ class WaveOfTurn(Form):
 
     def points(self, low: float, high: float) -> Floats:
         del low, high
-        turn = np.linspace(0.0, 1.0, int(np.ceil(POINTS_PER_WAVE * max(self.frequency, 1.0))) + 1)
+        turn = np.linspace(0.0, 1.0, int(np.ceil(BOUNDS.points_per_wave * max(self.frequency, 1.0))) + 1)
         return np.concatenate([-turn[:0:-1], turn[1:]])
 
 
@@ -214,7 +206,8 @@ class StepForm(Form):
 
 
 def _across(at: float, width: float, low: float, high: float) -> Floats:
-    near = at + width * np.linspace(-WIDTHS, WIDTHS, int(2 * WIDTHS * POINTS_PER_WIDTH) + 1)
+    reach = BOUNDS.tails_shown
+    near = at + width * np.linspace(-reach, reach, int(2 * reach * BOUNDS.points_per_width) + 1)
     return np.unique(np.concatenate([[low], near[(near > low) & (near < high)], [high]]))
 
 
@@ -313,10 +306,6 @@ class Spring(Form):
         return np.column_stack([np.ones(len(values)), (values - self.about) / 100.0])
 
 
-RINGS_FOR = 4.0
-"""Decay times over which a ringing is printed, until 2 % remain."""
-
-
 @dataclass(frozen=True, eq=False)
 class Ringing(Form):
     """A damped oscillation over the signed time since a reversal: cosine and sine."""
@@ -337,8 +326,8 @@ class Ringing(Form):
 
     def points(self, low: float, high: float) -> Floats:
         del low
-        last = min(high, RINGS_FOR * self.decay)
-        return np.linspace(1e-6, last, max(int(POINTS_PER_WAVE * last / self.period), 2) + 1)
+        last = min(high, BOUNDS.tails_shown * self.decay)
+        return np.linspace(1e-6, last, max(int(BOUNDS.points_per_wave * last / self.period), 2) + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,9 +358,6 @@ class BehindReversal(Form):
         return self.length * np.append(0.0, 0.5 ** np.arange(self.halves, -1, -1))
 
 
-CUBIC = 3
-
-
 @dataclass(frozen=True, eq=False)
 class Spline(Form):
     """A smooth curve: cubic B-splines over a range, constant outside.
@@ -391,10 +377,10 @@ class Spline(Form):
 
     def columns(self, values: Floats) -> Floats:
         """Return B-splines at values, shape (..., p)."""
-        inner = np.linspace(0.0, 1.0, self.functions - CUBIC + 1)
-        knots = np.concatenate([np.zeros(CUBIC), inner, np.ones(CUBIC)])
+        inner = np.linspace(0.0, 1.0, self.functions - DEGREE + 1)
+        knots = np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
         share = np.clip((np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low), 0.0, 1.0)
-        flat = BSpline.design_matrix(share.ravel(), knots, CUBIC).toarray()
+        flat = BSpline.design_matrix(share.ravel(), knots, DEGREE).toarray()
         return flat.reshape(*share.shape, self.functions)[..., : self.count]
 
 
@@ -453,7 +439,7 @@ class Stretches(Form):
 
 
 DEGREE = 3
-"""Degree of the modulating polynomials: four functions over the range of a variable."""
+"""Degree of splines, and of modulating polynomials: four functions over the range of a variable."""
 
 ALONG_SCREWS = 8
 """Their degree for friction and wear of screws, which vary over some tens of millimetres: nine functions over the range.

@@ -91,9 +91,9 @@ def basis(phase_rad: Floats, highest: int) -> Floats:
 
 
 def _waves(phase_rad: Floats, highest: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return waves whose products are harmonics a + AT_ONCE b, ten times faster than cosines."""
-    first = np.exp(1j * phase_rad)
-    return _powers(first, min(AT_ONCE, highest + 1)), _powers(np.exp(1j * AT_ONCE * phase_rad), highest // AT_ONCE + 1)
+    """Return waves whose products are harmonics a + q b, ten times faster than cosines."""
+    q, first = BOUNDS.harmonics_at_once, np.exp(1j * phase_rad)
+    return _powers(first, min(q, highest + 1)), _powers(np.exp(1j * q * phase_rad), highest // q + 1)
 
 
 def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
@@ -105,7 +105,10 @@ def _powers(wave: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:
 
 
 def _sums(values: Sequence[Floats], phase_rad: Floats, highest: int) -> list[NDArray[np.complex128]]:
-    total = np.zeros((len(values), highest // AT_ONCE + 1, min(AT_ONCE, highest + 1)), dtype=np.complex128)
+    total = np.zeros(
+        (len(values), highest // BOUNDS.harmonics_at_once + 1, min(BOUNDS.harmonics_at_once, highest + 1)),
+        dtype=np.complex128,
+    )
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
         for k, column in enumerate(values):
@@ -150,9 +153,12 @@ def smooth_of(several: Sequence[Floats], phase_rad: Floats, highest: int) -> lis
     """Return several smoothed residuals at equal phases."""
     if not several:
         return []
-    padded = np.zeros((len(several), (highest // AT_ONCE + 1) * min(AT_ONCE, highest + 1)), dtype=np.complex128)
+    padded = np.zeros(
+        (len(several), (highest // BOUNDS.harmonics_at_once + 1) * min(BOUNDS.harmonics_at_once, highest + 1)),
+        dtype=np.complex128,
+    )
     padded[:, : highest + 1] = amplitudes_of(several, phase_rad, highest)
-    parts = padded.reshape(len(several), highest // AT_ONCE + 1, -1)
+    parts = padded.reshape(len(several), highest // BOUNDS.harmonics_at_once + 1, -1)
     found = [np.empty(len(phase_rad)) for _ in several]
     for rows in _stretches(len(phase_rad)):
         fine, coarse = _waves(phase_rad[rows], highest)
@@ -165,9 +171,6 @@ WORST_CONDITION = 1e6
 """Largest condition number of normal equations, which lose six of sixteen digits; evenly spaced phases have 1. The
 limit is uncritical: phases without 30 degrees have 7e5, without 45 degrees 2e9, and even there the results agree to
 1e-6 of the noise."""
-
-AT_ONCE = 16
-"""Harmonics per coarse wave: the root of the usual number."""
 
 
 def bands(samples: int) -> tuple[int, int]:
@@ -244,7 +247,7 @@ def noise_left_by(
     freedom = 2.0 * len(residuals)
     share = np.mean(draws, axis=0) / freedom
     # Few draws scatter between harmonics, but the absorbed share changes slowly.
-    width = min(SMOOTHED, len(share))
+    width = min(BOUNDS.harmonics_averaged, len(share))
     share = np.convolve(np.pad(share, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")[
         : len(squares)
     ]
@@ -258,9 +261,6 @@ def noise_left_by(
     usual = float(np.mean(share[above]))
     return noise_spectrum(left * usual, low, freedom * usual)
 
-
-SMOOTHED = 9
-"""Harmonics over which the remaining share is averaged."""
 
 LEAST_LEFT = 0.02
 """Least remaining share of noise of a usable harmonic or frequency. If columns absorb it completely, priors leave
@@ -420,7 +420,7 @@ def noise_of(residuals: Sequence[Floats], freedom_used: float) -> Noise:
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
     sigma = float(np.sqrt(square / max(count - freedom_used, 1.0)))
-    covariance = sum(_autocovariance(residual) for residual in residuals if len(residual) >= _LAGS)
+    covariance = sum(_autocovariance(residual) for residual in residuals if len(residual) >= BOUNDS.lags)
     if np.ndim(covariance) == 0 or not square > 0.0:
         return Noise(sigma, 1.0)
     correlation = np.asarray(covariance) / np.asarray(covariance)[0]
@@ -460,11 +460,8 @@ def noise_of_turns(residuals: Sequence[Floats], freedom_used: float) -> Noise:
 FEWEST_SAMPLES = 60
 """Fewest samples of a turn: then at least five harmonics are low, nearly all that geometric errors cause."""
 
-_LAGS = 201
-"""Number of lags in samples; longer correlations are structure that a model should name."""
-
 
 def _autocovariance(residual: Floats) -> Floats:
-    size = next_fast_len(len(residual) + _LAGS, real=True)  # padding, so lags do not wrap around
+    size = next_fast_len(len(residual) + BOUNDS.lags, real=True)  # padding, so lags do not wrap around
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
-    return np.fft.irfft(spectrum, size)[:_LAGS]
+    return np.fft.irfft(spectrum, size)[: BOUNDS.lags]

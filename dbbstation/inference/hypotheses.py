@@ -15,25 +15,13 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, slices_of, with_slack_of
+from dbbstation.inference.model_comparison import SLACK_SHARES, Member, slices_of, with_slack_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.computing.arrays import Flags, Floats, Integers
     from dbbstation.inference.model_comparison import Around, Cause, ModelComparison, Scan, Variant
-
-LIKELY = 8.0
-"""Largest log odds against a hypothesis, relative to the best, whose neighbours are examined; less likely ones have a
-probability of 3e-4."""
-
-CLOSE = 1.0
-"""The same limit if only the most probable hypothesis is wanted: clearly less probable ones seldom lead to a better
-neighbour. With 1, 3 and 8 the selections of ten groups of tests in the slowest known session were equal."""
-
-NEGLIGIBLE = 40.0
-"""Log odds against the best hypothesis above which first scores are discarded to save memory: a million such sets have
-a total probability of 4e-12."""
 
 
 SCAN, FIT = 1.0 / 3.0, 3e5
@@ -174,7 +162,7 @@ def search(
     seeds: Iterable[Sequence[Member]] = (),
     most_expanded: int = BOUNDS.expanded,
     most_members: int | None = None,
-    likely: float = LIKELY,
+    likely: float = BOUNDS.likely,
     *,
     thorough: bool = True,
     work: SearchWork | None = None,
@@ -185,7 +173,7 @@ def search(
         seeds: further sets to examine, such as earlier ones.
         most_expanded: most sets whose neighbours are examined.
         most_members: largest size of a set; None for no limit.
-        likely: expand sets within these log odds of the best; `CLOSE` to find only the best.
+        likely: expand sets within these log odds of the best; `BOUNDS.close` to find only the best.
         thorough: also replace two members by one, and one by two.
         work: limit of counted work, at which the best set so far is returned; None for no limit.
     """
@@ -261,7 +249,7 @@ class _Search:
             if self._may_be_likely(others, evidence, float(scan.log_odds[k])):
                 self._look_at([*others, scan.best_of(k)])
         for member in hypothesis.members:
-            if member.cause.named and member.width < FLEXIBLE:
+            if member.cause.named and member.width < BOUNDS.flexible:
                 continue
             scan = around.without([member.name])[0]
             self._pairs(hypothesis.without(member.name), scan)
@@ -293,14 +281,14 @@ class _Search:
 
     def _try_more(self, members: Sequence[Member], log_posterior: float, scan: Scan) -> None:
         worth = scan.log_odds
-        for k in np.flatnonzero(log_posterior + worth > self.top - NEGLIGIBLE).tolist():
+        for k in np.flatnonzero(log_posterior + worth > self.top - BOUNDS.negligible).tolist():
             self._score([*members, scan.best_of(k)], log_posterior + float(worth[k]), worth=float(worth[k]))
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
         if len(members) > self.most_members:
             self.beyond = max(self.beyond, log_posterior)
             return
-        if log_posterior > self.top - NEGLIGIBLE:
+        if log_posterior > self.top - BOUNDS.negligible:
             self.scored.setdefault(frozenset(member.name for member in members), log_posterior)
             if len(self.scored) > self.room:
                 self._drop_negligible()
@@ -308,7 +296,7 @@ class _Search:
             self._look_at(members)
 
     def _drop_negligible(self) -> None:
-        self.scored = {key: score for key, score in self.scored.items() if score > self.top - NEGLIGIBLE}
+        self.scored = {key: score for key, score in self.scored.items() if score > self.top - BOUNDS.negligible}
         self.room = max(BOUNDS.scores, 2 * len(self.scored))
 
     def _pairs(self, members: Sequence[Member], scan: Scan) -> None:
@@ -330,7 +318,7 @@ class _Search:
         best = apart[np.argsort(-worth[apart])]
         # A flexible form imitates two causes, so pairs of inflexible causes are examined separately.
         widths = np.array([member.width for member in named])
-        stiff = best[widths[pairs[best]].max(axis=1) < FLEXIBLE]
+        stiff = best[widths[pairs[best]].max(axis=1) < BOUNDS.flexible]
         alone = self.comparison.log_evidence(members)
         for some in (best, stiff):
             for k in some[: BOUNDS.paired_hypotheses].tolist():
@@ -338,7 +326,7 @@ class _Search:
                     self._look_at([*members, *(named[one] for one in pairs[k])])
 
     def _may_be_likely(self, members: Sequence[Member], evidence: float, worth: float) -> bool:
-        return evidence + sum(member.log_odds for member in members) + worth > self.top - NEGLIGIBLE
+        return evidence + sum(member.log_odds for member in members) + worth > self.top - BOUNDS.negligible
 
     def _anew(self, member: Member) -> Member:
         cause, old = self.causes[member.name], member.variant

@@ -16,7 +16,7 @@ from dbbstation.facts.value import Value
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import impossible
-from dbbstation.inference.coloured import FEWEST_INDEPENDENT
+from dbbstation.inference.coloured import FEWEST_INDEPENDENT, NOTHING
 from dbbstation.inference.followed import (
     VariableProbabilities,
     classes_of,
@@ -42,7 +42,7 @@ from dbbstation.inference.levels import (
 )
 from dbbstation.inference.model_comparison import LOG_SCALE_WEIGHTS, SCALES, all_columns
 from dbbstation.inference.patterns import CURVES, Family
-from dbbstation.inference.triangle import left_by, norms, root, squares, triangle_of
+from dbbstation.inference.triangle import ROUNDING, left_by, norms, root, squares, triangle_of
 from dbbstation.inference.uneven import widening_of
 from dbbstation.inference.variables import Kind
 from dbbstation.inference.verdict import SURE, SURELY, DensityGains
@@ -224,9 +224,6 @@ MARGIN = 1.25
 20 effects injected at the size with margin. Their probability alone was sure for 9, 10 and 10 of ten at factors 1, 1.25
 and 1.5."""
 
-ENTIRELY = 1e-9
-"""Least share of squares outside the base; effects with less are concealed completely."""
-
 
 def detectable(settled: Settled) -> tuple[Detectable, ...]:
     """Return detectable sizes of effects over variables and of the user's causes, before absorption by the base; the least detectable first."""
@@ -258,10 +255,6 @@ def detectable_causes(settled: Settled) -> tuple[Detectable, ...]:
     return tuple(sorted(found, key=lambda one: -np.inf if one.size is None else -one.size))
 
 
-NOTHING = 1e-3
-"""Least whitened rms of an effect, relative to the noise: with less, a million rows show it by one standard deviation."""
-
-
 FORMS = (Family.CURVE, Family.LINEAR, Family.DRIFT, None)
 """Families of effects with a detectable size; laws of the user have none."""
 
@@ -288,7 +281,7 @@ def _detectable(
     confirm: str | None = None,
 ) -> Detectable:
     size = None
-    if shown >= ENTIRELY:
+    if shown >= ROUNDING:
         products = settled.comparison.beside(settled.best.without(cause.name), variant.columns)
         size = least_seen(products, samples, variant.plausible, cause.log_prior_odds + variant.log_weight)
     return Detectable(follows, None if size is None else MARGIN * size, float(np.clip(1.0 - shown, 0.0, 1.0)), confirm)
@@ -355,7 +348,7 @@ def may_result(variable: Variable, channel: Channel) -> bool:
     )
     whole = squares(values - values.mean())
     left, both = (squares(left_by(by, values)) for by in (simulated, np.hstack([simulated, carried])))
-    if not ENTIRELY * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
+    if not ROUNDING * whole < left <= (1.0 - DETERMINED) * whole or both > (1.0 - CARRIES) * left:
         return False
     free = len(values) - simulated.shape[1] - carried.shape[1]
     more = carried.shape[1]

@@ -202,11 +202,6 @@ def solved(rest: Floats, of_base: Floats, gains: Floats) -> Floats:
 PLACED = (Family.WAVE, Family.BUMP, Family.STEP)
 """Families whose place, width or frequency is a nonlinear parameter."""
 
-ROWS_PER_PIECE = 4
-"""Least average rows per bin of a variable; 1 for waves except over time, because four rows can be a wave."""
-
-PIECES_PER_WAVE = 4
-"""Bins in the shortest wave."""
 
 WIDTHS = (64.0, 32.0, 16.0, 8.0)
 """Ratios of the range to standard deviations of bumps."""
@@ -229,8 +224,8 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
     for variable in variables:
         values = variable.values[kept]
         distinct = len(np.unique(values))
-        pieces = min(BOUNDS.pieces, distinct // 2, len(values) // ROWS_PER_PIECE)
-        if pieces < 2 * PIECES_PER_WAVE:
+        pieces = min(BOUNDS.pieces, distinct // 2, len(values) // BOUNDS.rows_per_piece)
+        if pieces < 2 * BOUNDS.pieces_per_wave:
             continue
         sums = _sums(left, values, pieces, size)
         fine = pieces if variable.kind is Kind.TIME else min(BOUNDS.pieces, distinct)
@@ -239,7 +234,7 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: Flags, size: flo
         most = BOUNDS.strongest_coloured if roughly else BOUNDS.strongest
         finely = sums if fine == pieces else _sums(left, values, fine, size)
         found += _waves(variable, finely, float(np.ptp(values)), fine, most, roughly=roughly)
-        finer = [n for n in FINER_CURVES if n * PIECES_PER_WAVE <= pieces]
+        finer = [n for n in FINER_CURVES if n * BOUNDS.pieces_per_wave <= pieces]
         found += [
             _pattern(variable, Family.CURVE, Spline(variable.low, variable.high, n), 1.0, f"{n} points") for n in finer
         ]
@@ -281,7 +276,7 @@ def _waves(
     variable: Variable, sums: Sums, extent: float, pieces: int, strongest: int, *, roughly: bool
 ) -> list[Pattern]:
     length = 2 * (int(sums.place[-1]) + 1)
-    last = min(int(2.0 * min(BOUNDS.cycles, pieces / PIECES_PER_WAVE)), length // 4)
+    last = min(int(2.0 * min(BOUNDS.cycles, pieces / BOUNDS.pieces_per_wave)), length // 4)
     if last <= 1:
         return []
     explained, tried = sums.of_waves(length, 1, last), (last - 1) / 2.0

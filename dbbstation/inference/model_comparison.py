@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 from scipy.linalg.lapack import dtrtri, dtrtrs
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.square_root import slices
 from dbbstation.inference.triangle import rms
 
@@ -32,12 +33,7 @@ LOG_SCALE_WEIGHTS = np.log([0.19, 0.19, 0.19, 0.19, 0.19, 0.05])
 """Prior probabilities of `SCALES`: log-uniform over two decades up to the plausible size, one in twenty beyond."""
 
 NO_SLACK = np.zeros(0)
-FLEXIBLE = 12
-"""Fewest amplitudes of a form that can imitate two causes: two per strut."""
 
-WIDE = 100
-"""Fewest amplitudes of a form for which a factorisation for each size takes less time than eigenvectors: 1.2 for 2.8 ms of
-209 amplitudes of a wandering bar, 0.10 for 0.14 ms of 48. Only the time depends on it."""
 
 SLACK_SHARES = ((0.1, 0.1), (0.1, 1.0), (1.0, 1.0))
 """Shares of the stated slack for averaging: of a formula's inaccuracy, and of what its parts may differ by. Some machines
@@ -250,7 +246,7 @@ class _OfCause:
             blocks = gram[columns[:, :, None], columns[:, None, :]]
             self.groups[size] = np.array(numbers), columns, plausible, blocks
         self.weights = np.array([variant.log_weight for variant in cause.variants])
-        self.slim = [i for i, v in enumerate(cause.variants) if len(v.columns) < FLEXIBLE]
+        self.slim = [i for i, v in enumerate(cause.variants) if len(v.columns) < BOUNDS.flexible]
 
 
 class _Forms:
@@ -482,7 +478,7 @@ def _scanned(forms: _Forms, towards: Floats, left: Sequence[Floats]) -> Scan:
     factors = np.empty((len(forms.weights), len(SCALES)))
     for (numbers, own, plausible, _), products in zip(forms.groups, left, strict=True):
         blocks, ahead = plausible[:, :, None] * products * plausible[:, None, :], plausible * towards[own]
-        if blocks.shape[-1] >= WIDE:
+        if blocks.shape[-1] >= BOUNDS.wide:
             factors[numbers] = [_factored(*each) for each in zip(blocks, ahead, strict=True)]
             continue
         seen, axes = np.linalg.eigh(blocks)

@@ -167,10 +167,6 @@ def _unit(unit: str, per: str) -> str:
     return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per
 
 
-HALF = 0.5
-"""Share of its largest value above which an effect counts as present in a span."""
-
-
 @dataclass(frozen=True)
 class Span:
     """A range of a variable in which an effect is present."""
@@ -310,7 +306,7 @@ class CauseJudge:
         happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
         lasts = pattern is None or pattern.family is Family.STEP or self._is_a_step(rows)
         away = np.abs(effect - np.median(effect))
-        largest = away >= HALF * away.max() if there else np.zeros(0, dtype=bool)
+        largest = away >= 0.5 * away.max() if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return CauseFinding(
             name=cause.name,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.inference.alternatives import in_place_of
-from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
+from dbbstation.inference.bank import Bank, alike, amplitudes_of
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NEGATIVE_SIGMA, beyond_reach, impossible, impossible_beside
 from dbbstation.inference.hypotheses import Hypothesis, SearchWork, search
@@ -128,7 +128,7 @@ def _meets(one: Settled, other: Settled) -> bool:
     if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
         return False
     apart = one.predicted() - other.predicted()
-    return rms(apart) < SETTLED * other.noise.sigma
+    return rms(apart) < BOUNDS.noise_settled * other.noise.sigma
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:

@@ -22,7 +22,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.triangle import triangle_of
+from dbbstation.inference.triangle import ROUNDING, triangle_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -311,10 +311,6 @@ def _tied(blocks: Sequence[Block], which: Integers, touched: Integers, own: Flag
         (blocks_of.get(key, []), np.array(columns_of.get(key, []), dtype=np.int64))
         for key in dict.fromkeys([*blocks_of, *columns_of])
     ]
-
-
-ROUNDING = 1e-9
-"""Tolerance of rounding: a column known only by its prior is exactly as uncertain as its scale and must not be lost."""
 
 
 @dataclass(frozen=True, eq=False)

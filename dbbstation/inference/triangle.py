@@ -11,8 +11,9 @@ from dbbstation.inference.bounds import BOUNDS
 if TYPE_CHECKING:
     from dbbstation.computing.arrays import Floats
 
-RANK = 1e-9
-"""Rank tolerance: singular values or eigenvalues of usable directions, relative to the largest."""
+ROUNDING = 1e-9
+"""Relative size below which rounding dominates: of singular values or eigenvalues, over the largest; of noise, effects
+and changes, over the whole."""
 
 
 def triangle_of(stacked: Floats) -> Floats:
@@ -36,7 +37,7 @@ def norms(columns: Floats) -> Floats:
     return np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
 
 
-def axes_of(columns: Floats, least: float = RANK) -> Floats:
+def axes_of(columns: Floats, least: float = ROUNDING) -> Floats:
     """Return orthonormal axes of columns, shape (n, k).
 
     Args:
@@ -46,7 +47,7 @@ def axes_of(columns: Floats, least: float = RANK) -> Floats:
     return u[:, s > least * s[:1]]
 
 
-def left_by(columns: Floats, values: Floats, rcond: float = RANK) -> Floats:
+def left_by(columns: Floats, values: Floats, rcond: float = ROUNDING) -> Floats:
     """Return the residual of values, shape (n,), after a least-squares fit of columns, shape (n, k)."""
     scaled = columns / norms(columns)
     return values - scaled @ np.linalg.lstsq(scaled, values, rcond=rcond)[0]

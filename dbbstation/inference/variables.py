@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.triangle import ROUNDING
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -39,9 +41,6 @@ there is no speed."""
 
 MANY = 10
 """Number of different values that suffices for every effect."""
-
-STILL = 1e-9
-"""Least change between rows, relative to the range, that counts as motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +135,7 @@ def _signs(variable: Variable, blocks: Sequence[slice], change_of: Callable[[Flo
     found = np.zeros(len(variable.values))
     for rows in blocks:
         change = change_of(variable.travel(rows))
-        moved = np.where(np.abs(change) > STILL * variable.extent, np.sign(change), 0.0)
+        moved = np.where(np.abs(change) > ROUNDING * variable.extent, np.sign(change), 0.0)
         first = int(np.argmax(moved != 0.0)) if moved.any() else 0
         last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(moved)), first))
         found[rows] = moved[last] if len(moved) else moved

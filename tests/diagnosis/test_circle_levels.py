@@ -9,8 +9,9 @@ from scipy.linalg import null_space
 from dbbstation.diagnosis.diagnose import thinned, without_doubtful, without_tests
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.verdicts import circle_levels, judge, outcome_of
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import chosen_anew
-from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, in_turn
+from dbbstation.inference.folds import in_turn
 from dbbstation.inference.followed import VariableProbabilities, classes_of, follow_of
 from dbbstation.inference.levels import Differs, FollowsAnswer
 from dbbstation.inference.levels_of import form_probabilities
@@ -91,7 +92,7 @@ def test_tests_that_are_held_out_give_no_cause_its_size(both):
     setup = base[:, known.random] * known.prior[known.random]
     causes = [channel.columns.of(member.variant.columns) * member.variant.plausible for member in members]
     columns = np.hstack([setup, *causes, machine])
-    groups = in_turn([one.test for one in channel.observations], FOLDS_OF_AN_ERROR)
+    groups = in_turn([one.test for one in channel.observations], BOUNDS.folds_of_an_error)
     group = np.repeat(groups, [rows.stop - rows.start for rows in channel.runs])
 
     def fitted(rows, count, goal):

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.diagnose import FINER, thinned
+from dbbstation.diagnosis.diagnose import thinned
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.screw_cyclic import ScrewCyclic
@@ -55,7 +56,7 @@ def test_readings_of_sectors_are_means_of_the_effect(tmp_path, mechanism, fitted
     of_samples, of_means = [], []
     for run in map(thinned, recorded.observations):
         assert len(run.raw) <= 720
-        assert len(run.finer[0].raw) <= FINER * len(run.raw)
+        assert len(run.finer[0].raw) <= BOUNDS.samples_of_sharp * len(run.raw)
         for one, found in ((run, of_samples), (replace(run, finer=None), of_means)):
             found.append(1e3 * (model.bar(one.motion()).length_mm - run.raw.length_mm))
     off_um, unlike_um = (np.sqrt(np.mean(np.square(np.concatenate(found)))) for found in (of_samples, of_means))

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.bounds import BOUNDS
-from dbbstation.inference.hypotheses import CLOSE, FIT, LIKELY, NEGLIGIBLE, SCAN, SearchWork, search
+from dbbstation.inference.hypotheses import FIT, SCAN, SearchWork, search
 from dbbstation.inference.model_comparison import (
-    FLEXIBLE,
     SCALES,
-    WIDE,
     Around,
     Cause,
     Member,
@@ -51,11 +49,11 @@ def test_probabilities_are_those_of_all_sets_and_all_sizes(rng, alike, noise):
     full = log_posteriors(problem, causes)
     off = probabilities(posterior, names) - inclusion(full, names)
     top = posterior.best.log_posterior
-    likely = [h for h in posterior.hypotheses if h.log_posterior > top - LIKELY]
+    likely = [h for h in posterior.hypotheses if h.log_posterior > top - BOUNDS.likely]
     sizes = [h.log_posterior - full[h.names] for h in likely]
     assert posterior.best.names == max(full, key=full.get)
     # Who wants that one alone need not look so far.
-    assert search(problem.comparison(), causes, likely=CLOSE).best.names == posterior.best.names
+    assert search(problem.comparison(), causes, likely=BOUNDS.close).best.names == posterior.best.names
     assert np.abs(off).max() < 0.05
     assert np.abs(sizes).max() < 0.2
 
@@ -129,8 +127,8 @@ def test_two_causes_that_hide_each_other_are_found_together(rng):
 def test_a_flexible_cause_that_imitates_two_gives_way_to_them(rng):
     """It holds both almost exactly, with ten more columns, and is better than either of them alone."""
     two = rng.normal(size=(40, 2))
-    columns = np.hstack([two, two + 0.01 * rng.normal(size=(40, 2)), rng.normal(size=(40, FLEXIBLE))])
-    imitation = variant(*range(2, 2 + FLEXIBLE))
+    columns = np.hstack([two, two + 0.01 * rng.normal(size=(40, 2)), rng.normal(size=(40, BOUNDS.flexible))])
+    imitation = variant(*range(2, 2 + BOUNDS.flexible))
     causes = [*one_column_each(2), cause("flexible", imitation, odds=ODDS), cause("other", variant(15), odds=ODDS)]
     problem = Dense(BASE, columns, two @ [0.7, 0.9] + rng.normal(0, 0.05, 40), 0.05)
     comparison = problem.comparison()
@@ -155,7 +153,7 @@ def test_a_law_that_is_not_quite_followed_takes_the_place_of_an_unnamed_effect(r
     assert search(comparison, causes).best.names == max(full, key=full.get) == {"law", "wave"}
 
 
-@pytest.mark.parametrize("amplitudes", [30, WIDE + 1])
+@pytest.mark.parametrize("amplitudes", [30, BOUNDS.wide + 1])
 def test_factors_of_every_size_are_those_of_the_normal_density(rng, amplitudes):
     """However wide a form is: log N(target; 0, I + s² C C') - log N(target; 0, I), beside an empty base."""
     columns = rng.normal(size=(250, amplitudes))
@@ -238,7 +236,7 @@ def test_scores_that_count_for_nothing_are_not_kept(rng):
     scored = {key: weight for key, weight in posterior.weights.items() if key not in looked_at}
     assert posterior.best.names == {"c4"}
     assert scored
-    assert min(scored.values()) > top - NEGLIGIBLE
+    assert min(scored.values()) > top - BOUNDS.negligible
 
 
 def test_pairs_that_are_replaced_are_counted(rng, monkeypatch):

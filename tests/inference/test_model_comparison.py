@@ -8,8 +8,8 @@ from scipy.integrate import dblquad, quad
 from scipy.special import logsumexp, ndtri
 from scipy.stats import norm
 
+from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.model_comparison import (
-    FLEXIBLE,
     LOG_SCALE_WEIGHTS,
     MOST_SLACK,
     SCALES,
@@ -114,9 +114,9 @@ def test_the_weights_of_sizes_are_probabilities():
 
 
 def test_the_best_narrow_form_is_given_where_a_flexible_one_is_better(rng):
-    columns = rng.normal(size=(50, FLEXIBLE + 1))
-    target = columns[:, :FLEXIBLE] @ rng.normal(size=FLEXIBLE) + 0.1 * rng.normal(size=50)
-    both = cause("both", variant(*range(FLEXIBLE)), variant(0), variant(FLEXIBLE))
+    columns = rng.normal(size=(50, BOUNDS.flexible + 1))
+    target = columns[:, : BOUNDS.flexible] @ rng.normal(size=BOUNDS.flexible) + 0.1 * rng.normal(size=50)
+    both = cause("both", variant(*range(BOUNDS.flexible)), variant(0), variant(BOUNDS.flexible))
     scan = Dense(BASE, columns, target, 0.1).comparison().scan([], [both, cause("slim", variant(1))])
     assert scan.best[0].variant is both.variants[0]
     assert scan.narrow[0].variant in both.variants[1:]

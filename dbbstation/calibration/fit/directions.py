@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.square_root import ROUNDING
+from dbbstation.inference.triangle import ROUNDING
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Owner
 

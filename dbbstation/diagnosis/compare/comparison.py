@@ -20,15 +20,15 @@ from dbbstation.errors import TraceError
 from dbbstation.inference.alternatives import cancelling
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.chosen_anew import KnownGains, gains_of_tests, groups_of_tests, rows_of_groups
-from dbbstation.inference.folds import FOLDS_OF_AN_ERROR, held_out, in_turn, refits_without
+from dbbstation.inference.folds import held_out, in_turn, refits_without
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.levels_of import levels_by_tests
 from dbbstation.inference.model_comparison import all_columns
-from dbbstation.inference.read_off import HALF, Trial, read_off
+from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.square_root import compress
-from dbbstation.inference.triangle import RANK, rms, root
+from dbbstation.inference.triangle import ROUNDING, rms, root
 from dbbstation.inference.verdict import OUT, SURE
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.analysis import figures
@@ -278,7 +278,7 @@ def _placed(sides: Sides, rows: Floats, share: float, taken_up: float) -> Effect
     worst = int(np.argmax([np.abs(values).max() for values in by_run]))
     pair, values = sides.pairs[worst], by_run[worst]
     at, count = int(np.argmax(np.abs(values))), len(values)
-    inside = values * np.sign(values[at]) >= HALF * abs(values[at])
+    inside = values * np.sign(values[at]) >= 0.5 * abs(values[at])
     # The contiguous arc about the peak, across the turn's start.
     rolled = np.roll(inside, -at)
     ahead = count if rolled.all() else int(np.argmin(rolled))
@@ -316,7 +316,7 @@ def _kinematic(sides: Sides) -> Floats:
         for reading in sides.readings[1]
     ]
     axes, sizes, _ = np.linalg.svd(sides.averaged(1, columns), full_matrices=False)
-    return axes[:, sizes > RANK * sizes[0]]
+    return axes[:, sizes > ROUNDING * sizes[0]]
 
 
 def noticed_mm(settled: Settled) -> float:
@@ -343,7 +343,7 @@ def predicted(sides: Sides, settled: Settled, members: Sequence[Member]) -> Held
     """Return prediction errors of held-out tests with stated set-ups and some causes."""
     bank, channel = settled.bank, settled.channel
     columns, known = bank.jointly(members)
-    groups = in_turn([pair.test for pair in sides.pairs], FOLDS_OF_AN_ERROR)
+    groups = in_turn([pair.test for pair in sides.pairs], BOUNDS.folds_of_an_error)
     every = np.arange(len(known.prior))
     blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
     return held_out(blocks, groups, known, every, len(channel.base.prior), settled.noise.innovation, channel.held)

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import RawCircle
 
 
+SAME = 1e-6
+"""Largest difference of equal bar lengths [mm] and angles [deg]."""
+
 SAME_PLACE_MM = 0.5
 """Largest distance between centres of one circle, from two CMM sheets of one plate, or sheet and drawing."""
-
-SAME_LENGTH_MM = 1e-6
-SAME_ANGLE_DEG = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,9 +205,9 @@ def _unlike(runs: Sequence[Observation]) -> str:
     first = runs[0].raw.circle
     for circle in (run.raw.circle for run in runs[1:]):
         pairs = [
-            ("bar length", "mm", (first.bar_mm,), (circle.bar_mm,), SAME_LENGTH_MM),
-            ("tilt", "degrees", first.tilt_deg, circle.tilt_deg, SAME_ANGLE_DEG),
-            ("elevation", "degrees", (first.elevation_deg,), (circle.elevation_deg,), SAME_ANGLE_DEG),
+            ("bar length", "mm", (first.bar_mm,), (circle.bar_mm,), SAME),
+            ("tilt", "degrees", first.tilt_deg, circle.tilt_deg, SAME),
+            ("elevation", "degrees", (first.elevation_deg,), (circle.elevation_deg,), SAME),
             ("ball", "mm", first.ball_mm, circle.ball_mm, SAME_PLACE_MM),
             ("centre", "mm", first.centre_mm, circle.centre_mm, SAME_PLACE_MM),
         ]

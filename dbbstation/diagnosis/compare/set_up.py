@@ -12,7 +12,7 @@ from dbbstation.diagnosis.shapes import LEVER_MM, TABLE
 from dbbstation.inference.channel import Base, Law
 from dbbstation.inference.harmonics import bands, basis
 from dbbstation.inference.levels import BALL, BAR
-from dbbstation.inference.triangle import squares
+from dbbstation.inference.triangle import ROUNDING, squares
 from dbbstation.sources.registry import sources_named
 
 if TYPE_CHECKING:
@@ -35,9 +35,6 @@ OF_THE_READING = frozenset({BALL, BAR, JIG, "angle", "reading", "commanded dista
 """Variables independent of struts and directions of travel, which effects of a ball, bar or holder may also follow."""
 
 ALIKE = "alike in all tests: the set-up's"
-
-NOTHING = 1e-9
-"""Negligible sensitivity to a ball's shift, as of a level bar to height."""
 
 ANYWHERE_MM = 1.0
 """Scatter of a ball of unknown place [mm]."""
@@ -154,7 +151,7 @@ def _outsize(source: ErrorSource, parameters: Sequence[str], sets: Sequence[tupl
 def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
     """Return laws for a shift and rotations common to all balls."""
     samples = sides.averaged(1, [run.gain[TABLE] for run in runs])
-    seen = np.flatnonzero(np.abs(samples).max(axis=0) > NOTHING)
+    seen = np.flatnonzero(np.abs(samples).max(axis=0) > ROUNDING)
     names = [f"{name}_mm" for name in "xyz"] + [f"turn_{name}_rad" for name in "xyz"]
     per = np.array([1.0] * 3 + [LEVER_MM] * 3)
     if len({pair.test for pair in sides.pairs}) < 2:  # noqa: PLR2004 - a single ball's displacement is its own

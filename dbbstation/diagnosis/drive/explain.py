@@ -14,7 +14,7 @@ from dbbstation.diagnosis.drive.fit import DriveFit, fit, log_possible, measured
 from dbbstation.inference.bounds import BOUNDS, DRIVES
 from dbbstation.inference.folds import selections_without
 from dbbstation.inference.followed import ChosenWithoutParts, left_without
-from dbbstation.inference.hypotheses import LIKELY, Posterior
+from dbbstation.inference.hypotheses import Posterior
 from dbbstation.inference.left_over import COUNTS_SIGMA
 from dbbstation.inference.settle import settle
 from dbbstation.inference.triangle import squares
@@ -86,7 +86,7 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
     hypotheses = list(posterior.hypotheses)
     top = -float("inf")
     for number, hypothesis in enumerate(posterior.hypotheses[: BOUNDS.looked_at]):
-        if hypothesis.log_posterior < top - LIKELY:
+        if hypothesis.log_posterior < top - BOUNDS.likely:
             break  # all further hypotheses are improbable
         less = log_possible(fit(drive, settled, hypothesis.members))
         hypotheses[number] = replace(hypothesis, log_posterior=hypothesis.log_posterior + less)

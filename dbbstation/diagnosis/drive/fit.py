@@ -14,10 +14,9 @@ from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.facts.value import Value
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import NEGATIVE_SIGMA
-from dbbstation.inference.folds import FOLDS
 from dbbstation.inference.model_comparison import slices_of
 from dbbstation.inference.read_off import values_of_law
-from dbbstation.inference.triangle import RANK, root, triangle_of
+from dbbstation.inference.triangle import ROUNDING, root, triangle_of
 from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
@@ -139,7 +138,7 @@ def _solved(rows: Floats, sd: Floats, noise: float) -> tuple[Floats, Floats]:
     stacked = np.vstack([rows[:, :-1] / norm, np.diag(noise / sd / norm)])
     target = np.concatenate([rows[:, -1], np.zeros(len(sd))])
     u, s, vt = np.linalg.svd(stacked, full_matrices=False)
-    s = np.maximum(s, RANK * s[0])
+    s = np.maximum(s, ROUNDING * s[0])
     root = (vt.T / s) / norm[:, None]
     return root @ (u.T @ target), noise**2 * (root @ root.T)
 
@@ -170,7 +169,7 @@ def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
         own = efficient.columns_of(law)
         told += range(own.start, own.stop)
     every = np.diag(plain.covariance) - np.diag(efficient.covariance)
-    known = [k for k in told if every[k] > RANK * plain.covariance[k, k]]
+    known = [k for k in told if every[k] > ROUNDING * plain.covariance[k, k]]
     apart = np.abs(plain.values - efficient.values)[known] / np.sqrt(every[known])
     return float(apart.max(initial=0.0))
 
@@ -179,13 +178,15 @@ def _widened(settled: Settled, fitted: DriveFit, rows: Floats, sd: Floats, noise
     """Widen the fit's uncertainties to include results without each stretch and with half the bandwidth."""
     # Noise alone understates them [Efron and Stein, The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq.
     # 1.5].
-    stretch = np.arange(len(rows)) * FOLDS // len(rows)
-    each = [triangle_of(rows[stretch == k]) for k in range(FOLDS)]
-    others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(FOLDS))
+    stretch = np.arange(len(rows)) * BOUNDS.folds // len(rows)
+    each = [triangle_of(rows[stretch == k]) for k in range(BOUNDS.folds)]
+    others = (np.vstack([*each[:k], *each[k + 1 :]]) for k in range(BOUNDS.folds))
     every = np.array([_solved(one, sd, noise)[0] for one in others])
-    moves = (FOLDS - 1.0) / FOLDS * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
+    moves = (BOUNDS.folds - 1.0) / BOUNDS.folds * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
     # If only one stretch shows a pulse, its omission gives no information.
-    everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(FOLDS)]).all(axis=0)
+    everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(BOUNDS.folds)]).all(
+        axis=0
+    )
     variance = np.maximum(np.diag(fitted.covariance), 1e-300)
     wider = np.sqrt(np.where(everywhere, np.maximum(moves / variance, 1.0), 1.0))
     # A value may be anywhere between the results of both bands, or equally far on the other side.

@@ -11,8 +11,8 @@ import numpy as np
 from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.bent import bent_laws, grows_with, is_same, memory_laws
 from dbbstation.inference.channel import Base, Channel, Law
-from dbbstation.inference.triangle import rms
-from dbbstation.inference.variables import STILL, Kind, Variable
+from dbbstation.inference.triangle import ROUNDING, rms
+from dbbstation.inference.variables import Kind, Variable
 from dbbstation.laws.contract import SourceForm
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def _sizes_of_noise(
 def step_of(values: Floats) -> float:
     """Return the largest step of which all values, shape (n,), are multiples."""
     steps = np.diff(np.unique(values))
-    steps = steps[steps > STILL * np.ptp(values)]
+    steps = steps[steps > ROUNDING * np.ptp(values)]
     return float(steps.min()) if len(steps) else 0.0
 
 

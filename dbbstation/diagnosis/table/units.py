@@ -79,10 +79,6 @@ _THERMOMETERS = ("temp", "temperature")
 _WORDS = re.compile(r"[^a-z0-9µ%]+")
 
 
-RATE_WORDS = 2
-"""Words of a rate after a name: amount and time."""
-
-
 def meaning_of(name: str) -> Meaning:
     """Return the unit or kind that a column's name states, such as `travel_mm` or `angle_deg`; else `PLAIN`."""
     words = [word for word in _WORDS.split(name.lower()) if word]
@@ -104,7 +100,7 @@ def _unit_at_end(words: list[str]) -> Meaning | None:
             continue
         if found.kind is not Kind.TIME or _CLOCKS & set(words[:-1]):
             return found
-        rate = _AMOUNTS.get(words[-2]) if len(words) > RATE_WORDS else None
+        rate = _AMOUNTS.get(words[-2]) if words[:-2] else None
         return Meaning(f"{rate}/{found.unit}" if rate else found.unit, Kind.ANY)  # otherwise a duration
     return None
 

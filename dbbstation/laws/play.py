@@ -96,21 +96,33 @@ def leaning(travel: Floats) -> PlayState:
 
 
 def followed(
-    travel: Floats, width: Floats, state: PlayState, load: Floats | None = None, friction: float = np.inf
+    travel: Floats, width: Floats, state: PlayState | None = None, load: Floats | None = None, friction: float = np.inf
 ) -> tuple[Floats, Floats, PlayState]:
     """Apply the play operator: y_k is y_{k-1} limited to x_k - w/2 ... x_k + w/2.
 
     Args:
+        state: None for a run that begins in motion.
         load: on the driven side, shape (n, m); beyond the friction, it holds the play at the end of its sign.
 
     Returns:
         Error y - x and its derivative by the width, shapes (n, m), and the state after the last row.
     """
     lag, by_width = np.empty_like(travel), np.empty_like(travel)
+    state = state or leaning(travel)
     place, side = state.place.copy(), state.side.copy()
     load = np.zeros_like(travel) if load is None else np.ascontiguousarray(load)
     _follow(np.ascontiguousarray(travel), load, width, friction, place, side, lag, by_width)
     return lag, by_width, PlayState(place, side)
+
+
+def resistance(travel: Floats, width: float, state: PlayState | None = None) -> tuple[Floats, PlayState]:
+    """Return the share of friction that opposes motion, -1 to 1, shape (n, m), and the state after the last row.
+
+    Friction turns round over `width`: a spring that slides at its ends [stop operator; Visintin, Differential Models of
+    Hysteresis, 1994, sec. III.2].
+    """
+    lag, _, behind = followed(travel, np.full(travel.shape[1], width), state)
+    return 2.0 * lag / width, behind
 
 
 @compiled

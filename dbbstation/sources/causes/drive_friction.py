@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.laws.play import followed, leaning
+from dbbstation.laws.play import resistance
 from dbbstation.machine.geometry import STRUT_NUMBERS, STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws.motion import driven_in_time, speed_mm_s
@@ -112,25 +112,15 @@ class DriveFriction(ErrorSource):
         load = motion.load_n
         if load is None:
             load = stated_loads(self.name, machine, motion.frames(machine), machine.hexapod)
-        return load, directions(length)[place], speed_mm_s(time_s, length)[place]
-
-
-def directions(length_mm: Floats) -> Floats:
-    """Return the direction of friction, -1 (shrinking) to 1 (growing), shape (n, 6).
-
-    Args:
-        length_mm: driven, in time order, shape (n, 6).
-    """
-    lag, _, _ = followed(length_mm, np.full(length_mm.shape[1], TURNED_OVER_MM), leaning(length_mm))
-    return -2.0 / TURNED_OVER_MM * lag
+        return load, -resistance(length, TURNED_OVER_MM)[0][place], speed_mm_s(time_s, length)[place]
 
 
 def driven_directions(motion: Motion, machine: Machine) -> Floats:
-    """Return the direction of friction along a motion, shape (n, 6).
+    """Return the direction of friction along a motion, -1 (shrinking) to 1 (growing), shape (n, 6).
 
     Readings with values between -1 and 1, within TURNED_OVER_MM of a reversal, cannot be used.
     """
-    return directions(motion.struts(machine).length_mm)
+    return -resistance(motion.struts(machine).length_mm, TURNED_OVER_MM)[0]
 
 
 def _by_motor(values: Floats) -> Floats:

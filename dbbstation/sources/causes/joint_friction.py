@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.laws.play import PlayState, followed, leaning
+from dbbstation.laws.play import PlayState, leaning, resistance
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
 from dbbstation.sources.contract import (
@@ -93,7 +93,7 @@ class JointFriction(SourceWithHistory):
         """
         struts, axes = motion.struts(machine), outer_axes(machine.hexapod)
         joints = joint_angles(struts, axes)
-        acting = resistance(joints.angle_rad, leaning(joints.angle_rad))[0]
+        acting = resistance(joints.angle_rad, WIND_UP_RAD)[0]
         outer, inner = drags(joints, acting)
         leans = np.sin(joints.angle_rad[:, STRUTS:, None]) ** 2
         parts = [
@@ -102,16 +102,17 @@ class JointFriction(SourceWithHistory):
             for drag in (outer, outer * leans, inner * leans)
         ]
         for angle in (OTHERS * WIND_UP_RAD, WIND_UP_RAD / OTHERS):
-            other = resistance(joints.angle_rad, leaning(joints.angle_rad), angle)[0] - acting
+            other = resistance(joints.angle_rad, angle)[0] - acting
             outer, inner = drags(joints, other)
             parts.append(outer + inner)
         compliance = strut_compliance(machine)
         tensions = [strut_tensions(struts, transverse_load(struts, values[:, None] * part)) for part in parts]
         return Effect(strut_mm=np.stack([stretch_mm(struts, compliance, tension) for tension in tensions], axis=-1))
 
-    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:
+    def derivative(self, motion: Motion, machine: Machine, values: Floats) -> Effect:  # noqa: ARG002
+        self.require(motion)
         struts = motion.struts(machine)
-        drag, _ = friction_drag(struts, outer_axes(machine.hexapod), self.begin(motion, machine, values))
+        drag, _ = friction_drag(struts, outer_axes(machine.hexapod))
         by_joint = []
         for i in range(STRUTS):
             alone = np.zeros_like(drag)
@@ -169,7 +170,7 @@ def friction_drag(struts: Struts, axes: Floats, state: PlayState | None = None) 
         The forces, and the state after the last row.
     """
     joints = joint_angles(struts, axes)
-    acting, behind = resistance(joints.angle_rad, leaning(joints.angle_rad) if state is None else state)
+    acting, behind = resistance(joints.angle_rad, WIND_UP_RAD, state)
     outer, inner = drags(joints, acting)
     return outer + inner, behind
 
@@ -180,16 +181,3 @@ def drags(joints: JointAngles, acting: Floats) -> tuple[Floats, Floats]:
         LEVER_MM * acting[:, :STRUTS, None] * joints.by_first,
         LEVER_MM * acting[:, STRUTS:, None] * joints.by_second,
     )
-
-
-def resistance(angle_rad: Floats, state: PlayState, wind_up_rad: float = WIND_UP_RAD) -> tuple[Floats, PlayState]:
-    """Return the share of friction that opposes motion, -1 to 1, shape (n, m).
-
-    Args:
-        angle_rad: in time order, shape (n, m).
-
-    Returns:
-        The shares, and the state after the last row.
-    """
-    lag, _, behind = followed(angle_rad, np.full(angle_rad.shape[1], wind_up_rad), state)
-    return 2.0 * lag / wind_up_rad, behind

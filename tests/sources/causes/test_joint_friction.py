@@ -10,12 +10,12 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import ModelError
-from dbbstation.laws.play import leaning
+from dbbstation.laws.play import resistance
 from dbbstation.machine.geometry import Compliance, Frames
 from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.causes.joint_friction import WIND_UP_RAD, JointFriction, friction_drag, outer_axes, resistance
+from dbbstation.sources.causes.joint_friction import WIND_UP_RAD, JointFriction, friction_drag, outer_axes
 from dbbstation.sources.contract import Fitted, Motion
 from tests.plant.linear import LinearSession
 from tests.plant.mechanisms.joints import JointFriction as FrictionOfPlant
@@ -88,7 +88,7 @@ def test_friction_follows_a_loop_in_time(rng):
         # An elastic stop: it winds up until the friction holds no more.
         acts = np.clip(acts - 2 * (angle[k] - angle[k - 1]) / WIND_UP_RAD, -1, 1)
         loop[k] = acts
-    found, _ = resistance(angle, leaning(angle))
+    found, _ = resistance(angle, WIND_UP_RAD)
     after = (np.abs(loop) == 1.0).cumsum(axis=0) > 0
     same = np.abs(found - loop) < 1e-9
     met = np.logical_or.accumulate(same, axis=0)

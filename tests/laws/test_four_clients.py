@@ -1,4 +1,4 @@
-"""Presliding and play, each written once, in a strut, a drive, a table and at a port: against things that move step by step."""
+"""Laws written once, in a strut, a drive, a table and at a port: against things that move step by step, and closed forms."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources import force, known_drive_sources
 from dbbstation.diagnosis.simulator.terms import Term, TermForm, evaluator
 from dbbstation.diagnosis.table.data import Table
+from dbbstation.inference.bent import memory_laws
 from dbbstation.inference.patterns import Family, patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.laws.contract import Scale
@@ -18,7 +19,9 @@ from dbbstation.sources.registry import known_sources
 from dbbstation.sources.trial import trial_machine
 from dbbstation.trace.drive import DriveRecording
 
-PRESLIDING, LOST_MOTION = (known_drive_sources()[name] for name in ("presliding", "lost-motion"))
+PRESLIDING, LOST_MOTION, TIME_SKEW, DRIFT = (
+    known_drive_sources()[name] for name in ("presliding", "lost-motion", "time-skew", "friction-drift")
+)
 LENGTH_MM, WIDTH_MM = 0.8, 0.5
 T = np.linspace(0.0, 12.0, 3001)
 X = 20.0 * np.sin(T)  # strokes of 25 lengths wind it up wholly; the turning points are no rows
@@ -141,3 +144,92 @@ def test_play_is_that_of_a_thing_in_a_gap(client):
     for found, expected in client():
         assert found == pytest.approx(expected, abs=1e-12)
         assert np.ptp(found) > 0.0
+
+
+LATE_S = 0.03
+
+
+def struts_at(machine, t):
+    poses = np.zeros((len(t), 6))
+    poses[:, 0], poses[:, 2] = 40.0 * np.sin(t), -1000.0
+    return Motion(poses, is_path=True, time_s=t).struts(machine).length_mm
+
+
+def delay_of_struts():
+    machine, motion, lengths = strut_motion()
+    found = known_sources()["time-skew"].effect(motion, machine, np.array([1e3 * LATE_S])).strut_mm
+    return found[:-20], (struts_at(machine, T + LATE_S) - lengths)[:-20]  # of the last rows the spline knows no more
+
+
+def delay_of_a_drive():
+    (form,) = TIME_SKEW.forms(Scale())
+    recorded = signals()
+    # The force is cos t; to first order it comes late by d times its rate.
+    return 1e3 * force(TIME_SKEW, form)(recorded)[1:-1, 0], np.sin(recorded.t_s)[1:-1]
+
+
+def delay_of_a_table():
+    law = memory_laws([Variable("x", "mm", Kind.LENGTH, X)], T, "s", (slice(0, len(T)),), 1.0, "mm")[1]
+    late = T > LATE_S
+    return law.columns((LATE_S,))[late, 1], (20.0 * np.sin(T - LATE_S) - X)[late]
+
+
+def delay_at_a_port():
+    value = evaluator(Term("path", TermForm.DELAY, ("x",), (LATE_S,)))
+    found = np.array([value(t, {"x": x}) for t, x in zip(T, X, strict=True)])
+    late = T > LATE_S
+    return found[late], (20.0 * np.sin(T - LATE_S) - X)[late]
+
+
+@pytest.mark.parametrize("client", [delay_of_struts, delay_of_a_drive, delay_of_a_table, delay_at_a_port])
+def test_a_delay_is_what_was_before(client):
+    found, expected = client()
+    assert found == pytest.approx(expected, abs=1e-4)
+    assert np.ptp(found) > 0.5
+
+
+def behind(values, t, constant, begins):
+    """What follows values with one time constant, less them: midpoint steps of tau dy/dt = x - y between straight rows."""
+    y, found = values[0] + begins, [begins]
+    for k in range(1, len(t)):
+        h = (t[k] - t[k - 1]) / FINE
+        for x in np.linspace(values[k - 1], values[k], FINE, endpoint=False) + (values[k] - values[k - 1]) / FINE / 2.0:
+            y = y + h * (x - y) / (constant + 0.5 * h)
+        found.append(y - values[k])
+    return np.array(found)
+
+
+def lag_of_struts():
+    machine, motion, lengths = strut_motion()
+    found = known_sources()["servo-lag"].effect(motion, machine, np.full(6, 1e3 * LATE_S)).strut_mm
+    speed, step = np.gradient(lengths[:, 0], T, edge_order=2), T[1] - T[0]
+    # It begins as a loop does that has forgotten how it began.
+    begins = -LATE_S * speed[0] + LATE_S**2 * (speed[1] - speed[0]) / step
+    return found[:, 0], behind(lengths[:, 0], T, LATE_S, begins)
+
+
+def lag_of_a_drive():
+    form = DRIFT.forms(Scale())[0]
+    recorded = signals()
+    moving = recorded.direction != 0.0
+    found = force(DRIFT, form, (2.0,))(recorded)[:, 0] * recorded.direction
+    since = recorded.t_s - recorded.t_s[0]
+    step = 1.0 + behind(np.ones(len(since)), since, 2.0, -1.0)  # what a step heats
+    return found[moving], (step / step[-1] - np.mean(step / step[-1]))[moving]
+
+
+def lag_of_a_table():
+    law = memory_laws([Variable("x", "mm", Kind.LENGTH, X)], T, "s", (slice(0, len(T)),), 1.0, "mm")[0]
+    return law.columns((LATE_S,))[:, 1], behind(X, T, LATE_S, 0.0)
+
+
+def lag_at_a_port():
+    value = evaluator(Term("path", TermForm.LAG, ("x",), (LATE_S,)))
+    return np.array([value(t, {"x": x}) for t, x in zip(T, X, strict=True)]), behind(X, T, LATE_S, 0.0)
+
+
+@pytest.mark.parametrize("client", [lag_of_struts, lag_of_a_drive, lag_of_a_table, lag_at_a_port])
+def test_a_lag_follows_with_one_time_constant(client):
+    found, expected = client()
+    assert found == pytest.approx(expected, abs=1e-4)  # speeds of struts are differences
+    assert np.ptp(found) > 0.5

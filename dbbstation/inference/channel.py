@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Choices, Family, Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.inference.variables import Variable
+    from dbbstation.laws.contract import SourceForm
 
 
 NAMED_ODDS = float(np.log(0.05 / 0.95))
@@ -116,6 +117,25 @@ class Law:
     acts_once: bool = False
     confirm: str = ""
     possible: Callable[[Mapping[str, float]], bool] = lambda _: True
+
+    @classmethod
+    def of(cls, name: str, form: SourceForm, columns: Callable[[tuple[float, ...]], Floats], **further: Any) -> Self:  # noqa: ANN401 - other fields
+        """Return the law of a stated form.
+
+        Args:
+            columns: function from nonlinear parameters to columns of amplitudes, shape (n, p).
+        """
+        every = (*form.amplitudes, *form.shapes)
+        return cls(
+            name=name,
+            columns=columns,
+            plausible=np.array([p.plausible for p in form.amplitudes]),
+            parameters=tuple(p.name for p in every),
+            units=tuple(p.unit for p in every),
+            grids=tuple(p.grid for p in form.shapes),
+            positive=tuple(p.positive for p in form.amplitudes),
+            **further,
+        )
 
     @cached_property
     def on_grid(self) -> tuple[tuple[tuple[float, ...], Floats], ...]:

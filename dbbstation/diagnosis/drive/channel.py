@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.sources import force, variable_of
-from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.bounds import BOUNDS
 from dbbstation.inference.channel import Base, Channel, Law
@@ -175,7 +174,7 @@ def _law(
     odds = np.log(source.prior_probability / (1.0 - source.prior_probability)) - np.log(form.tried)
     variable = variable_of(source)
     along = "time" if variable.startswith("time") else "position"
-    return law_of(
+    return Law.of(
         name,
         form,
         columns,

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.law import law_of
 from dbbstation.inference.bent import bent_laws, grows_with, is_same, memory_laws
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.triangle import ROUNDING, rms
@@ -133,7 +132,7 @@ class Table:
         if follows is None and along in self.columns:
             follows = Variable(along, "", Kind.ANY, self.columns[along])
 
-        return law_of(
+        return Law.of(
             source.name, form, partial(form.at, given), form_uncertainty=source.form_uncertainty, follows=follows
         )
 

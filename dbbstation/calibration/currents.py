@@ -248,8 +248,8 @@ def current_blocks(layout: Layout, channel: CurrentChannel | None, x: Floats) ->
     if channel is None:
         return []
     blocks, left = linearised(layout, channel, x)
-    noise = motor_noise(left)
-    return [replace(block, noise=_effective(noise[motor])) for motor, block in blocks]
+    noise = [SMALLEST_NOISE_A if one is None else max(one.effective, SMALLEST_NOISE_A) for one in motor_noise(left)]
+    return [replace(block, noise=noise[motor]) for motor, block in blocks]
 
 
 def linearised(
@@ -291,10 +291,6 @@ def linearised(
 def motor_noise(left: Sequence[Sequence[Floats]]) -> list[Noise | None]:
     """Return each motor's noise from its residual."""
     return [noise_of(of_motor, len(PER_MOTOR)) if of_motor else None for of_motor in left]
-
-
-def _effective(noise: Noise | None) -> float:
-    return SMALLEST_NOISE_A if noise is None else max(noise.effective, SMALLEST_NOISE_A)
 
 
 def current_start(layout: Layout, channel: CurrentChannel | None) -> dict[str, Floats]:

@@ -155,11 +155,11 @@ def _print_quick_looks(looks: Sequence[QuickLookResult]) -> None:
                 [
                     *name,
                     one.signature,
-                    one.place or "",
+                    one.place,
                     *(with_uncertainty(one.value or 0.0, COVERAGE_FACTOR * (one.u or 0.0)) if known else ("-", "-")),
                     one.unit,
                     ("yes" if one.seen else "no") if known else "-",
-                    one.text or "",
+                    one.text,
                 ]
             )
     echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")

@@ -89,10 +89,6 @@ def show(result: DiagnosisResult, *, effects: Annotated[bool, Option(EFFECTS)] =
         print_effects(result.effects)
 
 
-def _further() -> dict[str, object]:
-    return {"until_interrupted": True}
-
-
 def _write(result: DiagnosisResult, path: Path, *, force: bool) -> None:
 
     save(result, path, force=force)
@@ -195,9 +191,9 @@ def _print_gain(result: DiagnosisFigures) -> None:
 def _print_sources(sources: Sequence[SourceFinding]) -> None:
     rows = []
     for source in sources:
-        hidden = "" if source.concealed is None else f"{100 * source.concealed:.0f} %"
-        gain = "" if source.gain is None else str(round(source.gain))
-        again = "" if source.stability is None else f"{100 * source.stability:.0f} %"
+        shares = (source.concealed, source.stability)
+        hidden, again = (None if share is None else f"{100 * share:.0f} %" for share in shares)
+        gain = None if source.gain is None else round(source.gain)
         alike = ", ".join(source.ambiguous_with or source.equivalent[1:])
         rows.append([source.name, source.verdict, probability_text(source.probability), gain, hidden, again, alike])
     titles = [
@@ -225,5 +221,5 @@ diagnose = command(
     show,
     CommandOutput("out", "MODEL.yaml", _write, said="joint model written to {path}"),
     figure(said="figure written to {path}"),
-    more=_further,
+    more=lambda: {"until_interrupted": True},
 )

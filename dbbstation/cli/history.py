@@ -70,10 +70,10 @@ def _row(one: QuantityHistory, k: float) -> list[object]:
         len(one.values),
         *_pair(last.value, last.u, k),
         "-" if one.limit is None else f"{one.limit:g}",
-        one.conformity or "",
+        one.conformity,
         *_pair(one.level, one.u_level, k),
         verdict_in_words(one),
-        "" if event is None else event.since,
+        event and event.since,
         *(("", "") if event is None else _pair(event.difference, event.u_difference, k)),
     ]
 

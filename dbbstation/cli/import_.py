@@ -358,7 +358,7 @@ def _show(found: ImportedSession) -> None:
     from dbbstation.trace.columns import LENGTH, TIME
 
     print_table(
-        ["column", "means", "unit"], [[name, one.means, one.unit or ""] for name, one in found.mapping.columns.items()]
+        ["column", "means", "unit"], [[name, one.means, one.unit] for name, one in found.mapping.columns.items()]
     )
     echo()
     rows = []

@@ -92,7 +92,7 @@ def log_said(text: str) -> None:
 def _text(cell: object) -> str:
     if isinstance(cell, float):
         return f"{cell:z.1f}"
-    text = on_one_line(str(cell))
+    text = on_one_line("" if cell is None else str(cell))
     return text if len(text) <= _LONGEST_CELL else f"{text[:_LONGEST_CELL]}…"
 
 

@@ -22,16 +22,11 @@ def print_programs(result: ProgramsResult) -> None:
         [
             each.file,
             each.points,
-            *map(
-                _or_empty,
-                (
-                    each.greatest_correction_um,
-                    each.model_uncertainty_um if not each.model_uncertainty_not_known_because else "unknown",
-                    each.chord_error_um,
-                    each.feed_s,
-                    each.nominal_feed_s,
-                ),
-            ),
+            each.greatest_correction_um,
+            "unknown" if each.model_uncertainty_not_known_because else each.model_uncertainty_um,
+            each.chord_error_um,
+            each.feed_s,
+            each.nominal_feed_s,
         ]
         for each in result.programs
     ]
@@ -43,10 +38,6 @@ def print_programs(result: ProgramsResult) -> None:
     if result.acceleration_mm_s2 is not None:
         say(f"the lengths of pieces suit {result.dialect} with {result.acceleration_in_words}")
     _say_uncertainty(result.programs)
-
-
-def _or_empty(value: float | str | None) -> float | str:
-    return "" if value is None else value
 
 
 def _say_uncertainty(programs: Sequence[WrittenProgram]) -> None:

@@ -71,9 +71,9 @@ def list_runs(folder: _Folder) -> Answer:
         [
             run.name,
             _at(run.started),
-            "" if run.mounting is None else run.mounting,
+            run.mounting,
             run.state.value,
-            "" if run.counts is None else run.counts.text,
+            run.counts and run.counts.text,
             run.reason,
         ]
         for run in runs

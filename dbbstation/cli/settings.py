@@ -142,11 +142,12 @@ def _print(found: Settings) -> None:
     for key, one in result.values.items():
         value = NOT_SET if one.value is None else str(one.value).replace("\t", "tab")
         value = re.sub(r"\b[0-9a-f]{64}\b", lambda hashed: f"{hashed[0][:12]}…", value)
-        rows.append([key, value, one.origin or ""])
+        rows.append([key, value, one.origin])
     print_table(["setting", "value", "from"], rows)
     for held in result.tolerances:
         circles = which_circles(held.tests, held.directions)
-        echo_line(f"tolerance: {held.quantity}{_filtered(held.filter)} at most {held.largest_um:g} µm, {circles}")
+        filtered = "" if held.filter is None else f" (filter: {held.filter})"
+        echo_line(f"tolerance: {held.quantity}{filtered} at most {held.largest_um:g} µm, {circles}")
     if found.tolerances_from:
         echo_line(f"tolerances from {found.tolerances_from}")
     if not found.files:
@@ -161,7 +162,3 @@ def _template() -> str:
     head, format_line, rest = text.partition(f"format: {format_of(SettingsFile)}\n")
     hint = "# Take away the # in front of what you set; where a line is indented, in front of the line above it too.\n"
     return head + hint + format_line + re.sub(r"^(?=[^#\n])", "#", rest, flags=re.MULTILINE)
-
-
-def _filtered(words: str | None) -> str:
-    return "" if words is None else f" (filter: {words})"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -57,7 +58,8 @@ def sources(
         found = source_description(source, given)
         return Answer(found, _details(found))
     rows = [
-        [source.name, source.belongs_to.value, role_of(source), _first(source.texts.what)] for source in known.values()
+        [source.name, source.belongs_to.value, role_of(source), re.split(": |[.] ", source.texts.what)[0].rstrip(".")]
+        for source in known.values()
     ]
     every = SourcesResult(tuple(source_description(source) for source in known.values()))
     return Answer(every, lambda: print_table(["cause", "belongs to", "role", "what it is"], rows))
@@ -94,7 +96,3 @@ def _details(told: SourceDescription) -> list[str]:
 
 def _wrapped(text: str, hanging: str = "") -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  " + hanging)
-
-
-def _first(text: str) -> str:
-    return text.split(": ", maxsplit=1)[0].split(". ", maxsplit=1)[0].rstrip(".")

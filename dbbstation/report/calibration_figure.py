@@ -14,13 +14,17 @@ from dbbstation.calibration.reporting.residual_map import ball_shifts, circle_te
 from dbbstation.report.drawing import (
     AFTER,
     BEFORE,
+    DIRECTIONS,
     LINE_OF_DIRECTION,
     ROW_IN,
     SET,
     WIDTH_IN,
     ShownFigure,
     draw_maps,
+    heading,
     in_style,
+    labelled,
+    legend_above,
 )
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.report.polar import step_of
@@ -73,25 +77,14 @@ def draw_calibration(calibration: Calibration) -> ShownFigure:
 def _circles(part: SubFigure, tests: Sequence[CircleTest], rows: int) -> None:
     reach = max(float(np.abs(circle.before_um).max()) for test in tests for circle in test.circles)
     ring = step_of(reach / 2.0)
-    part.suptitle(
-        f"measured less predicted length about the commanded circle, one ring {ring:g} µm",
-        fontsize=9,
-        x=0.01,
-        ha="left",
-    )
+    heading(part, f"measured less predicted length about the commanded circle, one ring {ring:g} µm")
     panels: Any = part.subplots(rows, min(COLUMNS, len(tests)), squeeze=False)
     for axes, test in zip(panels.flat, tests, strict=False):
         _circle(axes, test, ring)
     for axes in panels.flat:
         axes.set_axis_off()
-    axes = panels[0, 0]
-    handles = [
-        axes.plot([], [], color=BEFORE, linewidth=1.0, label="nominal machine")[0],
-        axes.plot([], [], color=AFTER, linewidth=1.0, label="calibrated")[0],
-        axes.plot([], [], color="black", linewidth=0.9, label="CCW")[0],
-        axes.plot([], [], color="black", linewidth=0.9, linestyle="--", label="CW")[0],
-    ]
-    part.legend(handles=handles, loc="upper right", ncols=4, borderpad=0.0)
+    sides = {"nominal machine": BEFORE, "calibrated": AFTER}
+    legend_above(part, panels[0, 0], {k: {"color": c, "linewidth": 1.0} for k, c in sides.items()} | DIRECTIONS)
 
 
 def _circle(axes: Axes, test: CircleTest, ring: float) -> None:
@@ -127,9 +120,7 @@ def _leverage(axes: Axes, leverage: Mapping[str, float]) -> None:
     axes.barh(place, list(leverage.values()), color="#777777")
     axes.set_yticks(place, list(leverage))
     axes.set_ylim(len(leverage) - 0.5, -0.5)
-    axes.set_ylabel("test")
-    axes.set_xlabel("parameters' worth of what is known")
-    axes.set_title("leverage of each test")
+    labelled(axes, "parameters' worth of what is known", "test", "leverage of each test")
 
 
 def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> None:
@@ -149,9 +140,7 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
     axes.set_xlim(middle[0] - half, middle[0] + half)
     axes.set_ylim(middle[1] - half, middle[1] + 1.15 * half)
     axes.set_aspect("equal")
-    axes.set_xlabel("X, mm")
-    axes.set_ylabel("Y, mm")
-    axes.set_title(f"centres off the balls, {title}")
+    labelled(axes, "X, mm", "Y, mm", f"centres off the balls, {title}")
     key = step_of(longest)
     start = np.array([middle[0] - half + 8.0, middle[1] - half + 10.0])
     axes.quiver(*start, key, 0.0, color="black", width=0.006, **scale)
@@ -180,6 +169,5 @@ def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, 1.25 * reach)
     axes.set_aspect("equal")
-    axes.set_xlabel("X, µm")
-    axes.set_ylabel("Y, µm")
+    labelled(axes, "X, µm", "Y, µm")
     axes.legend(loc="upper right", handlelength=1.0, borderpad=0.1)

@@ -13,7 +13,7 @@ import numpy as np
 from dbbstation import __version__
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
-from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, in_style
+from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, in_style, labelled
 from dbbstation.report.figure_format import Wanted, in_format
 from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_map, draw_polar, draw_spectrum, draw_together
 from dbbstation.report.polar import chosen
@@ -92,14 +92,11 @@ class Plotted:
             raise StationError(
                 f"only one session is there to compare, {several.pop()}", remedy="name two sessions or more"
             )
-        return [
-            self._panel(session, test, [one for one in shown if (one.session, one.entry.test) == (session, test)])
-            for session, test in dict.fromkeys((one.session, one.entry.test) for one in shown)
-        ]
-
-    def _panel(self, session: str, test: str, runs: Sequence[MeasuredCircle]) -> PlotPanel:
-        drawn = chosen(runs, MOST_DRAWN)
-        return PlotPanel(session, test, tuple(drawn), len(runs) - len(drawn))
+        of: dict[tuple[str, str], list[MeasuredCircle]] = {}
+        for one in shown:
+            of.setdefault((one.session, one.entry.test), []).append(one)
+        drawn = {key: chosen(runs, MOST_DRAWN) for key, runs in of.items()}
+        return [PlotPanel(*key, tuple(drawn[key]), len(runs) - len(drawn[key])) for key, runs in of.items()]
 
     def on_sheet(self) -> list[MeasuredCircle]:
         """Return the drawn runs; a map averages all circles."""
@@ -134,9 +131,7 @@ def _trace(axes: Axes, name: str, analysis: CircleAnalysis) -> None:
     theta = np.radians(analysis.path.theta_deg) if polar else analysis.path.theta_deg
     axes.plot(theta, analysis.residual_um, ".", color=AFTER, markersize=1.5)
     axes.set_xticks(np.radians(QUARTERS[:-1]) if polar else QUARTERS)
-    axes.set_xlabel("angle from +X towards +Y, degrees")
-    axes.set_ylabel("deviation, µm")
-    axes.set_title(f"{name}: G(LS) {analysis.g_um:.2f} µm")
+    labelled(axes, "angle from +X towards +Y, degrees", "deviation, µm", f"{name}: G(LS) {analysis.g_um:.2f} µm")
 
 
 def draw_circles(plotted: Plotted) -> Figure:
@@ -176,7 +171,8 @@ def _grid(
         row, column = divmod(k, columns)
         left = MARGIN_IN + column * (each + _GAP_IN)
         bottom = sheet.top_in - (row + 1) * height - row * _GAP_IN
-        draw(sheet, Box(left, bottom, each, height), _name(plotted, panel), panel.drawn)
+        name = f"{panel.session}: test {panel.test}" if len(plotted.found.sessions) > 1 else f"test {panel.test}"
+        draw(sheet, Box(left, bottom, each, height), name, panel.drawn)
     return sheet.figure
 
 
@@ -191,7 +187,8 @@ def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
     sheet = _sheet(plotted, width_in, room, panels)
     top = sheet.top_in
     for test, of in tests.items():
-        reach_um = max(_reach_um(panel.drawn) for panel in of)
+        drawn = [one.analysis for panel in of for one, _ in panel.drawn if one.analysis is not None]
+        reach_um = max(float(abs(one.residual_um).max()) for one in drawn)
         for column, panel in enumerate(of):
             left = MARGIN_IN + column * (each + _GAP_IN)
             box = Box(left, top - heights[0], each, heights[0])
@@ -283,13 +280,5 @@ def _bar(said: dict[str, str]) -> str:
     return f"{said['bar']}, {said['bar calibrated']}"
 
 
-def _name(plotted: Plotted, panel: PlotPanel) -> str:
-    return f"{panel.session}: test {panel.test}" if len(plotted.found.sessions) > 1 else f"test {panel.test}"
-
-
 def _directions(drawn: Sequence[Drawn]) -> list[str]:
     return list(dict.fromkeys(str(one.entry.direction) for one, _ in drawn))
-
-
-def _reach_um(drawn: Sequence[Drawn]) -> float:
-    return max(float(abs(one.analysis.residual_um).max()) for one, _ in drawn if one.analysis is not None)

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.plan.plan import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, ShownFigure, in_style
+from dbbstation.report.drawing import (
+    AFTER,
+    BEFORE,
+    QUARTERS,
+    ShownFigure,
+    in_style,
+    labelled,
+    map_by_angle,
+    zero_line,
+)
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
 
@@ -57,14 +66,9 @@ def _map(axes: Axes, found: Comparison, tests: list[tuple[str, int]], direction:
     rows = {(r.test, r.number): r.by_angle_um for r in found.runs if r.direction == direction}
     nothing = np.full(len(found.runs[0].by_angle_um), np.nan)
     values = np.array([rows.get(test, nothing) for test in tests])
-    edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
-    mesh = axes.pcolormesh(edges, np.arange(len(tests) + 1), values, cmap=DIVERGING, vmin=-reach, vmax=reach)
     numbered = any(number > 1 for _, number in tests)
-    axes.set_yticks(np.arange(len(tests)) + 0.5, [f"{test} {n}" if numbered else test for test, n in tests])
-    axes.set_ylim(len(tests), 0)
-    axes.set_xticks(QUARTERS)
-    axes.set_xlabel("angle from +X towards +Y, degrees")
-    axes.set_title(f"difference, {str(direction).upper()}")
+    mesh = map_by_angle(axes, [f"{test} {n}" if numbered else test for test, n in tests], values, reach)
+    labelled(axes, "angle from +X towards +Y, degrees", title=f"difference, {str(direction).upper()}")
     return mesh
 
 
@@ -78,6 +82,6 @@ def _overlay(readings: Axes, differences: Axes, run: RunDifference) -> None:
     differences.plot(theta, 1e3 * run.smooth_mm, color="black", linewidth=1.2, label="smooth")
     differences.plot(theta, 1e3 * run.found_mm, color=COLOUR_B, linewidth=1.0, linestyle="--", label="found")
     differences.legend()
-    differences.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+    zero_line(differences)
     differences.set_xticks(QUARTERS)
     differences.set_xlabel("angle, degrees")

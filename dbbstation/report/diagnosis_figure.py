@@ -16,6 +16,7 @@ from dbbstation.plan.plan import Direction
 from dbbstation.report.drawing import (
     AFTER,
     BEFORE,
+    DIRECTIONS,
     LINE_OF_DIRECTION,
     MEASURED,
     QUARTERS,
@@ -23,7 +24,11 @@ from dbbstation.report.drawing import (
     WIDTH_IN,
     ShownFigure,
     draw_maps,
+    heading,
     in_style,
+    labelled,
+    legend_above,
+    zero_line,
 )
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
@@ -61,10 +66,10 @@ def draw_unexplained(part: SubFigure, curve: Curve) -> None:
         axes.plot(at, value, color=AFTER, linewidth=1.0)
         axes.set_xlim(at[0], at[-1])
         axes.set_xlabel(f"{curve.follows.variable.replace('-', ' ')}, {'°' if curve.unit == 'deg' else curve.unit}")
-    axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+    zero_line(axes)
     axes.set_ylabel("µm, ±2u")
     axes.set_title(curve.convention, loc="right")
-    part.suptitle(f"without a name: {_whose(curve)}, cause unknown", fontsize=9, x=0.01, ha="left")
+    heading(part, f"without a name: {_whose(curve)}, cause unknown")
 
 
 def _whose(curve: Curve) -> str:
@@ -179,14 +184,14 @@ def _maps(part: SubFigure, diagnosis: Diagnosis, *, found: bool) -> None:
 def _curves(part: SubFigure, one: SourceCurves, marked: int | None, *, found: bool) -> None:
     what = "strut-length error" if one.struts else "error of the reading"
     over = one.variable.replace("-", " ")
-    part.suptitle(f"{one.source or 'without a name'}: {what} over {over}", fontsize=9, x=0.01, ha="left")
+    heading(part, f"{one.source or 'without a name'}: {what} over {over}")
     panels: Any = part.subplots(1, len(one.struts) or 1, sharey=True, squeeze=False)[0]
     for k, axes in enumerate(panels):
         for branch in one.struts[k] if one.struts else one.reading:
             _branch(axes, branch, found=found, fine=one.fine)
         if one.struts:
             axes.set_title(f"strut {k + 1}", fontweight="bold" if k + 1 == marked else "normal")
-        axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+        zero_line(axes)
         axes.locator_params(axis="x", nbins=4 if one.struts else 10)
         axes.set_xlabel(f"{over}, {one.unit}")
     panels[0].set_ylabel("µm" if one.fine else "µm, bars ±2σ")
@@ -207,24 +212,20 @@ def _branch(axes: Axes, branch: Branch, *, found: bool, fine: bool) -> None:
 
 def _legend_of_curves(part: SubFigure, axes: Axes, branches: Sequence[Branch], *, found: bool) -> None:
     dot: dict[str, Any] = {"linewidth": 0.0, "marker": "o", "markersize": 3.0}
-    handles = [axes.plot([], [], color=BEFORE, label="residual of the kinematic model", **dot)[0]]
+    lines: dict[str, dict[str, Any]] = {"residual of the kinematic model": {"color": BEFORE, **dot}}
+    black: dict[str, Any] = {"color": "black", "linewidth": 1.0}
     if found:
-        handles += axes.plot([], [], color=AFTER, label="joint model and its residual", **dot)
-        handles += axes.plot([], [], color="black", linewidth=1.0, label="joint model")
-    for branch in branches:
-        if branch.sense:
-            marker, line = MARKER_OF[branch.sense], LINE_OF[branch.sense]
-            handles += axes.plot(
-                [], [], color="black", marker=marker, markersize=3.0, linewidth=1.0, linestyle=line, label=branch.sense
-            )
-    part.legend(handles=handles, loc="upper right", ncols=len(handles), borderpad=0.0)
+        lines |= {"joint model and its residual": {"color": AFTER, **dot}, "joint model": black}
+    for sense in (branch.sense for branch in branches if branch.sense):
+        lines[sense] = black | {"marker": MARKER_OF[sense], "markersize": 3.0, "linestyle": LINE_OF[sense]}
+    legend_above(part, axes, lines)
 
 
 def _traces(part: SubFigure, gains: Sequence[GainOfTest], *, found: bool) -> None:
     key = (lambda one: -one.gain_um) if found else (lambda one: -one.residual_um[0])
     chosen = sorted(gains, key=key)[:TRACES]
     which = "tests that gained most" if found else "tests with the largest residual"
-    part.suptitle(f"traces of the {which}", fontsize=9, x=0.01, ha="left")
+    heading(part, f"traces of the {which}")
     panels: Any = part.subplots(3, len(chosen), sharex=True, sharey="row", squeeze=False)
     for column, one in zip(panels.T, chosen, strict=True):
         before, after = one.residual_um
@@ -233,13 +234,11 @@ def _traces(part: SubFigure, gains: Sequence[GainOfTest], *, found: bool) -> Non
             line = LINE_OF_DIRECTION[trace.direction]
             left = column[1 + list(Direction).index(trace.direction)]
             column[0].plot(trace.theta_deg, trace.measured_um, color=MEASURED, linewidth=2.0, linestyle=line, alpha=0.5)
-            column[0].plot(trace.theta_deg, trace.before_um, color=BEFORE, linewidth=0.9, linestyle=line)
-            left.plot(trace.theta_deg, trace.measured_um - trace.before_um, color=BEFORE, linewidth=0.8)
-            if found:
-                column[0].plot(trace.theta_deg, trace.after_um, color=AFTER, linewidth=0.9, linestyle=line)
-                left.plot(trace.theta_deg, trace.measured_um - trace.after_um, color=AFTER, linewidth=0.8)
+            for values, colour in ((trace.before_um, BEFORE), (trace.after_um, AFTER))[: 1 + found]:
+                column[0].plot(trace.theta_deg, values, color=colour, linewidth=0.9, linestyle=line)
+                left.plot(trace.theta_deg, trace.measured_um - values, color=colour, linewidth=0.8)
         for axes in column:
-            axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+            zero_line(axes)
             axes.set_xticks(QUARTERS)
             axes.set_xlim(0.0, 360.0)
         column[-1].set_xlabel("angle from +X to +Y, °")
@@ -253,14 +252,10 @@ def _traces(part: SubFigure, gains: Sequence[GainOfTest], *, found: bool) -> Non
 
 
 def _legend_of_traces(part: SubFigure, axes: Axes, *, found: bool) -> None:
-    handles = [
-        axes.plot([], [], color=MEASURED, linewidth=2.0, alpha=0.5, label="measured")[0],
-        axes.plot([], [], color=BEFORE, linewidth=1.0, label="kinematic model")[0],
-        *([axes.plot([], [], color=AFTER, linewidth=1.0, label="with causes found")[0]] if found else []),
-        axes.plot([], [], color="black", linewidth=0.9, label="CCW")[0],
-        axes.plot([], [], color="black", linewidth=0.9, linestyle="--", label="CW")[0],
-    ]
-    part.legend(handles=handles, loc="upper right", ncols=5, borderpad=0.0)
+    lines: dict[str, dict[str, Any]] = {"measured": {"color": MEASURED, "linewidth": 2.0, "alpha": 0.5}}
+    lines["kinematic model"] = {"color": BEFORE, "linewidth": 1.0}
+    lines |= {"with causes found": {"color": AFTER, "linewidth": 1.0}} if found else {}
+    legend_above(part, axes, lines | DIRECTIONS)
 
 
 def _bars(part: SubFigure, diagnosis: Diagnosis, gains: Sequence[GainOfTest], *, found: bool) -> None:
@@ -268,18 +263,15 @@ def _bars(part: SubFigure, diagnosis: Diagnosis, gains: Sequence[GainOfTest], *,
     names = [one.name for one in gains]
     _pairs(panels[0], names, [one.residual_um for one in gains], found=found)
     panels[0].axhline(1e3 * fine_noise_mm(diagnosis.after), color="black", linewidth=0.8, linestyle="--", label="noise")
-    panels[0].set_title("residual of each test within its mounting")
-    panels[0].set_ylabel("µm rms")
+    labelled(panels[0], "", "µm rms", "residual of each test within its mounting")
     _pairs(panels[1], names, [one.circularity_um for one in gains], found=found)
-    panels[1].set_title("circularity left of each test")
-    panels[1].set_ylabel("µm")
+    labelled(panels[1], "", "µm", "circularity left of each test")
     whole = (rms_um(diagnosis.before.residual_mm), rms_um(diagnosis.after.residual_mm))
     _pairs(panels[2], ["residual", "tests left out,\npredicted"], [whole, _held_out_um(diagnosis)], found=found)
-    panels[2].set_title("all tests")
-    panels[2].set_ylabel("µm rms")
+    labelled(panels[2], "", "µm rms", "all tests")
     for axes in panels[:2]:
         axes.set_xlabel("test")
-    part.suptitle("residual, circularity, prediction", fontsize=9, x=0.01, ha="left")
+    heading(part, "residual, circularity, prediction")
     part.legend(*panels[0].get_legend_handles_labels(), loc="upper right", ncols=3, borderpad=0.0)
 
 
@@ -290,9 +282,8 @@ def _held_out_um(diagnosis: Diagnosis) -> tuple[float, float]:
 
 def _pairs(axes: Axes, names: Sequence[str], values: Sequence[tuple[float, float]], *, found: bool) -> None:
     place = np.arange(len(names))
+    before, after = zip(*values, strict=True)
+    axes.bar(place - 0.2 * found, before, 0.4 if found else 0.6, color=BEFORE, label="kinematic model")
     if found:
-        axes.bar(place - 0.2, [before for before, _ in values], 0.4, color=BEFORE, label="kinematic model")
-        axes.bar(place + 0.2, [after for _, after in values], 0.4, color=AFTER, label="with causes found")
-    else:
-        axes.bar(place, [before for before, _ in values], 0.6, color=BEFORE, label="kinematic model")
+        axes.bar(place + 0.2, after, 0.4, color=AFTER, label="with causes found")
     axes.set_xticks(place, names, rotation=90 if max(map(len, names)) > 3 and len(names) > 4 else 0)  # noqa: PLR2004

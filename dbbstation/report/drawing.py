@@ -12,11 +12,12 @@ from dbbstation.plan.plan import Direction
 from dbbstation.report.figure_format import as_svg
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from contextlib import AbstractContextManager
 
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
+    from matplotlib.figure import SubFigure
 
     from dbbstation.calibration.reporting.residual_map import ResidualMap
     from dbbstation.computing.arrays import Floats
@@ -66,6 +67,33 @@ def in_style() -> AbstractContextManager[None]:
     return mpl.rc_context(STYLE)
 
 
+def labelled(axes: Axes, x: str, y: str = "", title: str = "") -> None:
+    """Name the axes and the panel."""
+    axes.set(xlabel=x, ylabel=y, title=title)
+
+
+def heading(part: SubFigure, text: str) -> None:
+    """Write the heading of a part of a figure."""
+    part.suptitle(text, fontsize=9, x=0.01, ha="left")
+
+
+def zero_line(axes: Axes) -> None:
+    """Mark zero."""
+    axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+
+
+def legend_above(part: SubFigure, axes: Axes, lines: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write the legend of a part of a figure in one row, by label and style of each line."""
+    handles = [axes.plot([], [], label=label, **style)[0] for label, style in lines.items()]
+    part.legend(handles=handles, loc="upper right", ncols=len(handles), borderpad=0.0)
+
+
+DIRECTIONS: dict[str, dict[str, Any]] = {
+    name.upper(): {"color": "black", "linewidth": 0.9, "linestyle": line} for name, line in LINE_OF_DIRECTION.items()
+}
+"""Style of a direction of travel in a legend."""
+
+
 def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[ResidualMap], noise_um: float) -> QuadMesh:
     """Draw maps by direction with one scale, white at zero.
 
@@ -84,14 +112,18 @@ def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[Resi
 
 
 def _map(axes: Axes, tests: Sequence[str], values: Floats, reach: float) -> QuadMesh:
-    edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
-    mesh = axes.pcolormesh(
-        edges, np.arange(len(tests) + 1), np.ma.masked_invalid(values), cmap=DIVERGING, vmin=-reach, vmax=reach
-    )
+    mesh = map_by_angle(axes, tests, np.ma.masked_invalid(values), reach)
     mesh.set_clip_on(False)
     axes.set_facecolor("#cccccc")  # nothing recorded
-    axes.set_yticks(np.arange(len(tests)) + 0.5, tests)
-    axes.set_ylim(len(tests), 0)
-    axes.set_xticks(QUARTERS)
     axes.set_xlabel("angle from +X to +Y, °")
+    return mesh
+
+
+def map_by_angle(axes: Axes, names: Sequence[str], values: Floats, reach: float) -> QuadMesh:
+    """Draw a row per name over the angle, values shape (names, angles)."""
+    edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
+    mesh = axes.pcolormesh(edges, np.arange(len(names) + 1), values, cmap=DIVERGING, vmin=-reach, vmax=reach)
+    axes.set_yticks(np.arange(len(names)) + 0.5, names)
+    axes.set_ylim(len(names), 0)
+    axes.set_xticks(QUARTERS)
     return mesh

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style, labelled
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
 
@@ -47,8 +47,7 @@ def _force(axes: Axes, diagnosis: DriveFindings) -> None:
     for colour, (label, column) in zip((MEASURED, BEFORE, AFTER), lines, strict=True):
         axes.plot(t[::step], table[column][::step], color=colour, label=label, linewidth=0.8)
     axes.axvspan(*diagnosis.held_back.t_s, color="#eeeeee", zorder=0)
-    axes.set_ylabel("force, N")
-    axes.set_title("force in the band of the comparison; grey: held back")
+    labelled(axes, "", "force, N", "force in the band of the comparison; grey: held back")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
 
 
@@ -59,9 +58,12 @@ def _left(axes: Axes, diagnosis: DriveFindings) -> None:
         axes.plot(t[::step], (table["force_n"] - table[column])[::step], color=colour, linewidth=0.8)
     errors = diagnosis.held_back.relative_force_error
     axes.axvspan(*diagnosis.held_back.t_s, color="#eeeeee", zorder=0)
-    axes.set_xlabel("time, s")
-    axes.set_ylabel("measured less model, N")
-    axes.set_title(f"what is left; held back {100 * errors.before:.1f} % -> {100 * errors.after:.1f} % of the force")
+    labelled(
+        axes,
+        "time, s",
+        "measured less model, N",
+        f"what is left; held back {100 * errors.before:.1f} % -> {100 * errors.after:.1f} % of the force",
+    )
 
 
 def _friction(axes: Axes, diagnosis: DriveFindings) -> None:
@@ -87,9 +89,7 @@ def _friction(axes: Axes, diagnosis: DriveFindings) -> None:
     low, high = np.percentile(friction, [0.5, 99.5])
     margin = 0.2 * (high - low)
     axes.set_ylim(low - margin, high + margin)
-    axes.set_xlabel("speed, mm/s")
-    axes.set_ylabel("force less inertia, N")
-    axes.set_title("friction (band: two standard uncertainties)")
+    labelled(axes, "speed, mm/s", "force less inertia, N", "friction (band: two standard uncertainties)")
     axes.legend(loc="upper left")
 
 

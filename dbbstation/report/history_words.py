@@ -11,7 +11,7 @@ from dbbstation.text.written import listed
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from dbbstation.results.history import ChangedQuantity, MachineHistoryResult, QuantityHistory
+    from dbbstation.results.history import MachineHistoryResult, QuantityHistory
 
 MOST_NAMED = 5
 """Greatest number of quantities that are named for one change; the table has all."""
@@ -66,13 +66,11 @@ def changes_in_words(machine: MachineHistoryResult, coverage_factor: float) -> I
         when = f"{found.name} ({found.date})"
         where = "" if since.name == found.name else f", since {since.name} ({since.date})"
         beside = f"; {', '.join(change.beside)}" if change.beside else ""
-        sizes = [f"{one.quantity} {changed_in_words(one, coverage_factor)}" for one in change.quantities]
+        sizes = [
+            f"{one.quantity} {difference_in_words(one.difference, one.u_difference, one.unit, coverage_factor)}"
+            for one in change.quantities
+        ]
         yield f"{change.verdict}: {when}{where}{beside}: {listed(sizes, MOST_NAMED)}"
-
-
-def changed_in_words(one: ChangedQuantity, coverage_factor: float) -> str:
-    """Return a difference with its sign, U and unit."""
-    return difference_in_words(one.difference, one.u_difference, one.unit, coverage_factor)
 
 
 def difference_in_words(difference: float, u: float, unit: str, coverage_factor: float) -> str:

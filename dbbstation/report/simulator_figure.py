@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, ShownFigure, in_style, labelled
 from dbbstation.report.figure_format import FigureFormat, Wanted, in_format
 from dbbstation.results.frame import OnePanel
 
@@ -41,8 +41,7 @@ def _over_time(axes: Axes, answer: SimulatorComparison) -> None:
         (answer.found.residual, AFTER, "corrected"),
     ):
         axes.plot(rows[::step], left[::step], color=colour, label=label, linewidth=0.8)
-    axes.set_xlabel("row")
-    axes.set_ylabel(_label(answer))
+    labelled(axes, "row", _label(answer))
     axes.legend()
 
 
@@ -60,8 +59,7 @@ def _over_signal(axes: Axes, answer: SimulatorComparison) -> None:
         values[::step], answer.base.fitted.residual[::step], ".", color=MEASURED, markersize=1.5, label="refitted"
     )
     axes.plot(values[::step], answer.found.residual[::step], ".", color=AFTER, markersize=1.5, label="corrected")
-    axes.set_xlabel(name)
-    axes.set_ylabel(_label(answer))
+    labelled(axes, name, _label(answer))
     axes.legend()
 
 
@@ -77,8 +75,7 @@ def _held_out(axes: Axes, answer: SimulatorComparison) -> None:
     ):
         axes.plot(places, errors, "o-", color=colour, label=label, markersize=3)
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("held-out part")
-    axes.set_ylabel(f"error, {answer.model.outputs[0].unit} rms".replace(",  rms", ", rms"))
+    labelled(axes, "held-out part", f"error, {answer.model.outputs[0].unit} rms".replace(",  rms", ", rms"))
     axes.legend()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -16,8 +16,11 @@ LEAST_PRINTED = 1e-99
 def model_warnings(identified: IdentifiedModel) -> tuple[str, ...]:
     """Return a model's warnings, a sentence each; may be empty."""
     report = identified.report
-    told = [*missing_physics_warnings(report), *_undecided(report), *unknown_cause_notes(identified.model)]
-    return tuple(told)
+    unknown = (
+        f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
+        for name in unknown_causes(identified.model)
+    )
+    return (*missing_physics_warnings(report), *_undecided(report), *unknown)
 
 
 def lacks_physics(report: Mapping[str, Any]) -> bool:
@@ -53,22 +56,11 @@ def _undecided(report: Mapping[str, Any]) -> list[str]:
     said = report.get("diagnosis")
     if not isinstance(said, Mapping):
         return []
-    told = [f"these recordings cannot tell {' from '.join(names)}: the model has one of them" for names in _lists(said)]
+    alike = [names for names in said.get("ambiguous", ()) if len(names) > 1]
+    told = [f"these recordings cannot tell {' from '.join(names)}: the model has one of them" for names in alike]
     if said.get("held_out_worse") is True:
         told.append("held-out tests are predicted worse by the model than by the kinematic calibration alone")
     return told + [str(text).rstrip(".") for text in said.get("limits", ())]
-
-
-def _lists(said: Mapping[str, Any]) -> list[Sequence[str]]:
-    return [names for names in said.get("ambiguous", ()) if len(names) > 1]
-
-
-def unknown_cause_notes(model: MachineModel) -> list[str]:
-    """Return notes on an error of unknown cause in the model."""
-    return [
-        f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
-        for name in unknown_causes(model)
-    ]
 
 
 def unknown_causes(model: MachineModel) -> tuple[str, ...]:

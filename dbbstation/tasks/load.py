@@ -134,7 +134,9 @@ def load_sessions(
                 # One recording at a time is in memory; its turn is what stays.
                 read = session.load(run)
                 warnings += [str(warning) for warning in (*read.warnings, *session.loss(run, read.recording))]
-                same = readings.setdefault(_readings(read.recording), session)
+                # Equal for copies with other comments. A copy that counts twice would wrongly halve the variance.
+                samples = read.recording.t_s.tobytes() + read.recording.length_mm.tobytes()
+                same = readings.setdefault(hashlib.sha256(samples).digest(), session)
                 if same is not session:
                     copied[session.folder, same.folder] += 1
                 began = session.started_s(run)
@@ -256,11 +258,6 @@ def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
         else session
         for k, session in enumerate(sessions)
     ]
-
-
-def _readings(recording: Recording) -> bytes:
-    """Return a digest of the readings, equal for copies with other comments. A copy that counts twice would wrongly halve the variance."""
-    return hashlib.sha256(recording.t_s.tobytes() + recording.length_mm.tobytes()).digest()
 
 
 def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:

@@ -255,9 +255,6 @@ def _with_correction(
     for name, values in more.items():
         if values is None or not len(values) or all(value != value for value in values.tolist()):  # noqa: PLR0124 - NaN
             continue
-        columns[_unused(f"{name}{unit}", columns)] = tuple(values.tolist())
+        names = (f"{name}{unit}", *(f"{name}{unit}_{k}" for k in range(2, len(columns) + 3)))
+        columns[next(one for one in names if one not in columns)] = tuple(values.tolist())
     return columns
-
-
-def _unused(name: str, taken: Mapping[str, object]) -> str:
-    return next(one for one in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if one not in taken)

@@ -190,7 +190,8 @@ class AcceptanceScreen(RowScreen):
         tests = () if answer is None else answer.tolerances_by_test
         if self._after.former is None:
             self.put([Content(label) for label in self._offered()])
-            self.about(self._about_now())
+            ran = "" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now))
+            self.about(Content(ran))
         else:
             self.put([Content.styled(HEADING, "dim"), *(test_line(one) for one in tests)])
             self.about(lines(*self._notes(answer)))
@@ -220,9 +221,6 @@ class AcceptanceScreen(RowScreen):
                 return texts.ACCEPTANCE_CANCELLED, False
         stage = result.stage or texts.STEP_BEGINS
         return texts.ACCEPTANCE_BUSY.format(stage=stage, passed=duration(result.passed_s)), False
-
-    def _about_now(self) -> Content:
-        return Content("" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now)))
 
     def _notes(self, answer: Any) -> list[Content]:  # noqa: ANN401 - a result as objects, or None
         after = self._after

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from dbbstation.quality.answer import RunAssessment
     from dbbstation.service.board import Board
-    from dbbstation.station.events import RunAnnounced
 
 _S_PER_MIN, _MIN_PER_H = 60.0, 60
 
@@ -37,8 +36,8 @@ def now(board: Board) -> str:
         return _BEGIN
     if board.finished is not None:
         return _finished(board)
-    say = _SENTENCES.get(board.state)
-    return say(board) if say else f"The station is {board.state}."
+    say = _SENTENCES.get(board.state, f"The station is {board.state}.")
+    return say if isinstance(say, str) else say(board)
 
 
 def now_for_operator(board: Board, trouble: str = "") -> str:
@@ -69,19 +68,8 @@ def _set_up(board: Board) -> str:
 
 
 def _armed(board: Board) -> str:
-    return f"{_last_step(board.announced)} at the machine; the recording begins and ends by itself."
-
-
-def _dwelling(_board: Board) -> str:
-    return "The bar stands at the feed-in point: the machine feeds in next, touch nothing."
-
-
-def _turning(_board: Board) -> str:
-    return "The machine runs the circle: touch nothing until it has fed out."
-
-
-def _leaving(_board: Board) -> str:
-    return "The circle is through, the machine feeds out: touch nothing; the word on it follows."
+    step = board.announced.instructions[-1] if board.announced else "Start the circle"
+    return f"{step} at the machine; the recording begins and ends by itself."
 
 
 def _verdict(board: Board) -> str:
@@ -128,24 +116,16 @@ def _flawed(board: Board) -> str:
     return f"{Advice.REPEAT}  {name} has no usable circle: {_ended(problem)} Enter or R measures it again, X leaves it out."
 
 
-def _paused(_board: Board) -> str:
-    return "Pause: nothing is recorded and nothing is waited for. P goes on."
-
-
-_SENTENCES: dict[State, Callable[[Board], str]] = {
+_SENTENCES: dict[State, str | Callable[[Board], str]] = {
     State.ANNOUNCED: _set_up,
     State.ARMED: _armed,
-    State.DWELLING: _dwelling,
-    State.TURNING: _turning,
-    State.LEAVING: _leaving,
+    State.DWELLING: "The bar stands at the feed-in point: the machine feeds in next, touch nothing.",
+    State.TURNING: "The machine runs the circle: touch nothing until it has fed out.",
+    State.LEAVING: "The circle is through, the machine feeds out: touch nothing; the word on it follows.",
     State.COMPLETE: _verdict,
     State.FLAWED: _flawed,
-    State.PAUSED: _paused,
+    State.PAUSED: "Pause: nothing is recorded and nothing is waited for. P goes on.",
 }
-
-
-def _last_step(announced: RunAnnounced | None) -> str:
-    return announced.instructions[-1] if announced else "Start the circle"
 
 
 def _finished(board: Board) -> str:

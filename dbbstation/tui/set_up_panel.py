@@ -75,12 +75,15 @@ class SetUpPanel(Panel):
             return Content("")
         ball, circle = announced.ball, announced.circle
         where, what, on = _place(ball)
+        raised = f"raised {circle.elevation_deg:g}°" if circle.elevation_deg else "level"
         return lines(
-            Content.assemble((where, "bold"), " ", _touch(announced)),
+            Content.assemble(
+                (where, "bold"), " ", ("put up", "$text-warning") if announced.put_up else ("leave as is", "dim")
+            ),
             Content.assemble(what, " ", (on, "bold")),
             Content.assemble("ball ", (ball.name, "bold")),
             Content.assemble("tilt ", (_tilt(circle), "bold")),
-            Content.assemble(f"bar {circle.bar_mm:g} mm {_elevation(circle)}", _too_slow(announced)),
+            Content.assemble(f"bar {circle.bar_mm:g} mm {raised}", _too_slow(announced)),
         )
 
 
@@ -125,14 +128,6 @@ def _too_slow(announced: RunAnnounced) -> Content:
     return Content.styled(f", only {seen.points_per_turn:.0f} points per turn", "$text-warning")
 
 
-def _touch(announced: RunAnnounced) -> Content:
-    return Content.styled("put up", "$text-warning") if announced.put_up else Content.styled("leave as is", "dim")
-
-
 def _tilt(circle: Circle) -> str:
     a, b, c = circle.tilt_deg
     return f"A {a:g}° B {b:g}°" + (f" C {c:g}°" if c else "")
-
-
-def _elevation(circle: Circle) -> str:
-    return f"raised {circle.elevation_deg:g}°" if circle.elevation_deg else "level"

@@ -146,7 +146,8 @@ def _looks_like(
             f"{what}; the ball stood in that bore, or the run was filed under the wrong test",
         )
     step, at = _step(residual)
-    if rms_um(_without_step(residual, at)) < 0.5 * rms_um(residual - residual.mean()):
+    levelled = [part - part.mean() for part in (residual[:at], residual[at:])]
+    if rms_um(np.concatenate(levelled)) < 0.5 * rms_um(residual - residual.mean()):
         return (
             OutlierKind.RUN,
             f"the reading steps by {1e3 * step:.1f} µm at {run.raw.theta_deg[at]:.0f}°; bar or holder was bumped",
@@ -162,10 +163,6 @@ def _step(residual: Floats) -> tuple[float, int]:
     weight = np.sqrt(at * (count - at))
     k = int(np.argmax(np.abs(difference) * weight))
     return float(difference[k]), int(at[k])
-
-
-def _without_step(residual: Floats, at: int) -> Floats:
-    return np.concatenate([residual[:at] - residual[:at].mean(), residual[at:] - residual[at:].mean()])
 
 
 MOST = 8

@@ -144,7 +144,8 @@ def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
 def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
     seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
     of = [run for run in calibration.observations if run.setup.mounting in freed]
-    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
+    tests = ", ".join(dict.fromkeys(run.test for run in of))
+    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {tests}"
     distance = float(np.hypot(*seat.shift_mm[:2]))
     along = seat.shift_mm[:2] / max(distance, 1e-12)
     return Outlier(
@@ -190,10 +191,6 @@ def _freed(run: Observation) -> Observation:
     seen = 3 if run.raw.circle.elevation_deg != 0.0 else 2
     size[:seen] = UNKNOWN_MM
     return replace(run, setup=replace(run.setup, mounting_repeatability_mm=size))
-
-
-def _tests(runs: Sequence[Observation]) -> str:
-    return ", ".join(dict.fromkeys(run.test for run in runs))
 
 
 def _um(shift_mm: Floats) -> tuple[float, float, float]:

@@ -115,7 +115,8 @@ def _deviations(of: CircleFigures, first: CircleFigures | None = None) -> Circle
 
 def _under(model: MachineModel, observations: Sequence[Observation]) -> tuple[list[CircleFigures], float]:
     def of_run(observation: Observation, residual_mm: Floats) -> tuple[CircleFigures, float, int]:
-        return _figures_of(observation, residual_mm), float(residual_mm @ residual_mm), len(residual_mm)
+        found = figures(observation.raw, observation.raw.circle.bar_mm + residual_mm)
+        return found, float(residual_mm @ residual_mm), len(residual_mm)
 
     # Per run, because residuals need one number per sample.
     found, squares, counts = zip(*of_residuals(model, observations, of_run), strict=True)
@@ -181,10 +182,6 @@ def _error_mm(model: MachineModel, xy_mm: Floats, height_mm: float, corrected: M
     actual = model.anywhere().actual_poses(motion)
     believed = poses if corrected is None else corrected.anywhere().actual_poses(motion)
     return actual[:, :3] - believed[:, :3]
-
-
-def _figures_of(observation: Observation, residual_mm: Floats) -> CircleFigures:
-    return figures(observation.raw, observation.raw.circle.bar_mm + residual_mm)
 
 
 def _first_in_direction(observations: Sequence[Observation], k: int) -> int:

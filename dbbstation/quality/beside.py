@@ -125,8 +125,8 @@ class NearAssignments:
         before = self._readings.circles[runs, self.labels[runs]]
         circles, off, scatter = self._of(runs, instead)
         logs, pull, turned = self._without(runs, sizes, self._between(before, circles, sizes))
-        covariance = scatter + self._between(circles, circles, sizes) + _turned(turned) @ turned
-        apart = (off - self._means(circles, sizes))[..., None] + _turned(turned) @ pull
+        covariance = scatter + self._between(circles, circles, sizes) + turned.mT @ turned
+        apart = (off - self._means(circles, sizes))[..., None] + turned.mT @ pull
         white, alone = _whitened(covariance, apart)
         found = most.copy()
         found[sizes] = logs - 0.5 * np.sum(white**2, axis=(2, 3)) - alone
@@ -224,11 +224,7 @@ def _whitened(covariance: Floats, columns: Floats) -> tuple[NDArray[np.floating]
     n, k = columns.shape[-2:]
     bordered = np.empty((*columns.shape[:-2], n + k, n + k))
     bordered[..., :n, :n] = covariance
-    bordered[..., n:, :n] = _turned(columns)
+    bordered[..., n:, :n] = columns.mT
     bordered[..., n:, n:] = np.finfo(float).max * np.eye(k)
     root = np.linalg.cholesky(bordered)
-    return _turned(root[..., n:, :n]), log_diagonal(root[..., :n, :n])
-
-
-def _turned(matrices: NDArray[np.floating]) -> NDArray[np.floating]:
-    return np.swapaxes(matrices, -1, -2)
+    return root[..., n:, :n].mT, log_diagonal(root[..., :n, :n])

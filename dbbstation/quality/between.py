@@ -30,13 +30,13 @@ def direction(one: Seen, others: Others, expected: Expected | None = None) -> Fi
     against = others.opposite or others.earlier
     if against is None:
         why = "no other run of this test, and the expected centre does not lie off the axis through the start"
-        return undecided(Name.DIRECTION, f"cannot be seen: {why}", "µm")
+        return undecided(Name.DIRECTION, f"cannot be seen: {why}")
     off, mirrored = across(one) - across(against), across(one) + across(against)
     apart, mirror = float(np.linalg.norm(off)), float(np.linalg.norm(mirrored))
     stated = f"off the axis through the start it is {apart:.1f} µm from run {against.run.label}, {mirror:.1f} µm from its mirror image"
     limits = _across_limits(one, against, others, off, mirrored)
     if limits is None:
-        return undecided(Name.DIRECTION, f"{stated}: what both may differ by is not known", "µm", apart)
+        return undecided(Name.DIRECTION, f"{stated}: what both may differ by is not known", apart)
     limit, of_mirror = limits
     if apart > limit and mirror <= of_mirror:
         why = f"{stated}: one of both was run the wrong way round; run both again"
@@ -86,14 +86,14 @@ def _by_place(one: Seen, expected: Expected | None) -> Finding | None:
 def other_direction(one: Seen, others: Others) -> Finding:
     """Judge the difference in form and place from the other direction."""
     if others.opposite is None:
-        return undecided(Name.OTHER_DIRECTION, "the other direction has not been measured", "µm")
+        return undecided(Name.OTHER_DIRECTION, "the other direction has not been measured")
     return _beside(Name.OTHER_DIRECTION, one, others.opposite, others.directions_um, others.directions_stated)
 
 
 def repeat(one: Seen, others: Others) -> Finding:
     """Judge the difference in form and place from the previous repeat."""
     if others.earlier is None:
-        return undecided(Name.REPEAT, "there is no earlier run of this test and direction", "µm")
+        return undecided(Name.REPEAT, "there is no earlier run of this test and direction")
     return _beside(Name.REPEAT, one, others.earlier, others.repeats_um, others.repeats_stated)
 
 
@@ -111,10 +111,10 @@ def _beside(
     if len(usual) < FEWEST_OTHERS:
         if covariance is None:
             why = f"{stated}; fewer than {FEWEST_OTHERS} other pairs, and nothing stated, to hold it against"
-            return undecided(name, why, "µm", value)
+            return undecided(name, why, value)
         limit = limit_along(covariance, off)
         wrong = f"{stated}, at most {limit:.1f} µm by what machine and plan state: something moved between both; run both again"
-        return found(name, value, limit, "µm", stated, wrong)
+        return found(name, value, limit, stated, wrong)
     lengths = [apart for apart, _ in usual]
     limit = max(
         length_quantile(COEFFICIENTS) * float(np.sqrt(unseen_um2(one, other))), length_limit(lengths, SCATTERING)
@@ -127,4 +127,4 @@ def _beside(
         more = max(float(np.median(sigmas)) / median_length(COEFFICIENTS), 1.0) if sigmas else 1.0
         limit = min(limit, more * limit_along(covariance, off), limit_of_length(covariance))
     wrong = f"{stated}, {np.median(lengths):.1f} µm usual in this session: something moved between both; run both again"
-    return found(name, value, limit, "µm", stated, wrong)
+    return found(name, value, limit, stated, wrong)

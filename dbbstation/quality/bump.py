@@ -50,7 +50,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     near = near_reversals(one.raw.theta_deg, reversals_deg)
     peaks = [peak for width in WIDTHS_DEG for peak in _peaks(one, rest, near, width)]
     if not peaks:
-        return found(Name.BUMP, 0.0, np.inf, "µm", "too few samples for stretches of 4 degrees", "")
+        return found(Name.BUMP, 0.0, np.inf, "too few samples for stretches of 4 degrees", "")
     worst = max(peaks, key=lambda peak: peak.ratio)
     place = f"{worst.height_um:+.1f} µm over {worst.width_deg:g} degrees at {worst.theta_deg:.0f} degrees"
     beside = ", where a strut turns round" if worst.at_reversal else ""
@@ -58,7 +58,6 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         Name.BUMP,
         abs(worst.height_um),
         worst.limit_um,
-        "µm",
         f"nothing sticks out: at most {place}{beside}",
         f"{place}{beside}: look for chips, knocks and cables that pull, and repeat the run",
         f"bump {place}",
@@ -85,7 +84,7 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) 
     # Drift separates the two ends of the turn, and the filter turns the gap into a step.
     phi = one.raw.phi_deg[middle]
     inner = (phi > REVERSAL_DEG) & (phi < FULL_TURN_DEG - REVERSAL_DEG)
-    found_peaks = []
+    tops: list[tuple[int, float, bool]] = []
     away = np.flatnonzero(inner & (beside < 0))
     usual = 0.0
     if len(away) >= FEWEST * samples:
@@ -94,18 +93,14 @@ def _peaks(one: CircleAnalysis, rest: Floats, near: Integers, width_deg: float) 
         usual, _ = scale_of(list(means[away]))
         apart = len(away) / samples
         limit = largest_of(2.0 * apart * len(WIDTHS_DEG), ROBUST_SHARE * apart) * usual
-        top = largest_at(means, away)
-        found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=False))
+        tops.append((largest_at(means, away), limit, False))
     numbers = [n for n in np.unique(beside[inner]) if n >= 0]
-    tops = [largest_at(means, np.flatnonzero(inner & (beside == n))) for n in numbers]
-    for k, top in enumerate(tops):
-        others = [float(means[t]) for j, t in enumerate(tops) if j != k]
-        if len(others) < FEWEST:
-            continue
-        scale, freedom = scale_of(others)
-        limit = largest_of(len(tops) * len(WIDTHS_DEG), freedom) * max(scale, usual)
-        found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=True))
-    return found_peaks
+    turned = [largest_at(means, np.flatnonzero(inner & (beside == n))) for n in numbers]
+    for k, top in enumerate(turned if len(turned) > FEWEST else ()):
+        scale, freedom = scale_of([float(means[t]) for j, t in enumerate(turned) if j != k])
+        limit = largest_of(len(turned) * len(WIDTHS_DEG), freedom) * max(scale, usual)
+        tops.append((top, limit, True))
+    return [_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, turns) for top, limit, turns in tops]
 
 
 def largest_at(means: Floats, among: Integers) -> int:

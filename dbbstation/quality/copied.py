@@ -44,7 +44,7 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
     raw = one.analysis.raw
     chance = _chance(one.analysis)
     if chance >= 1.0:
-        return undecided(Name.COPIED, "the step of the readings is not finer than their noise", "%")
+        return undecided(Name.COPIED, "the step of the readings is not finer than their noise")
     them = [(other, other.analysis.raw.length_mm) for other in others if other.analysis is not None]
     places = len(raw) * max(sum(len(length) for _, length in them), 1)
     row = 1 + ceil(log(places / PROBABILITY) / -log(chance))
@@ -62,7 +62,6 @@ def copied(one: Seen, others: Sequence[Seen]) -> Finding:
         Name.COPIED,
         100.0 * share,
         100.0 * (row - 1) / len(raw),
-        "%",
         "no stretch of readings stands in another run",
         f"{stated}: one file came in twice, or a player repeats itself; measure the circle, and do not use both",
         f"the readings are those of run {label}",

@@ -69,15 +69,25 @@ class Finding:
         return self.verdict is FindingVerdict.WRONG
 
 
-def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str, short: str = "") -> Finding:
+UNITS = {
+    **dict.fromkeys((Name.LOST, Name.REPEATED, Name.COPIED, Name.SCALE), "%"),
+    **dict.fromkeys((Name.CIRCLE, Name.TEST, Name.PROGRAMS, Name.BAR), ""),
+    Name.HELD: "s",
+    Name.FEED: "mm/min",
+}
+"""Units that are not µm."""
+
+
+def found(name: Name, value: float, limit: float, sound: str, wrong: str, short: str = "") -> Finding:
     """Return the finding that follows from value and limit."""
     verdict = FindingVerdict.WRONG if value > limit else FindingVerdict.GOOD
-    return Finding(name, value, limit, unit, verdict, wrong if verdict is FindingVerdict.WRONG else sound, short)
+    text = wrong if verdict is FindingVerdict.WRONG else sound
+    return Finding(name, value, limit, UNITS.get(name, "µm"), verdict, text, short)
 
 
-def undecided(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
+def undecided(name: Name, why: str, value: float | None = None) -> Finding:
     """Return an undecided finding with its reason."""
-    return Finding(name, value, None, unit, FindingVerdict.CANNOT_TELL, why)
+    return Finding(name, value, None, UNITS.get(name, "µm"), FindingVerdict.CANNOT_TELL, why)
 
 
 def against_limit(finding: Finding) -> str:

@@ -107,10 +107,10 @@ class Forms:
         self._make_room(behind, columns.shape[1])
         covariance = SIZES[:, None, None] ** 2 * by_machine + by_rest
         before = self._whitening[:, :n, :n]
-        shared = covariance[:, :, :n] @ _turned(before)
-        variance, axes = np.linalg.eigh(covariance[:, :, n:] + np.eye(COEFFICIENTS) - shared @ _turned(shared))
+        shared = covariance[:, :, :n] @ before.mT
+        variance, axes = np.linalg.eigh(covariance[:, :, n:] + np.eye(COEFFICIENTS) - shared @ shared.mT)
         variance = np.maximum(variance, 1.0)  # the run's own part; rounding may give less
-        white = _turned(axes) / np.sqrt(variance)[:, :, None]
+        white = axes.mT / np.sqrt(variance)[:, :, None]
         self._whitening[:, :n, n:behind] = 0.0
         self._whitening[:, n:behind, :n] = -white @ (shared @ before)
         self._whitening[:, n:behind, n:behind] = white
@@ -168,7 +168,7 @@ class FormsBesides:
         self._forms, self._left_out = forms, left_out
         self._whitening, columns, log_determinant = forms.all()
         self._basis, self._root = np.linalg.qr(self._whitening[:, :, rows_of(left_out)])
-        self._along = _turned(self._basis) @ columns
+        self._along = self._basis.mT @ columns
         columns = columns - self._basis @ self._along
         sizes = np.abs(np.diagonal(self._root, axis1=1, axis2=2))
         self._drift, off = columns[:, :, -1:], columns[:, :, :-1]
@@ -176,8 +176,8 @@ class FormsBesides:
         grown = 1.0 + rate_um_s**2 * square
         self._share = ((1.0 - 1.0 / np.sqrt(grown)) / np.where(square > 0.0, square, 1.0))[:, None, None]
         self._variance = (rate_um_s**2 / grown)[:, None, None]
-        self._amount = self._variance * (_turned(self._drift) @ off)
-        self.white = off - self._share * self._drift @ (_turned(self._drift) @ off)
+        self._amount = self._variance * (self._drift.mT @ off)
+        self.white = off - self._share * self._drift @ (self._drift.mT @ off)
         self.log_determinant = log_determinant + 2.0 * np.sum(np.log(sizes), axis=1) + np.log(grown)
 
     def log_likelihoods(self) -> Floats:
@@ -193,7 +193,7 @@ class FormsBesides:
         root = np.linalg.inv(self._root)[:, rows]
         apart = root @ self._along
         drift, off = apart[:, :, -1:], apart[:, :, :-1]
-        covariance = root @ _turned(root) + self._variance * drift @ _turned(drift)
+        covariance = root @ root.mT + self._variance * drift @ drift.mT
         return own_um[:, None] * (off - drift @ self._amount), own_um[:, None] * covariance * own_um
 
     def length_without(self, size: int, rows: Integers) -> float:
@@ -239,7 +239,3 @@ def rows_of(places: Sequence[int]) -> Integers:
 
 def _key(one: Held) -> tuple[int, ...]:
     return tuple(map(id, one))
-
-
-def _turned(matrices: Floats) -> Floats:
-    return np.swapaxes(matrices, -1, -2)

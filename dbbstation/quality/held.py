@@ -138,18 +138,18 @@ def held(raw: RawCircle) -> Finding:
     """Judge the longest sequence of equal readings."""
     first, last = equal_readings(raw)
     if len(first) == 1:
-        return undecided(Name.HELD, ALL_EQUAL, "s")
+        return undecided(Name.HELD, ALL_EQUAL)
     durations = raw.t_s[last] - raw.t_s[first]
     longest = int(np.argmax(durations))
     most = equal_limit(*moving_noise(raw), len(raw))
     value, place = float(durations[longest]), f"{raw.theta_deg[first[longest]]:.0f} degrees"
     if most == inf:
         return undecided(
-            Name.HELD, f"at most {value:.1f} s; the step of the readings is not finer than their noise", "s", value
+            Name.HELD, f"at most {value:.1f} s; the step of the readings is not finer than their noise", value
         )
     limit = max(SHORTEST_S, most * float(np.median(np.diff(raw.t_s))))
     stated = f"the length stands still for {value:.1f} s at {place}"
-    return found(Name.HELD, value, limit, "s", "the length never stands still", f"{stated}: {AFTER_HELD}")
+    return found(Name.HELD, value, limit, "the length never stands still", f"{stated}: {AFTER_HELD}")
 
 
 AFTER_HELD = "look after plunger, stroke and plug of the gauge, and repeat the run"

@@ -39,11 +39,11 @@ def local_difference(one: Seen, others: Others) -> Finding:
     # Enough other pairs with larger differences widen the limit.
     against = others.opposite or others.earlier
     if against is None or one.analysis is None or against.analysis is None:
-        return undecided(Name.LOCAL, "no other run of this test has been measured", "µm")
+        return undecided(Name.LOCAL, "no other run of this test has been measured")
     if not (
         one.local_um.any() and against.local_um.any() and one.analysis.noise.known and against.analysis.noise.known
     ):
-        return undecided(Name.LOCAL, "too few samples for undulations that are short", "µm")
+        return undecided(Name.LOCAL, "too few samples for undulations that are short")
     differs, counts = one.local_um - against.local_um, _compared(one, against)
     alike = one.run.circle.direction is against.run.circle.direction
     value = locally_apart_um(one, against)
@@ -64,7 +64,6 @@ def local_difference(one: Seen, others: Others) -> Finding:
         Name.LOCAL,
         value,
         limit,
-        "µm",
         f"nowhere does the path leave that of run {against.run.label}: at most {place}",
         f"the path is {place}: look for dirt between ball and cup and for what touches the bar there, and run both again",
         f"the path is {place}",

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.quality.finding import Finding, FindingVerdict, Name, found, undecided
 from dbbstation.quality.forms import own_um2
 from dbbstation.quality.knowledge import HIGHER
-from dbbstation.quality.limits import length_quantile, quantile
+from dbbstation.quality.limits import quantile
 from dbbstation.quality.stated import limit_along
 from dbbstation.trace.cut import FEED_SIGMAS
 
@@ -29,7 +29,7 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
     if (larger := _turns_slower(one)) is not None:
         return larger
     if expected is None:
-        return undecided(Name.RADIUS, "no expected radius is known", "µm")
+        return undecided(Name.RADIUS, "no expected radius is known")
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
     u_um = float(np.hypot(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw))))
     stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm{BY_OTHERS if by_others else ''}"
@@ -37,7 +37,6 @@ def radius(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = 
         Name.RADIUS,
         abs(off_um),
         quantile(np.inf) * u_um,
-        "µm",
         stated,
         f"{stated}: check bar length, radius of plan and program, and the tool length",
     )
@@ -61,23 +60,20 @@ def _turns_slower(one: CircleAnalysis) -> Finding | None:
 def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = False) -> Finding:
     """Judge the centre; arguments as of `radius`."""
     if expected is None:
-        return undecided(Name.BORE, "no expected centre is known", "µm")
+        return undecided(Name.BORE, "no expected centre is known")
     if not expected.place_known:
-        return undecided(Name.BORE, "the ball was put up under the spindle: its place is not known", "µm")
+        return undecided(Name.BORE, "the ball was put up under the spindle: its place is not known")
     off_um = 1e3 * (np.array(one.centre_mm) - expected.centre_mm)
     noise = 2.0 * one.noise.sigma_um**2 / len(one.raw)
     covariance = 1e6 * expected.covariance_mm2[:2, :2] + noise * np.eye(2)
-    size = float(np.linalg.norm(off_um))
-    along = off_um / size if size > 0.0 else np.array([1.0, 0.0])
-    # The sound centre's ellipse, in the direction of this deviation.
-    limit = length_quantile(2) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
+    # The limit is the sound centre's ellipse, in the direction of this deviation.
+    size, limit = float(np.linalg.norm(off_um)), limit_along(covariance, off_um)
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"the centre is {size:.1f} µm from where it is {where}, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
     return found(
         Name.BORE,
         size,
         limit,
-        "µm",
         stated,
         f"{stated}: check bore, holder and its seat, and the ball's entry in the plan",
     )
@@ -86,7 +82,7 @@ def bore(one: CircleAnalysis, expected: Expected | None, *, by_others: bool = Fa
 def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Finding:
     """Judge mean, centre, ellipse and triangle together."""
     if expected is None:
-        return undecided(Name.FORM, "no expected form is known", "µm")
+        return undecided(Name.FORM, "no expected form is known")
     covariance = expected.known_um2
     if covariance is None:
         effects = np.hstack([np.zeros((len(expected.form_um), 1)), *expected.effects_um.values()])
@@ -98,4 +94,4 @@ def form(one: Seen, expected: Expected | None, *, by_others: bool = False) -> Fi
     where = f"expected{BY_OTHERS if by_others else ''}"
     stated = f"{value:.1f} µm rms from where mean, centre, ellipse and triangle are {where}"
     wrong = f"{stated}: check tilt, plane and radius of the program, and how the plate sits"
-    return found(Name.FORM, value, limit, "µm", stated, wrong)
+    return found(Name.FORM, value, limit, stated, wrong)

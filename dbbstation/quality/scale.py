@@ -23,9 +23,9 @@ def scale(one: Seen, others: Others) -> Finding:
     # results counts.
     expected, feed_in_um = one.run.expected, 1e3 * one.run.circle.feed_in_mm
     if one.ways is None:
-        return undecided(Name.SCALE, "feed-in and feed-out are not in the recording, or have too few samples", "%")
+        return undecided(Name.SCALE, "feed-in and feed-out are not in the recording, or have too few samples")
     if expected is None:
-        return undecided(Name.SCALE, "how far a sound machine misses the feed-in is not known", "%")
+        return undecided(Name.SCALE, "how far a sound machine misses the feed-in is not known")
     own_um = _excess_um(one)
     u_um = _u_um([(one, expected)])
     size, limit, counted = abs(own_um), quantile(np.inf) * u_um, own_um
@@ -43,7 +43,6 @@ def scale(one: Seen, others: Others) -> Finding:
         Name.SCALE,
         100.0 * size / feed_in_um,
         100.0 * limit / feed_in_um,
-        "%",
         stated,
         f"{stated}: check what the gauge counts per millimetre, at a gauge block, and the feed-in of plan and program",
         f"the gauge counts {percent:+.1f} % too much",

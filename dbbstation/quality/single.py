@@ -34,21 +34,20 @@ def repeated(raw: RawCircle) -> Finding:
     """Judge how many readings repeat the previous reading, except in long standstills."""
     first, last = equal_readings(raw)
     if len(first) == 1:
-        return undecided(Name.REPEATED, ALL_EQUAL, "%")
+        return undecided(Name.REPEATED, ALL_EQUAL)
     short = raw.t_s[last] - raw.t_s[first] < SHORTEST_S
     squares_mm2, count, step_mm = moving_noise(raw)
     chance = chance_equal(squares_mm2, count, step_mm)
     share = float(np.sum((last - first)[short])) / max(count, 1)
     if chance >= 1.0:
         why = f"{100.0 * share:.0f} % of the readings are the same as the one before; their step is not finer than their noise"
-        return undecided(Name.REPEATED, why, "%", 100.0 * share)
+        return undecided(Name.REPEATED, why, 100.0 * share)
     limit = max(HARMLESS, float(bdtrik(1.0 - SHARE, count, chance)) / count)
     stated = f"{100.0 * share:.0f} % of the readings are the same as the one before"
     return found(
         Name.REPEATED,
         100.0 * share,
         100.0 * limit,
-        "%",
         stated,
         f"{stated}: the gauge is asked more often than it has new readings, or rows come twice; set the rate to what it renews, and "
         "repeat the run",
@@ -61,19 +60,17 @@ def lost_samples(one: Seen) -> Finding:
     lost, kept = one.lost
     percent = 100.0 * lost / max(lost + kept, 1)
     stated = share_lost(lost, kept, one.unusable) if lost else "no sample is missing on the turn"
-    return found(Name.LOST, percent, one.run.largest_loss_percent, "%", stated, f"{stated}; {AFTER_LOSS}")
+    return found(Name.LOST, percent, one.run.largest_loss_percent, stated, f"{stated}; {AFTER_LOSS}")
 
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
     """Judge the noise by the noise of other runs."""
     value = max(one.noise.reading_um, LEAST_UM)
     if not one.noise.known:
-        return undecided(Name.NOISE, "too few samples to separate noise from form", "µm")
+        return undecided(Name.NOISE, "too few samples to separate noise from form")
     known = [max(other, LEAST_UM) for other in others.noise_um if np.isfinite(other)]
     if len(known) < FEWEST_OTHERS:
-        return undecided(
-            Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", "µm", value
-        )
+        return undecided(Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", value)
     logs = np.log(known)
     middle = float(np.median(logs))
     own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
@@ -82,13 +79,12 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
     log_limit = middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])
     if log_limit > LARGEST_LOG:
         why = f"{value:.2f} µm; the noise of the other runs differs too much to hold it against"
-        return undecided(Name.NOISE, why, "µm", value)
+        return undecided(Name.NOISE, why, value)
     limit = float(np.exp(log_limit))
     return found(
         Name.NOISE,
         value,
         limit,
-        "µm",
         f"{value:.2f} µm per reading",
         f"{value:.2f} µm per reading, {np.exp(middle):.2f} µm in the other runs: look after balls, cable and what shakes the "
         "machine, and repeat the run",
@@ -102,7 +98,7 @@ LARGEST_LOG = float(np.log(1e4))
 def closure(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
     """Judge the difference between end and beginning of the turn by noise and other runs."""
     if one.closure is None or not one.noise.known:
-        return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form", "µm")
+        return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form")
     u = one.closure.u_um
     limit = max(_beyond(u, one.noise.freedom, others.closure_um), _left_open_um(expected))
     size = abs(one.closure.height_um)
@@ -111,7 +107,6 @@ def closure(one: CircleAnalysis, others: Others, expected: Expected | None = Non
         Name.CLOSURE,
         size,
         limit,
-        "µm",
         stated,
         f"{stated}: something moved or warmed during the run, or the angles are wrong; repeat it",
     )
@@ -120,9 +115,9 @@ def closure(one: CircleAnalysis, others: Others, expected: Expected | None = Non
 def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None) -> Finding:
     """Judge the difference between both passes of the overlap by noise, feed and other runs."""
     if one.passes is None:
-        return undecided(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
+        return undecided(Name.DRIFT, "the recording was cut to its turn: no place is passed twice")
     if not one.noise.known:
-        return undecided(Name.DRIFT, "too few samples to separate noise from form", "µm")
+        return undecided(Name.DRIFT, "too few samples to separate noise from form")
     passes = one.passes
     u = passes.u_mean_um(one.noise.sigma_um)
     limit = _beyond(float(np.hypot(u, _by_feed_um(one))), one.noise.freedom, others.drift_um)
@@ -132,7 +127,6 @@ def drift(one: CircleAnalysis, others: Others, expected: Expected | None = None)
         Name.DRIFT,
         abs(passes.mean_um),
         limit,
-        "µm",
         stated,
         f"{stated}, the same place passed twice: let bar and machine warm through, tighten the holder, and repeat the run",
     )
@@ -187,13 +181,13 @@ def feed(one: Seen, others: Others) -> Finding:
     off = limit * feed_off(
         one.feed_mm_min, one.run.recording, one.run.circle, edges_of(one.run.recording, one.run.circle)
     )
-    return found(Name.FEED, off, limit, "mm/min", stated, f"{stated}: {AFTER_OTHER_FEED}", short)
+    return found(Name.FEED, off, limit, stated, f"{stated}: {AFTER_OTHER_FEED}", short)
 
 
 def _feed_by_duration(one: Seen, others: Others) -> Finding:
     circle, why = one.run.circle, "the overlap is too short or too round to show the feed"
     if one.longer_s is None:
-        return undecided(Name.FEED, why, "mm/min")
+        return undecided(Name.FEED, why)
     due = due_s(circle)
     usual, scatter = LONGEST_STOP_S, 0.0
     if len(others.longer_s) >= FEWEST_OTHERS:
@@ -202,9 +196,7 @@ def _feed_by_duration(one: Seen, others: Others) -> Finding:
     limit = max(FEED_TOLERANCE * due + UNEVEN_STOP_S, quantile(np.inf) * scatter)
     over = one.longer_s - usual
     if over <= limit:
-        return undecided(
-            Name.FEED, f"{why}; feed-in to feed-out took {due + one.longer_s:.1f} s, {due:.1f} s were due", "mm/min"
-        )
+        return undecided(Name.FEED, f"{why}; feed-in to feed-out took {due + one.longer_s:.1f} s, {due:.1f} s were due")
     programmed = circle.feed_mm_min
     shown = programmed * due / (due + over)
     stated = (

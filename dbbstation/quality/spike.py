@@ -45,7 +45,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     # probability `limits.SHARE`.
     apart, sound = _apart(one.residual_um, one.raw.phi_deg)
     if int(sound.sum()) < LARGEST_BLOCK:
-        return undecided(Name.SPIKE, "too few samples to hold single readings against their neighbours", "µm")
+        return undecided(Name.SPIKE, "too few samples to hold single readings against their neighbours")
     near = near_reversals(one.raw.theta_deg, reversals_deg, REVERSAL_DEG)
     scale, freedom = _scales(apart, sound & (near < 0))
     rounding = one.noise.resolution_um
@@ -65,7 +65,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
             limit = largest_of(len(tops), known) * max(usual, float(scale[top])) + rounding
             candidates.append((abs(float(apart[top])), limit, top))
     if not candidates:
-        return undecided(Name.SPIKE, "a strut turns round everywhere: single readings cannot be judged", "µm")
+        return undecided(Name.SPIKE, "a strut turns round everywhere: single readings cannot be judged")
     height_um, limit_um, at = max(candidates, key=lambda each: each[0] / each[1])
     place = f"{apart[at]:+.1f} µm beside its neighbours at {one.raw.theta_deg[at]:.1f} degrees"
     more = sum(size > limit for size, limit, _ in candidates)
@@ -75,7 +75,6 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         Name.SPIKE,
         height_um,
         limit_um,
-        "µm",
         f"no reading leaves its neighbours: at most {place}",
         f"a reading stands {place}{many}: G holds it; look after plug, cable and earth of the gauge, and repeat the run",
         f"spike {place}",

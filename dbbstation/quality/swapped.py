@@ -57,7 +57,6 @@ def of_its_test(one: Seen, both: Together | None) -> Finding:
         Name.TEST,
         value,
         limit,
-        "",
         sound,
         f"{better}: check bore, holder, tilt, start and program of both, and run it again",
     )

@@ -83,7 +83,7 @@ class Plotted:
         Raises:
             StationError: no run shows a circle; a comparison has only one session with circles.
         """
-        shown = [one for one in self.found.circles if one.analysis is not None]
+        shown = self.found.shown
         if not shown:
             why = "; ".join(f"{one.entry.label}: {one.problem}" for one in self.found.circles)
             raise StationError(f"no run shows a circle: {why}", remedy="record the test again, or choose another")
@@ -101,7 +101,7 @@ class Plotted:
     def on_sheet(self) -> list[MeasuredCircle]:
         """Return the drawn runs; a map averages all circles."""
         if self.kind is PlotKind.MAP:
-            return [one for one in self.found.circles if one.analysis is not None]
+            return self.found.shown
         return [one for panel in self.panels() for one, _ in panel.drawn]
 
 
@@ -121,7 +121,7 @@ def circles_figure(kind: str, found: Circled, chosen: Filter, wanted: Wanted) ->
                     f"one panel has the deviation of one run, not a {plotted.kind}",
                     remedy="draw the whole figure, without Axes",
                 )
-            runs = {one.entry.label: one.analysis for one in plotted.found.circles if one.analysis is not None}
+            runs = {one.entry.label: one.analysed for one in plotted.found.shown}
             return wanted.draw({name: partial(_trace, name=name, analysis=one) for name, one in runs.items()})
         return in_format(draw_circles(plotted), wanted)
 
@@ -187,8 +187,7 @@ def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
     sheet = _sheet(plotted, width_in, room, panels)
     top = sheet.top_in
     for test, of in tests.items():
-        drawn = [one.analysis for panel in of for one, _ in panel.drawn if one.analysis is not None]
-        reach_um = max(float(abs(one.residual_um).max()) for one in drawn)
+        reach_um = max(float(abs(one.analysed.residual_um).max()) for panel in of for one, _ in panel.drawn)
         for column, panel in enumerate(of):
             left = MARGIN_IN + column * (each + _GAP_IN)
             box = Box(left, top - heights[0], each, heights[0])
@@ -201,7 +200,7 @@ def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
 
 
 def _map(plotted: Plotted) -> Figure:
-    shown = [one for one in plotted.found.circles if one.analysis is not None]
+    shown = plotted.found.shown
     sessions = [s for s in plotted.found.sessions if any(one.session == s.name for one in shown)]
     columns = min(2, len(sessions))
     rows = -(-len(sessions) // columns)

@@ -120,13 +120,13 @@ class Reported:
 def numbers_of(reported: Reported, page: str) -> ReportResult:
     """Return the numbers of a report for JSON and template."""
     tolerances, coverage_factor = reported.settings.tolerances, reported.coverage_factor
-    now = tolerated_circles(reported.found.circles, tolerances)
+    now = tolerated_circles(reported.found.shown, tolerances)
     now_both = (*now, *tolerated_pairs(reported.found.pairs, tolerances))
     modelled, ranked = reported.modelled, reported.ranked
     identified = None if modelled is None else modelled.identified
     certificate = certified_of(reported)
     former = reported.before
-    before = () if former is None else tolerated_circles(former.circles, tolerances)
+    before = () if former is None else tolerated_circles(former.shown, tolerances)
     before_both = (*before, *(() if former is None else tolerated_pairs(former.pairs, tolerances)))
     measured = tuple(side_by_side(now, before))
     held = tuple(compared(one, now_both, before_both, coverage_factor) for one in tolerances)
@@ -235,18 +235,14 @@ def _notes_before(reported: Reported) -> list[str]:
 
 
 def _polars(reported: Reported) -> list[Polar]:
-    before = () if reported.before is None else reported.before.circles
-    tests = dict.fromkeys((one.session, one.entry.test) for one in reported.found.circles if one.analysis is not None)
+    before = () if reported.before is None else reported.before.shown
+    tests = dict.fromkeys((one.session, one.entry.test) for one in reported.found.shown)
     several = len(reported.found.sessions) > 1
     return [
         polar(
             f"{session}: test {test}" if several else f"test {test}",
-            [
-                c
-                for c in reported.found.circles
-                if (c.session, c.entry.test) == (session, test) and c.analysis is not None
-            ],
-            [c for c in before if c.entry.test == test and c.analysis is not None],
+            [c for c in reported.found.shown if (c.session, c.entry.test) == (session, test)],
+            [c for c in before if c.entry.test == test],
         )
         for session, test in tests
     ]

@@ -42,7 +42,7 @@ def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_
     Args:
         reach_um: largest drawn deviation; None: the greatest.
     """
-    found = [(one.analysis, thin) for one, thin in drawn if one.analysis is not None]
+    found = [(one.analysed, thin) for one, thin in drawn]
     most_um = reach_um or max(float(np.abs(analysis.residual_um).max()) for analysis, _ in found)
     scale, step_um = REACH / max(most_um, 1e-3), step_of(most_um)
     lines = [name, f"G {_figures(drawn)} µm; one division {step_um:g} µm"]
@@ -78,10 +78,8 @@ def draw_deviation(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) ->
     """Draw traces over the angle from +X towards +Y."""
     axes = _chart(sheet, box, [name, f"G {_figures(drawn)} µm"], "deviation, µm")
     for one, thin in drawn:
-        if one.analysis is not None:
-            axes.plot(
-                *thinned(one.analysis.path.theta_deg, one.analysis.residual_um), **_style(one.analysis, thin=thin)
-            )
+        turn = one.analysed
+        axes.plot(*thinned(turn.path.theta_deg, turn.residual_um), **_style(turn, thin=thin))
     _turn(axes)
 
 
@@ -90,10 +88,8 @@ def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence
     axes = _chart(sheet, box, [name], "deviation, µm")
     for colour, (session, of) in zip(_colours(len(runs)), runs.items(), strict=True):
         for k, one in enumerate(of):
-            if one.analysis is None:
-                continue
-            style = _style(one.analysis, thin=False) | {"color": colour}
-            line = thinned(one.analysis.path.theta_deg, one.analysis.residual_um)
+            style = _style(one.analysed, thin=False) | {"color": colour}
+            line = thinned(one.analysed.path.theta_deg, one.analysed.residual_um)
             axes.plot(*line, **style, label=session if k == 0 else None)
     _turn(axes)
     # Above the lines, which get room for it.
@@ -107,7 +103,7 @@ def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence
 
 def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> None:
     """Draw the amplitudes of undulations, and the noise."""
-    spectra = [(one.analysis, one.spectrum, thin) for one, thin in drawn if one.analysis is not None]
+    spectra = [(one.analysed, one.spectrum, thin) for one, thin in drawn]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
     noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")
     subtitle = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
@@ -159,7 +155,7 @@ def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
 
 
 def _figures(drawn: Sequence[Drawn]) -> str:
-    last = [one for one, thin in drawn if not thin and one.analysis is not None]
+    last = (one for one, thin in drawn if not thin)
     return ", ".join(f"{one.budget().value_um:.1f} {str(one.entry.direction).upper()}" for one in last)
 
 
@@ -257,8 +253,7 @@ def _arrow(axes: Axes, tail: np.ndarray, along: np.ndarray, colour: str) -> None
 def _centres_um(circles: Sequence[MeasuredCircle]) -> dict[str, np.ndarray]:
     by_test: dict[str, list[tuple[float, float]]] = {}
     for one in circles:
-        if one.analysis is not None:
-            by_test.setdefault(one.entry.test, []).append(one.analysis.centre_mm)
+        by_test.setdefault(one.entry.test, []).append(one.analysed.centre_mm)
     return {test: 1e3 * np.mean(of, axis=0) for test, of in by_test.items()}
 
 

@@ -86,20 +86,19 @@ class Polar:
 def polar(title: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
     """Return a test's circles about their centres, before and now with one scale."""
     drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
-    analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
     paths = [
         PolarTrace(
-            analysis.path.theta_deg,
-            analysis.residual_um,
+            one.analysed.path.theta_deg,
+            one.analysed.residual_um,
             str(one.entry.direction),
             f"{'before ' if former else ''}{str(one.entry.direction).upper()} {one.entry.repeat}",
             f"{'before: ' if former else ''}{one.entry.label}: G {one.budget(BudgetQuantity.G_LS).value_um:.1f} µm",
             former=former,
             thin=thin,
         )
-        for one, analysis, former, thin in analysed
+        for one, former, thin in drawn
     ]
-    made = polar_of(title, analysed[-1][1].raw.circle, paths, len(now) + len(before) - len(drawn))
+    made = polar_of(title, drawn[-1][0].analysed.raw.circle, paths, len(now) + len(before) - len(drawn))
     points = sorted(len(one.theta_deg) for one in paths)
     count = f"{points[0]} points" if points[0] == points[-1] else f"{points[0]} to {points[-1]} points"
     return replace(made, what=f"{made.what}, {count}")

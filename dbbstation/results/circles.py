@@ -189,15 +189,16 @@ class MeasuredCircle:
 
     def budget(self, quantity: BudgetQuantity = BudgetQuantity.G) -> Budget:
         """Return a figure of the circle with its uncertainty."""
-        return budget_of(self._analysed, quantity, self.known)
+        return budget_of(self.analysed, quantity, self.known)
 
     @cached_property
     def spectrum(self) -> FormSpectrum:
         """Return the circle's undulations."""
-        return spectrum_of(self._analysed)
+        return spectrum_of(self.analysed)
 
     @property
-    def _analysed(self) -> CircleAnalysis:
+    def analysed(self) -> CircleAnalysis:
+        """Return the analysis of a circle that is shown."""
         if self.analysis is None:
             raise ValueError("a run without a circle has no figures")
         return self.analysis
@@ -220,6 +221,11 @@ class Circled:
     pairs: tuple[MeasuredPair, ...]
     warnings: tuple[str, ...]
     sessions: tuple[SessionFolder, ...]
+
+    @property
+    def shown(self) -> list[MeasuredCircle]:
+        """Return the runs that show a circle."""
+        return [one for one in self.circles if one.analysis is not None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -244,7 +250,7 @@ class CirclesResult(Framed):
 
     def headline(self) -> str:
         """Return the number of circles and their greatest G."""
-        found = [one.analysis.g_um for one in self.circles.circles if one.analysis is not None]
+        found = [one.analysed.g_um for one in self.circles.shown]
         return (
             f"{len(self.runs)} circles, G up to {max(found):.2f} µm"
             if found
@@ -353,11 +359,11 @@ def _quick_looks(found: Circled) -> list[QuickLookResult]:
     partner = {id(pair.one): pair.other for pair in found.pairs}
     second = {id(pair.other) for pair in found.pairs}
     looks = []
-    for circle in found.circles:
-        if circle.analysis is None or id(circle) in second:
+    for circle in found.shown:
+        if id(circle) in second:
             continue
         turns = [one for one in (circle, partner.get(id(circle))) if one is not None]
-        looked = quick_look([one.analysis for one in turns if one.analysis is not None])
+        looked = quick_look([one.analysed for one in turns])
         looks.append(
             QuickLookResult(
                 session=circle.session,

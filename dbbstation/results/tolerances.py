@@ -68,11 +68,10 @@ def tolerated_circles(
             one,
             one.entry,
             direction=str(one.entry.direction),
-            sizes=sizes_of(refiltered(one.analysis, TOLERATED), one.known),
-            others={key: _size_of(one.analysis, one.known, *key) for key in dict.fromkeys(wanted)},
+            sizes=sizes_of(refiltered(one.analysed, TOLERATED), one.known),
+            others={key: _size_of(one.analysed, one.known, *key) for key in dict.fromkeys(wanted)},
         )
         for one in circles
-        if one.analysis is not None
     )
 
 

@@ -146,7 +146,7 @@ def _diagnosed(piece: FleetPiece) -> Done:
 
 def _circles(piece: FleetPiece) -> Done:
     result = circles(piece.folder, **piece.options.given)
-    runs = run_figures(result.circles.circles)
+    runs = run_figures(result.circles.shown)
     worst = max(
         (one for run in runs for one in run.figures if one.name == "G"), key=lambda one: one.value_um, default=None
     )

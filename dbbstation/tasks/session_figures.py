@@ -45,7 +45,7 @@ def session_figures(folder: Path) -> SessionFigures:
     with input_book():  # recordings are inputs of what is kept, not of the command that happens to read them
         found = load_circles([folder], TOLERATED)
     session = found.sessions[0]
-    runs = run_figures(found.circles)
+    runs = run_figures(found.shown)
     moments = [one.entry.started for one in found.circles if one.entry.started is not None]
     return SessionFigures(
         name=session.name,
@@ -66,15 +66,12 @@ def session_figures(folder: Path) -> SessionFigures:
 
 
 def run_figures(circles: Sequence[MeasuredCircle]) -> tuple[RunFigures, ...]:
-    """Return the comparable figures of all runs that show a circle."""
-    shown = [one for one in circles if one.analysis is not None]
-    return tuple(map(_figures, shown, tolerated_circles(shown)))
+    """Return the comparable figures of runs that show a circle."""
+    return tuple(map(_figures, circles, tolerated_circles(circles)))
 
 
 def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
-    analysis = one.analysis
-    if analysis is None:
-        raise ValueError("a run without a circle has no figures")
+    analysis = one.analysed
     known = budgets(analysis, one.known, (BudgetQuantity.X, BudgetQuantity.Y))
     x_mm, y_mm = analysis.centre_mm
     g, centre, radial = (

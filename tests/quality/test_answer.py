@@ -77,5 +77,5 @@ def test_a_recording_without_a_circle_is_repeated():
     assert answer((), "no feed-out seen").causes == ("no feed-out seen",)
     assert answer((), "no feed-out seen").word is Advice.REPEAT
     assert answer(()).word is Advice.CANNOT_TELL  # nothing was looked for
-    wrong = found(Name.LOST, 3.0, 0.5, "%", "", "lost")
+    wrong = found(Name.LOST, 3.0, 0.5, "", "lost")
     assert answer([wrong]).causes == (f"lost samples 3.00 of 0.50 %: {DO[Name.LOST]}",)

@@ -122,7 +122,7 @@ def _begun(arguments: Sequence[str] | None) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> None:
     """Run the command line, or another group of commands, and exit with its code."""
-    given = _begun(arguments)
+    given, code = _begun(arguments), FAILED
     debug = _DEBUG in given
     try:
         # Not `cli.main`, which answers Ctrl-C with an empty line of its own.
@@ -131,38 +131,35 @@ def main(arguments: Sequence[str] | None = None, group: click.Group = cli) -> No
             input_book(),
             group.make_context(group.name, _own_first(given), obj=tuple(given)) as context,
         ):
-            code = _invoked(group, context)
+            done = _invoked(group, context)
             if virtual := virtual_so_far():
                 echo(f"VIRTUAL MACHINE: {', '.join(virtual)}: computed, and not measured on a real machine", err=True)
             flush_output()
+            code = done if isinstance(done, int) else DONE
     except click.exceptions.Exit as left:
         code = left.exit_code
     except click.ClickException as problem:
         told = io.StringIO()
         _with_new_name(problem).show(told)
         echo(told.getvalue(), err=True, nl=False)
-        sys.exit(problem.exit_code)
+        code = problem.exit_code
     except (click.Abort, KeyboardInterrupt):
         # A terminal shows ^C where the cursor stands.
         echo(("\n" if sys.stderr.isatty() else "") + "interrupted; files that were already written are kept", err=True)
-        sys.exit(FAILED)
     except BrokenPipeError:
         # Whoever read the output has seen enough, as `| head` does.
         drop_output()
-        sys.exit(FAILED)
     except (StationError, OSError) as problem:
         if debug:
             raise
         drop_unwritable()
         echo(in_a_sentence(problem) if isinstance(problem, OSError) else str(problem), err=True)
-        sys.exit(FAILED)
     except Exception as problem:
         if debug:
             raise
         echo(f"{type(problem).__name__}: {problem}", err=True)
         echo(f"this is a fault of dbbstation itself; {_DEBUG} shows what to report", err=True)
-        sys.exit(FAILED)
-    sys.exit(code if isinstance(code, int) else DONE)
+    sys.exit(code)
 
 
 def _with_new_name(problem: click.ClickException) -> click.ClickException:

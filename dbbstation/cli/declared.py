@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import click
 
-from dbbstation.cli.output import echo, format_of, known_format, print_json, print_result, say
+from dbbstation.cli.output import echo, format_of, known_format, print_json, print_result, provenance, say
 from dbbstation.cli.progress import count_bar, task_bar
-from dbbstation.cli.provenance import provenance
 from dbbstation.cli.shop import ShopOption
 from dbbstation.errors import ArgumentError, OutputError
 from dbbstation.tasks import options as o

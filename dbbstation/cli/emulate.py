@@ -76,13 +76,9 @@ def emulate(
 
     usual = chosen.protocol()
     protocol = at_rate(usual, rate_hz)
-    sent_hz, usual_hz = protocol.fastest_hz(baud) * time_scale, usual.fastest_hz(baud)
-    pace = (
-        f"{protocol.fastest_hz(baud):g} readings per second of machine time"
-        if wait
-        else f"{sent_hz:g} readings a second"
-    )
-    say(f"note: sends {pace}; {chosen.instrument} has {usual_hz:g}")
+    sent_hz = protocol.fastest_hz(baud) * (1.0 if wait else time_scale)
+    pace = f"{sent_hz:g} readings {'per second of machine time' if wait else 'a second'}"
+    say(f"note: sends {pace}; {chosen.instrument} has {usual.fastest_hz(baud):g}")
     if protocol.voice("fault") is None:
         say(
             f"note: {chosen.instrument} has no frame for a missing bar: it sends nothing until `mount` or `start` puts a ball up"

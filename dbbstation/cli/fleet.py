@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import click
 
 from dbbstation.cli.declared import made
-from dbbstation.cli.output import echo, print_result, print_table, say
+from dbbstation.cli.output import echo, print_result, print_table, provenance, say
 from dbbstation.cli.progress import count_bar
-from dbbstation.cli.provenance import provenance
 from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Names, Option

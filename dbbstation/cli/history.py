@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.cli.declared import CommandOutput, command
-from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_line, print_table
-from dbbstation.cli.provenance import provenance
+from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, echo, echo_line, print_table, provenance
 from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks.history import history as task
 from dbbstation.tasks.telling import silent

@@ -11,8 +11,7 @@ import click
 
 from dbbstation.cli.declared import made
 from dbbstation.cli.mapping_options import MappingOptions, chosen_mapping, read_tables
-from dbbstation.cli.output import echo, echo_line, print_result, print_table
-from dbbstation.cli.provenance import provenance
+from dbbstation.cli.output import echo, echo_line, print_result, print_table, provenance
 from dbbstation.cli.session_options import SessionOptions
 from dbbstation.errors import InputError, OutputError
 from dbbstation.tasks import options as o

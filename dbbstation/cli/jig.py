@@ -10,8 +10,7 @@ import click
 
 from dbbstation.cli.declared import Answer, made
 from dbbstation.cli.mapping_options import AsWritten
-from dbbstation.cli.output import echo, echo_line, print_table
-from dbbstation.cli.provenance import provenance
+from dbbstation.cli.output import echo, echo_line, print_table, provenance
 from dbbstation.errors import InputError
 from dbbstation.files.formats.number_language import number_language
 from dbbstation.tasks import options as o
@@ -132,10 +131,7 @@ def sheet(
     write_table(out, jig_text(new), provenance(), force=force)
     balls = {name: _change_um(old, name, ball.centre_mm) for name, ball in new.balls.items()}
     lost = [name for name in old.balls if name not in new.balls]
-    told = {
-        name: MeasuredBall(tuple(new.balls[name].centre_mm), None if change is None else tuple(change))
-        for name, change in balls.items()
-    }
+    told = {name: MeasuredBall(tuple(new.balls[name].centre_mm), change) for name, change in balls.items()}
     rows = [
         [
             name,
@@ -266,10 +262,10 @@ def _pairs(texts: Sequence[str], option: str, form: str) -> list[tuple[str, str]
     return found
 
 
-def _change_um(old: JigFile, name: str, centre_mm: Sequence[float]) -> list[float] | None:
+def _change_um(old: JigFile, name: str, centre_mm: Sequence[float]) -> tuple[float, ...] | None:
     if name not in old.balls:
         return None
-    return [1e3 * (new - before) for new, before in zip(centre_mm, old.balls[name].centre_mm, strict=True)]
+    return tuple(1e3 * (new - before) for new, before in zip(centre_mm, old.balls[name].centre_mm, strict=True))
 
 
 def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str, list[Any]]:

@@ -19,7 +19,7 @@ from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from dbbstation.cli.provenance import PROGRAM, command_of
+from dbbstation.cli.output import PROGRAM, command_of
 from dbbstation.errors import unwritable
 from dbbstation.files.inputs import inputs_so_far
 from dbbstation.files.places import session_around

@@ -15,8 +15,7 @@ from dbbstation.cli.effects import (
     print_finding,
     print_left,
 )
-from dbbstation.cli.output import echo, print_table
-from dbbstation.cli.provenance import provenance
+from dbbstation.cli.output import echo, print_table, provenance
 from dbbstation.cli.shop import shop_settings
 from dbbstation.tasks.mismatch import mismatch as task
 

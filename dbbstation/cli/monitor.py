@@ -11,8 +11,7 @@ import click
 
 from dbbstation.cli.declared import made
 from dbbstation.cli.instrument_options import INSTRUMENT, PROFILE, ZERO_MM, LineOptions, Spy, spying
-from dbbstation.cli.output import echo, json_text, print_json
-from dbbstation.cli.provenance import provenance
+from dbbstation.cli.output import echo, json_text, print_json, provenance
 from dbbstation.facts import picked
 from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option

@@ -69,7 +69,7 @@ def in_style() -> AbstractContextManager[None]:
 
 def labelled(axes: Axes, x: str, y: str = "", title: str = "") -> None:
     """Name the axes and the panel."""
-    axes.set(xlabel=x, ylabel=y, title=title)
+    axes.set(xlabel=x, ylabel=y, **({"title": title} if title else {}))
 
 
 def heading(part: SubFigure, text: str) -> None:

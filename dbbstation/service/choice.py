@@ -204,14 +204,8 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         bar_waiver=choice.bar_waiver.strip(),
         job=choice.job.strip(),
     )
-    job = Job(
-        machine,
-        plan,
-        choice.folder,
-        details,
-        programs,
-        model=model,
-    ).read_by(protocol, choice.line.profile, choice.line.port, choice.line.baud)
+    job = Job(machine, plan, choice.folder, details, programs, model=model)
+    job = job.read_by(protocol, choice.line.profile, choice.line.port, choice.line.baud)
     job.check(str(plan_file))
     domain = plan.to_domain()
     if not (choice.goes_on or choice.line.virtual or details.bar_waiver):

@@ -160,14 +160,11 @@ def parameters(
     taken_out = (*found.values.sources(), *(f for f in own.of_the_machine().sources if f.source.name in in_table))
     corrected = replace(nominal, control=correction_of("parameters", digest, date, taken_out, nominal))
     joints = hal_lines(found.values, nominal)
-    files = {
-        "genhexkins.hal": "\n".join(joints) + "\n",
-        "parameters.csv": _table(joints),
-        "machine.yaml": machine_text(corrected),
-    }
+    files = {"genhexkins.hal": "\n".join(joints) + "\n", "parameters.csv": _table(joints)}
+    files |= {"machine.yaml": machine_text(corrected)}
     files |= {f"joint-{i}.comp": text for i, text in enumerate(lines)}
     write_folder(out, files, force=force)
-    home = home_mm(found.values, nominal)
+    home = home_mm(found.values, nominal).tolist()
     settings_of = ["[KINS]", "KINEMATICS = genhexkins", f"JOINTS = {STRUTS}"]
     for i in range(STRUTS):
         settings_of += [f"[JOINT_{i}]", f"HOME and HOME_OFFSET: add {home[i]:.6f}"]
@@ -180,7 +177,7 @@ def parameters(
         high=tuple(high.tolist()),
         left=found.left,
         sources=_held(own, found.sources, with_play=play is not None),
-        home_mm=tuple(home.tolist()),
+        home_mm=tuple(home),
         ini=tuple(settings_of),
         way_back=(
             "put the former lines back into INI and HAL files, and home again",

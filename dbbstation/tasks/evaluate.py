@@ -94,9 +94,9 @@ def evaluate(
         held_out=set(chain(*recorded.sessions.items())).isdisjoint(chain(*identified.sessions.items())),
         flatness_u_um=flatness_u_um,
         parallelism_u_um=parallelism_u_um,
-        plane_uncertainty_not_known_because=None
-        if None not in {flatness_u_um, parallelism_u_um}
-        else identified.why_unknown,
+        plane_uncertainty_not_known_because=identified.why_unknown
+        if None in (flatness_u_um, parallelism_u_um)
+        else None,
         plane_z_mm=height_mm,
         plane_without=tuple(f.source.name for f in own if f not in placed and not f.source.of_currents),
         tolerances=evaluated_tolerances(tolerances, runs),

@@ -143,15 +143,11 @@ def blocks(
             **recording.logged,
         }
         texts = {columns.STATUS: read.status, **read.unknown_columns}
-        block: dict[str, Floats | list[str]] = {}
-        for name in what.names:
-            if name in said:
-                block[name] = [said[name]] * count
-            elif what.is_text(name):
-                block[name] = list(texts.get(name) or [""] * count)
-            else:
-                block[name] = numbers.get(name, none)
-        yield block
+        texts |= {name: (text,) * count for name, text in said.items()}
+        yield {
+            name: list(texts.get(name) or [""] * count) if what.is_text(name) else numbers.get(name, none)
+            for name in what.names
+        }
     progress(len(what.runs), len(what.runs))
 
 

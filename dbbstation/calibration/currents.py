@@ -383,7 +383,7 @@ def motor_findings(
         "circles": by_themselves(blocks[:circles], layout.known, noise.effective, nominal[:circles]),
         "currents": by_themselves(currents, layout.known),
     }
-    fitted = np.flatnonzero(~layout.known.random)
+    fitted = layout.fitted
     names = layout.names
     open_columns = fitted[np.linalg.norm(solution.held, axis=0) > OPEN]
     held = frozenset(names[column][2] for column in open_columns if names[column][0] in _drives(layout))

@@ -79,9 +79,19 @@ class Layout:
         return amplitudes, np.array([number for number, shape in numbered if shape], dtype=np.int64)
 
     @property
+    def fitted(self) -> Integers:
+        """Return the columns of parameters that are not random."""
+        return np.flatnonzero(~self.known.random)
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """Return the parameter of each column."""
+        return [p for term in self.terms for p in term.parameters]
+
+    @property
     def limits(self) -> tuple[Floats, Floats]:
         """Return lower and upper limits of every column, shape (k,) each: shapes may exceed their grid by one step."""
-        each = [p.limits for term in self.terms for p in term.parameters]
+        each = [p.limits for p in self.parameters]
         return np.array([low for low, _ in each]), np.array([high for _, high in each])
 
     def held_at(self, x: Floats, columns: Integers) -> Layout:
@@ -93,7 +103,12 @@ class Layout:
     @property
     def bounded(self) -> Flags:
         """Return whether a tolerance bounds each column, shape (k,)."""
-        return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
+        return np.array([p.tolerance is not None for p in self.parameters], dtype=bool)
+
+    @property
+    def unbounded(self) -> Columns:
+        """Return what is known of the columns without tolerances."""
+        return replace(self.known, prior=np.where(self.bounded, np.inf, self.known.prior))
 
     def formula_variance(self, x: Floats) -> Floats:
         """Return every column's variance due to the inaccuracy of its formula, shape (k,)."""
@@ -111,10 +126,7 @@ class Layout:
 
     def model(self, x: Floats) -> MachineModel:
         """Return the machine model at x, shape (k,)."""
-        return MachineModel(
-            self.machine,
-            tuple(term.fitted(x) for term in self.terms),
-        )
+        return MachineModel(self.machine, tuple(term.fitted(x) for term in self.terms))
 
 
 def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> Layout:
@@ -137,7 +149,8 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
             if stated is not None and not np.any(stated > 0.0):
                 continue
             terms.append(ParameterSet(source, shared, parameters, slice(len(prior), len(prior) + len(parameters))))
-            sizes = [_prior(p) for p in parameters] if stated is None else [float(size) for size in stated]
+            tolerances = [np.inf if p.tolerance is None else p.tolerance for p in parameters]
+            sizes = tolerances if stated is None else stated.tolist()
             prior += [p.plausible if p.grid else size for p, size in zip(parameters, sizes, strict=True)]
             random += [stated is not None] * len(parameters)
     every = [p for term in terms for p in term.parameters]
@@ -165,7 +178,3 @@ def _sets(sources: Sequence[ErrorSource], observations: Sequence[Observation]) -
                 stated = error
             sets[source.shared_by(motion)] = stated
     return found
-
-
-def _prior(parameter: Parameter) -> float:
-    return np.inf if parameter.tolerance is None else parameter.tolerance

@@ -164,9 +164,7 @@ SECTORS = 720
 
 def misfit_of(calibration: Calibration, noise: Spectrum | None = None) -> Misfit:
     """Return an F test of the residual's low harmonics, after removal of a ball position per mounting."""
-    fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
-    residuals, phases, mountings = _by_sector(calibration)
-    return misfit(residuals, phases, mountings, fitted, noise)
+    return misfit(*_by_sector(calibration), calibration.parameters_identified, noise)
 
 
 def remainder_of(calibration: Calibration, noise: Spectrum) -> Remainder:

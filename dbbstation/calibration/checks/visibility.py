@@ -6,7 +6,7 @@ directions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,9 +93,8 @@ class Observability:
 @with_one_thread
 def visibility(calibration: Calibration) -> Observability:
     """Return the observability of a calibration."""
-    known = calibration.layout.known
-    fitted = np.flatnonzero(~known.random)
-    scale = known.scale[fitted]
+    fitted = calibration.layout.fitted
+    scale = calibration.layout.known.scale[fitted]
     whole = spread_over(calibration.circle_blocks, fitted)[:, :-1] * scale
     free = complement(calibration.solution.held)
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
@@ -126,12 +125,11 @@ def indices(singular: Floats, readings: int) -> Indices:
 
 
 def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
-    known = calibration.layout.known
-    fitted = np.flatnonzero(~known.random)
-    scale = known.scale[fitted]
+    fitted = calibration.layout.fitted
+    scale = calibration.layout.known.scale[fitted]
     scaled = calibration.solution.covariance[np.ix_(fitted, fitted)] / np.outer(scale, scale)
     variance, axes = np.linalg.eigh(scaled)
-    units = [parameter.unit for term in calibration.layout.terms for parameter in term.parameters]
+    units = [parameter.unit for parameter in calibration.layout.parameters]
     found = []
     for k in range(len(fitted) - 1, len(fitted) - 1 - min(WEAKEST, calibration.parameters_identified), -1):
         moved = scale * axes[:, k]
@@ -144,7 +142,7 @@ def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
 
 
 def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
-    fitted = np.flatnonzero(~calibration.layout.known.random)
+    fitted = calibration.layout.fitted
     covariance = calibration.solution.covariance[np.ix_(fitted, fitted)]
     sigma = np.sqrt(np.diag(covariance))
     fitted, covariance, sigma = fitted[sigma > 0.0], covariance[np.ix_(sigma > 0.0, sigma > 0.0)], sigma[sigma > 0.0]
@@ -206,9 +204,7 @@ class PlanCheck:
 @with_one_thread
 def check_plan(calibration: Calibration) -> PlanCheck:
     """Count the directions that tests determine at the fit's noise, without tolerances of the machine file."""
-    known = calibration.layout.known
-    free = replace(known, prior=np.where(calibration.layout.bounded, np.inf, known.prior))
-    fitted = int(np.count_nonzero(~known.random))
+    free, fitted = calibration.layout.unbounded, len(calibration.layout.fitted)
 
     def determined(blocks: Sequence[Block]) -> int:
         return fitted - len(lost_directions(blocks, free, calibration.noise.effective))

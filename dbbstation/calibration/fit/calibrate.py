@@ -122,7 +122,7 @@ class Calibration:
     @property
     def parameters_identified(self) -> int:
         """Return the number of machine parameters less the number of held directions."""
-        return int(np.count_nonzero(~self.layout.known.random)) - len(self.solution.held)
+        return len(self.layout.fitted) - len(self.solution.held)
 
 
 def default_sources() -> tuple[ErrorSource, ...]:
@@ -252,7 +252,7 @@ def _approached(
     """Approach a machine with errors of millimetres, by Gauss-Newton steps with a usual bar's noise."""
     # Nonlinearity dominates early residuals; as noise it would hide determined directions. The noise is therefore
     # estimated only after steps no longer halve the residual.
-    noise = Noise(FIRST_NOISE_MM, 1.0).effective
+    noise = FIRST_NOISE_MM
     held = lost_directions(nominal, layout.known, noise)
     blocks = list(nominal)
     for _ in range(MOST_STEPS):
@@ -270,11 +270,9 @@ def _rms_mm(left: Sequence[Floats]) -> float:
 
 def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> Floats:
     """Return fitted directions that only priors bound, as orthonormal rows in scaled parameters, shape (r, f)."""
-    known = layout.known
     if not layout.bounded.any():
-        return np.zeros((0, int(np.count_nonzero(~known.random))))
-    free = replace(known, prior=np.where(layout.bounded, np.inf, known.prior))
-    return lost_directions(blocks, free, noise.effective)
+        return np.zeros((0, len(layout.fitted)))
+    return lost_directions(blocks, layout.unbounded, noise.effective)
 
 
 def _share(layout: Layout, step: Floats, before: Floats, share: float) -> float:
@@ -282,7 +280,7 @@ def _share(layout: Layout, step: Floats, before: Floats, share: float) -> float:
     # Full steps oscillate in shape parameters with small amplitude and in nearly undetermined combinations. If the
     # share s gave successive steps with the ratio q, the share s / (1 - q) would have reached the minimum (Aitken's
     # rule). The smallest such share is used.
-    shaped = np.array([bool(p.grid) for term in layout.terms for p in term.parameters])
+    shaped = np.array([bool(p.grid) for p in layout.parameters])
     now, last = step / layout.known.scale, before / layout.known.scale
     along = float(now @ last) / max(float(last @ last), 1e-300)
     # The ratio of converged steps is rounding, as for a shape parameter at zero amplitude.

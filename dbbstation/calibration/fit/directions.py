@@ -42,33 +42,25 @@ class RigidPattern:
 def patterns(base_joints_mm: Floats, axis_of_strut: Floats) -> list[RigidPattern]:
     """Return known patterns, in order of trial: rigid motions of the base, common strut length, size, joint with strut."""
     none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
-    found = [
-        RigidPattern(f"all six base joints together along {axis}", none, np.tile(np.eye(3)[k], (STRUTS, 1)))
-        for k, axis in enumerate("XYZ")
+    axes = list(zip("XYZ", np.eye(3), strict=True))
+    own = [f"base joint {i + 1} along its strut together with that strut's length" for i in range(STRUTS)]
+    along = [one[:, None] * axis for one, axis in zip(np.eye(STRUTS), axis_of_strut, strict=True)]
+    return [
+        *(RigidPattern(f"all six base joints together along {x}", none, np.tile(e, (STRUTS, 1))) for x, e in axes),
+        *(
+            RigidPattern(f"all six base joints turned together about {x}", none, np.cross(e, base_joints_mm))
+            for x, e in axes
+        ),
+        RigidPattern("all six struts together in length", np.ones(STRUTS), still),
+        RigidPattern("the base joints' circle in size", none, base_joints_mm * np.array([1.0, 1.0, 0.0])),
+        *map(RigidPattern, own, np.eye(STRUTS), along),
     ]
-    found += [
-        RigidPattern(f"all six base joints turned together about {axis}", none, np.cross(np.eye(3)[k], base_joints_mm))
-        for k, axis in enumerate("XYZ")
-    ]
-    found.append(RigidPattern("all six struts together in length", np.ones(STRUTS), still))
-    found.append(RigidPattern("the base joints' circle in size", none, base_joints_mm * np.array([1.0, 1.0, 0.0])))
-    found += [
-        RigidPattern(
-            f"base joint {i + 1} along its strut together with that strut's length",
-            np.eye(STRUTS)[i],
-            np.eye(STRUTS)[i][:, None] * axis_of_strut[i],
-        )
-        for i in range(STRUTS)
-    ]
-    return found
 
 
 def in_words(layout: Layout, held: Floats) -> tuple[str, ...]:
     """Return one description per held direction."""
-    fitted = np.flatnonzero(~layout.known.random)
-    names = [layout.names[column] for column in fitted]
-    scale = layout.known.scale[fitted]
-    remaining = _orthonormal(held * scale)
+    names = [layout.names[column] for column in layout.fitted]
+    remaining = _orthonormal(held * layout.known.scale[layout.fitted])
     texts: list[str] = []
     for pattern in patterns(layout.machine.hexapod.base_joints_mm, _strut_axes(layout)):
         vector = _as_columns(pattern, names)
@@ -87,11 +79,12 @@ def in_words(layout: Layout, held: Floats) -> tuple[str, ...]:
 
 def of_circles(layout: Layout, held: Floats) -> Floats:
     """Return directions without their components in drive parameters, shape (g, f); purely electrical directions are dropped."""
-    fitted = np.flatnonzero(~layout.known.random)
     drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
     if not drives or len(held) == 0:
         return held
-    _, share, rows = np.linalg.svd(np.where(np.isin(fitted, np.concatenate(drives)), 0.0, held), full_matrices=False)
+    _, share, rows = np.linalg.svd(
+        np.where(np.isin(layout.fitted, np.concatenate(drives)), 0.0, held), full_matrices=False
+    )
     return rows[share > SHOWS_IN_CIRCLES]
 
 
@@ -187,7 +180,7 @@ def _fitted(layout: Layout) -> list[Name]:
         for term in layout.terms
         for parameter in term.parameters
     ]
-    return [names[column] for column in np.flatnonzero(~layout.known.random)]
+    return [names[column] for column in layout.fitted]
 
 
 def _best(fitted: Sequence[Name], lost: Floats) -> list[int]:

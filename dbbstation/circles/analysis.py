@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -98,13 +98,10 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
     return CircleAnalysis(
         raw=raw,
         chosen=chosen,
-        path=path,
-        g_least_squares_um=1e3 * float(np.ptp(path.least_squares.deviation_mm)),
+        **_of_path(path, radius_error_um),
         centre_mm=measured.centre_mm,
         radius_error_um=radius_error_um,
         mean_radial_error_um=measured.mean_radial_error_um,
-        f_centred=_extremes(radius_error_um + 1e3 * path.least_squares.deviation_mm),
-        f_commanded=_extremes(1e3 * (path.about_ball_mm - path.radius_mm)),
         steps=tuple(step for step in steps if step is not None),
         harmonics=harmonics_of(plain),
         closure=closure_of(raw, residual_um, sigma),
@@ -124,15 +121,18 @@ def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
     """
     if chosen is one.chosen:
         return one
-    path = path_of(one.raw, chosen)
-    return replace(
-        one,
-        chosen=chosen,
-        path=path,
-        g_least_squares_um=1e3 * float(np.ptp(path.least_squares.deviation_mm)),
-        f_centred=_extremes(one.radius_error_um + 1e3 * path.least_squares.deviation_mm),
-        f_commanded=_extremes(1e3 * (path.about_ball_mm - path.radius_mm)),
-    )
+    return replace(one, chosen=chosen, **_of_path(path_of(one.raw, chosen), one.radius_error_um))
+
+
+def _of_path(path: CirclePath, radius_error_um: float) -> dict[str, Any]:
+    """Return the figures that the filter affects."""
+    deviation_mm = path.least_squares.deviation_mm
+    return {
+        "path": path,
+        "g_least_squares_um": 1e3 * float(np.ptp(deviation_mm)),
+        "f_centred": _extremes(radius_error_um + 1e3 * deviation_mm),
+        "f_commanded": _extremes(1e3 * (path.about_ball_mm - path.radius_mm)),
+    }
 
 
 def _without_drift(raw: RawCircle, residual_um: Floats) -> Floats:

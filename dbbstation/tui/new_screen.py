@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 from textual.content import Content
 
 from dbbstation.service.choice import Choice, Gate, Order, SetUpPart
-from dbbstation.service.session_notes import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.bar_screen import BarScreen
 from dbbstation.tui.prepare_screen import PrepareScreen
 from dbbstation.tui.questions import ChooseQuestion, TypeQuestion
-from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.row_screen import FrontScreen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,7 +34,7 @@ _OF_LINE = (SetUpPart.INSTRUMENT, SetUpPart.PORT)
 _NAME = 15
 
 
-class NewScreen(RowScreen):
+class NewScreen(FrontScreen):
     """Shown over the sessions."""
 
     help_name = "new"
@@ -48,21 +47,17 @@ class NewScreen(RowScreen):
     ]
 
     def __init__(self, reception: StationApp, front: Front, choice: Choice) -> None:
-        super().__init__()
+        super().__init__(reception, front)
         self.choice = choice
-        self._reception, self._front = reception, front
 
     def on_mount(self) -> None:
         self._show()
 
     def action_begin(self) -> None:
-        missing = self.choice.missing()
-        if missing:
+        if self.choice.missing():
             self._show()
-            return
-        self.say(texts.NEW_CHECKS)
-        choice = self.choice
-        self._reception.do(lambda: self._front.prepare(choice), self._prepared, self.failed)
+        else:
+            self.prepare(self.choice, self._prepared)
 
     def action_probe(self) -> None:
         line = self.choice.line
@@ -70,7 +65,7 @@ class NewScreen(RowScreen):
             self._show()
             return
         self.say(texts.NEW_ASKS.format(port=line.port, instrument=line.instrument))
-        self._reception.do(lambda: self._front.probe(line), self._answered, self.failed)
+        self.do(lambda: self._front.probe(line), self._answered)
 
     def action_empty(self) -> None:
         part = ROWS[self.at]
@@ -185,10 +180,7 @@ class NewScreen(RowScreen):
 
     def _typed(self, part: SetUpPart, text: str) -> None:
         if part is SetUpPart.TEMPERATURE:
-            temp_c = shop_degc(text)
-            if temp_c is None:
-                self.say(texts.NO_NUMBER.format(text=text), wrong=True)
-            else:
+            if (temp_c := self.degc_of(text)) is not None:
                 self._take(ambient_temp_c=temp_c)
         elif part in {SetUpPart.MACHINE, SetUpPart.PLAN, SetUpPart.FOLDER, SetUpPart.PROGRAMS}:
             self._take(**{_FIELDS[part]: (self._front.under / Path(text).expanduser())})

@@ -9,7 +9,6 @@ from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.widgets import Footer, Static
 
-from dbbstation.service.session_notes import shop_degc
 from dbbstation.station.states import State
 from dbbstation.tui import texts
 from dbbstation.tui.board_screen import RunScreen
@@ -17,7 +16,7 @@ from dbbstation.tui.large_screen import LargeFigures, block_rows, largest
 from dbbstation.tui.now_line import OperatorNowLine, ProgressLine, TitleLine, banner
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import TypeQuestion, YesQuestion
-from dbbstation.tui.row_screen import ExplainedScreen, RowScreen
+from dbbstation.tui.row_screen import ExplainedScreen, FrontScreen
 from dbbstation.tui.set_up_panel import set_up
 
 if TYPE_CHECKING:
@@ -35,14 +34,14 @@ if TYPE_CHECKING:
 _NAME = 16
 
 
-class JobScreen(RowScreen):
+class JobScreen(FrontScreen):
     """The bottom screen: what is measured, and its few choices."""
 
     help_name = "job"
 
     def __init__(self, reception: StationApp, front: Front, operated: Operated) -> None:
-        super().__init__()
-        self._reception, self._front, self._operated = reception, front, operated
+        super().__init__(reception, front)
+        self._operated = operated
         self._choice: Choice | None = None
 
     def on_mount(self) -> None:
@@ -50,7 +49,7 @@ class JobScreen(RowScreen):
 
     def search(self) -> None:
         self.say(texts.START_LOOKS)
-        self._reception.do(self._operated.choice, self._found, self.failed)
+        self.do(self._operated.choice, self._found)
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         if self._choice is None:
@@ -58,7 +57,7 @@ class JobScreen(RowScreen):
         name = self._rows[self.at]
         if name == _ANEW:
             self.say(texts.START_LOOKS)
-            self._reception.do(lambda: self._operated.choice(anew=True), self._found, self.failed)
+            self.do(lambda: self._operated.choice(anew=True), self._found)
             return
         if name == _BEGIN:
             self._begin(self._choice)
@@ -81,9 +80,7 @@ class JobScreen(RowScreen):
         def sure(yes: bool | None) -> None:  # noqa: FBT001 - answer of a question
             if yes:
                 self.say(texts.NEW_CHECKS)
-                self._reception.do(
-                    lambda: self._checked(choice), lambda prepared: self._prepared(choice, prepared), self.failed
-                )
+                self.do(lambda: self._checked(choice), lambda prepared: self._prepared(choice, prepared))
 
         if self._operated.left_long_ago(choice):
             self.app.push_screen(YesQuestion(texts.JOB_OLD), sure)
@@ -102,9 +99,7 @@ class JobScreen(RowScreen):
         if name == "port":
             self._choice = replace(self._choice, line=self._choice.line.model_copy(update={"port": text}))
         elif name == "temperature":
-            degc = shop_degc(text)
-            if degc is None:
-                self.say(texts.NO_NUMBER.format(text=text), wrong=True)
+            if (degc := self.degc_of(text)) is None:
                 return
             self._choice = replace(self._choice, ambient_temp_c=degc)
         else:

@@ -15,7 +15,7 @@ from dbbstation.tui import texts
 from dbbstation.tui.panel import lines
 from dbbstation.tui.questions import ChooseQuestion, TemperatureQuestion
 from dbbstation.tui.reading_panel import seat_words
-from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.row_screen import FrontScreen
 from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ _GOOD, _OPEN, _NOTE = "✓", "!", "·"
 """Signs: checked and good; unknown; note."""
 
 
-class PrepareScreen(RowScreen):
+class PrepareScreen(FrontScreen):
     """Shown over the choices or the sessions; shorter for a continued session."""
 
     help_name = "prepare"
@@ -55,8 +55,7 @@ class PrepareScreen(RowScreen):
         prepared: Prepared,
         changed: Callable[[Choice], None] = lambda _choice: None,
     ) -> None:
-        super().__init__()
-        self._reception, self._front = reception, front
+        super().__init__(reception, front)
         self._choice, self._prepared, self._changed = choice, prepared, changed
         self._goes_on = choice.goes_on
         self._confirmed: set[str] = set()
@@ -208,14 +207,12 @@ class PrepareScreen(RowScreen):
                 # The session has to know what commands its runs: its circles are no longer the plan's.
                 self._take(replace(choice, programs=folder))
 
-        self._reception.do(lambda: self._front.write_programs(choice, model), written, self.failed)
+        self.do(lambda: self._front.write_programs(choice, model), written)
 
     def _take(self, choice: Choice) -> None:
-        self.say(texts.NEW_CHECKS)
-
         def prepared(found: Prepared) -> None:
             self._choice, self._prepared = choice, found
             self._changed(choice)
             self._show()
 
-        self._reception.do(lambda: self._front.prepare(choice), prepared, self.failed)
+        self.prepare(choice, prepared)

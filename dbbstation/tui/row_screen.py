@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.containers import VerticalScroll
 from textual.content import Content
@@ -10,13 +10,19 @@ from textual.screen import Screen
 from textual.widgets import Footer, OptionList, Static
 from textual.widgets.option_list import Option
 
+from dbbstation.service.session_notes import shop_degc
+from dbbstation.tui import texts
 from dbbstation.tui.help_screen import HELP
 from dbbstation.tui.now_line import banner
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from textual.app import ComposeResult
+
+    from dbbstation.service.choice import Choice, Prepared
+    from dbbstation.service.front import Front
+    from dbbstation.tui.app import StationApp
 
 
 class ExplainedScreen(Screen[None]):
@@ -117,3 +123,27 @@ class RowScreen(ExplainedScreen):
 
     def _mark(self) -> None:
         mark_chosen(self.query_one("#rows", OptionList), self._put)
+
+
+class FrontScreen(RowScreen):
+    """A list of rows before a session is opened."""
+
+    def __init__(self, reception: StationApp, front: Front) -> None:
+        super().__init__()
+        self._reception, self._front = reception, front
+
+    def do(self, work: Callable[[], Any], then: Callable[[Any], None]) -> None:
+        """Do work in the background, then go on with its result or say why not."""
+        self._reception.do(work, then, self.failed)
+
+    def prepare(self, choice: Choice, then: Callable[[Prepared], None]) -> None:
+        """Read and check what was chosen."""
+        self.say(texts.NEW_CHECKS)
+        self.do(lambda: self._front.prepare(choice), then)
+
+    def degc_of(self, text: str) -> float | None:
+        """Return a temperature, or say that it is none."""
+        degc = shop_degc(text)
+        if degc is None:
+            self.say(texts.NO_NUMBER.format(text=text), wrong=True)
+        return degc

@@ -10,7 +10,7 @@ from dbbstation.tui import texts
 from dbbstation.tui.new_screen import NewScreen
 from dbbstation.tui.panel import cut
 from dbbstation.tui.prepare_screen import PrepareScreen
-from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.row_screen import FrontScreen
 from dbbstation.tui.sentences import duration
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _NAME = 22
 
 
-class StartScreen(RowScreen):
+class StartScreen(FrontScreen):
     """The bottom screen without a job."""
 
     help_name = "start"
@@ -38,8 +38,7 @@ class StartScreen(RowScreen):
     ]
 
     def __init__(self, reception: StationApp, front: Front) -> None:
-        super().__init__()
-        self._reception, self._front = reception, front
+        super().__init__(reception, front)
         self._sessions: tuple[SessionLine, ...] = ()
 
     def on_mount(self) -> None:
@@ -48,7 +47,7 @@ class StartScreen(RowScreen):
     def search(self) -> None:
         """List the sessions again; a reported failure stays visible."""
         self.say(texts.START_LOOKS)
-        self._reception.do(self._front.sessions, self._list, self.failed)
+        self.do(self._front.sessions, self._list)
 
     @property
     def chosen(self) -> SessionLine | None:
@@ -68,26 +67,22 @@ class StartScreen(RowScreen):
             return
         choice = self._front.goes_on_with(line.folder)
         if choice.missing():
-            self._enter(NewScreen(self._reception, self._front, choice))
+            self._choose(choice)
         else:
-            self.say(texts.NEW_CHECKS)
-            self._reception.do(
-                lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self.failed
-            )
+            self.prepare(choice, lambda prepared: self._prepared(choice, prepared))
 
     def chosen_another(self) -> None:
         self._tell()
 
     def action_new(self) -> None:
-        self._enter(NewScreen(self._reception, self._front, self._front.first_choice()))
+        self._choose(self._front.first_choice())
 
     def action_virtual(self) -> None:
-        self._enter(NewScreen(self._reception, self._front, self._front.virtual_choice()))
+        self._choose(self._front.virtual_choice())
 
     def action_line(self) -> None:
         if self.chosen is not None:
-            choice = self._front.goes_on_with(self.chosen.folder)
-            self._enter(NewScreen(self._reception, self._front, choice))
+            self._choose(self._front.goes_on_with(self.chosen.folder))
 
     def action_results(self) -> None:
         if self.chosen is not None:
@@ -105,9 +100,12 @@ class StartScreen(RowScreen):
             self.say(texts.START_SOME)
             self._enter(PrepareScreen(self._reception, self._front, choice, prepared))
 
-    def _enter(self, screen: RowScreen) -> None:
+    def _choose(self, choice: Choice) -> None:
+        self._enter(NewScreen(self._reception, self._front, choice))
+
+    def _enter(self, screen: FrontScreen) -> None:
         def left(_: None) -> None:
-            self._reception.do(self._front.release, lambda _: None, self.failed)
+            self.do(self._front.release, lambda _: None)
 
         self.app.push_screen(screen, left)
 

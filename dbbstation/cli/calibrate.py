@@ -25,9 +25,8 @@ def print_currents(currents: CurrentsFigures | None) -> None:
     """Print drives, centre of gravity and notes of motor currents."""
     if currents is None:
         return
-    echo()
     echo(
-        f"motor currents, with the platform's weight of {currents.weight_taken_as_known_n:.0f} N taken as known; "
+        f"\nmotor currents, with the platform's weight of {currents.weight_taken_as_known_n:.0f} N taken as known; "
         "±: u, one standard uncertainty"
     )
     titles = ["motor", "N/A", "±", "friction N", "±", "per speed N s/mm", "±", "per load N/kN", "±", "asymmetry N", "±"]

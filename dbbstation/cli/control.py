@@ -159,7 +159,6 @@ def _um(value: float | None) -> str:
 
 
 def _print(title: str, lines: Sequence[str]) -> None:
-    echo()
-    echo(f"{title}:")
+    echo(f"\n{title}:")
     for line in lines:
         echo(f"  {line}")

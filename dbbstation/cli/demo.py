@@ -91,8 +91,7 @@ def _print(result: DemoResult) -> None:
     from dbbstation.facts.serialise import read_plain
     from dbbstation.facts.value import Value
 
-    echo()
-    echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
+    echo("\n      centre deviation  mean radial error  circular deviation G   [µm, measured]")
     rows: list[list[object]] = [[run.test, *(size for sizes in _sizes(run) for size in sizes)] for run in result.runs]
     means: list[object] = ["mean", *_means(result.runs)]
     print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
@@ -112,15 +111,13 @@ def _print(result: DemoResult) -> None:
     held_out = result.diagnosis.held_out_rms_um
     if result.diagnosis.held_out == "tested":
         echo(f"Held-out tests are predicted to {held_out.before:.1f} µm rms before, {held_out.after:.1f} after.")
-    echo()
-    echo(f"The report says: {result.report.verdict.headline}")
+    echo(f"\nThe report says: {result.report.verdict.headline}")
     for rank, one in enumerate(result.report.causes, start=1):
         echo(
             f"Cause {rank} of the errors before: {one.cause}, {one.g_um:.1f} µm of G, {one.centre_um:.1f} µm of the "
             f"centres. {one.cure}"
         )
-    echo()
-    echo(f"everything is in {result.folder}:")
+    echo(f"\neverything is in {result.folder}:")
     for name, what in _CONTENTS:
         echo(f"  {name:<24} {what}")
 

@@ -22,8 +22,7 @@ def show(result: EvaluationResult) -> None:
     print_runs(result.runs, low_passed=True)
     echo()
     _print_predicted(result.runs)
-    echo()
-    echo(f"nominal machine leaves {result.nominal_rms_um:8.2f} µm rms")
+    echo(f"\nnominal machine leaves {result.nominal_rms_um:8.2f} µm rms")
     echo(f"model leaves           {result.residual_rms_um:8.2f} µm rms")
     echo(f"uncompensated at Z {result.plane_z_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     if result.plane_without:

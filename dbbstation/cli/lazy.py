@@ -77,21 +77,16 @@ class Utf8(StringParamType):
         return text
 
 
-def in_utf8(command: click.Command) -> click.Command:
-    """Let a command, or every command of a group, refuse texts that are not UTF-8."""
+def made_ready(command: click.Command) -> click.Command:
+    """Let a command, or every one of a group, keep the log, refuse texts that are not UTF-8, and show its examples unwrapped."""
     for inner in command.commands.values() if isinstance(command, click.Group) else ():
-        in_utf8(inner)
+        made_ready(inner)
     for parameter in command.params:
         if type(parameter.type) is StringParamType:
             parameter.type = Utf8()
-    return command
-
-
-def made_ready(command: click.Command) -> click.Command:
-    """Let a command keep the log, refuse texts that are not UTF-8, and show its examples unwrapped."""
     # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
     command.help = (command.help or "").replace(r"\b", "\b")
-    return attended(in_utf8(command))
+    return attended(command)
 
 
 class LazyGroup(click.Group):

@@ -55,9 +55,7 @@ _FORM = _Printable("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%
 
 
 def attended(command: click.Command) -> click.Command:
-    """Let a command, or every command of a group, write the log once."""
-    for inner in command.commands.values() if isinstance(command, click.Group) else ():
-        attended(inner)
+    """Let a command write the log once."""
     callback = command.callback
     if callback is not None and not isinstance(command, click.Group) and not hasattr(callback, "attended"):
         command.callback = _attended(callback)

@@ -173,8 +173,8 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
             )
             columns[name] = Proposed(one.means, unit)
     means = {one.means for one in columns.values()}
+    unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
     if not means & {LENGTH, DEVIATION}:
-        unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
         asker.give(
             "--columns 'NAME=deviation:µm' or 'NAME=length:mm'",
             f"which column has the readings of the bar; these are not understood: {unknown}",
@@ -182,7 +182,6 @@ def chosen_mapping(tables: Sequence[ForeignTable], options: MappingOptions, aske
     own = set(table.table.names) >= EXPORTED
     trace: str | None = options.trace
     if ANGLE not in means and not own and trace is None:
-        unknown = ", ".join(name for name, one in columns.items() if one.means == IGNORED)
         question = (
             "no column was taken for an angle: are the files the whole run with feed-in and feed-out, or the turn alone"
             + f"; not understood: {unknown}, say --columns 'NAME=angle:deg' where one is the angle" * bool(unknown)

@@ -191,21 +191,17 @@ class Keyboard:
 
 def _command_of(line: str) -> Command | None:
     word, _, rest = line.partition(" ")
-    if word.lower() == "g" and rest.strip():
-        return GoTo(rest.strip())
-    if word.lower() == "a" and rest.strip():
-        return Accept(rest.strip())
-    if word.lower() == "n" and rest.strip():
-        return AddNote(rest.strip())
-    if word.lower() == "t" and rest.strip():
-        return _temperature(rest.strip())
-    return _WORDS.get(word[:1].lower())
+    made = _WITH_TEXT.get(word.lower()) if rest.strip() else None
+    return _WORDS.get(word[:1].lower()) if made is None else made(rest.strip())
 
 
 def _temperature(text: str) -> AddNote | None:
     """Return the shop's temperature as a note, or None if implausible."""
     degc = shop_degc(text)
     return None if degc is None else AddNote(ambient_temp_c=degc)
+
+
+_WITH_TEXT: dict[str, Callable[[str], Command | None]] = {"g": GoTo, "a": Accept, "n": AddNote, "t": _temperature}
 
 
 def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: C901, PLR0911 - a line per event, nothing nested

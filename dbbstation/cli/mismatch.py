@@ -54,10 +54,6 @@ def _refused(result: MismatchResult | SimulatorResult, path: Path) -> OutputErro
     return not_written(path, result.levels) if result.levels.correction is False else None
 
 
-def _refused_table(result: MismatchResult | SimulatorResult, path: Path) -> OutputError | None:
-    return None if hasattr(result, "rows_csv") else _refused(result, path)
-
-
 def _allowed() -> dict[str, object]:
     setting = shop_settings().values.get("simulators")
     return {"allowed": setting.value if setting else ()}
@@ -67,7 +63,13 @@ mismatch = command(
     task,
     show,
     CommandOutput("out", "CODE.py", refused=_refused, only_with="simulator"),
-    CommandOutput("table", write=_write_table, table=True, refused=_refused_table, field="corrected"),
+    CommandOutput(
+        "table",
+        write=_write_table,
+        table=True,
+        refused=lambda result, path: None if hasattr(result, "rows_csv") else _refused(result, path),
+        field="corrected",
+    ),
     figure(),
     more=_allowed,
 )

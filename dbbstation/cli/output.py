@@ -172,9 +172,8 @@ def print_tolerances(held: Sequence[EvaluatedTolerance], origin: str) -> None:
     """Print the worst run of every tolerance."""
     if not held:
         return
-    echo()
     echo(
-        f"tolerances [µm], from {origin}; the worst run of each, readings under the nominal machine and under the model"
+        f"\ntolerances [µm], from {origin}; the worst run of each, readings under the nominal machine and under the model"
     )
     rows = []
     for one in held:

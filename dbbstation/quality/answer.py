@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from dbbstation.quality.finding import Finding, FindingVerdict, Name
+from dbbstation.quality.finding import Finding, FindingVerdict, Name, times_limit
 from dbbstation.quality.limits import LOG_ODDS_LIMIT
 
 if TYPE_CHECKING:
@@ -54,18 +54,15 @@ def answer(findings: Sequence[Finding], problem: str = "", to_come: int = 0) -> 
         return RunAssessment(Advice.REPEAT, tuple(cause_of(one) for one in sorted(wrong, key=rank)))
     decided = {one.name for one in findings if one.verdict is not FindingVerdict.CANNOT_TELL}
     hidden = [fault for fault, names in SHOWN_BY.items() if not decided & names]
-    hidden += [DOUBTED[one.name] for one in findings if one.name in DOUBTED and _doubted(one)]
+    # An undecided fault is doubted if it is likelier than not, given a prior probability of 0.001.
+    open_ones = [one for one in findings if one.verdict is FindingVerdict.CANNOT_TELL]
+    hidden += [DOUBTED[one.name] for one in open_ones if one.name in DOUBTED and (one.value or 0.0) > LOG_ODDS_LIMIT]
     later = tuple(fault for fault in hidden if findings and to_come and fault in SHOWN_LATER)
     unseen = tuple(fault for fault in hidden if fault not in later)
     settled_by = tuple(
         dict.fromkeys(SHOWN_LATER.get(fault, BY_PLAN) for fault in unseen if fault not in DOUBTED.values())
     )
     return RunAssessment(Advice.CANNOT_TELL if unseen else Advice.GOOD, (), unseen, settled_by, later)
-
-
-def _doubted(finding: Finding) -> bool:
-    """Return whether an undecided fault is likelier than not, given a prior probability of 0.001."""
-    return (finding.value or 0.0) > LOG_ODDS_LIMIT and finding.verdict is FindingVerdict.CANNOT_TELL
 
 
 def cause_of(finding: Finding) -> str:
@@ -105,7 +102,7 @@ ranked by value over limit, because all limits have the same probability."""
 def rank(finding: Finding) -> tuple[int, float]:
     """Return a sort key: the most explanatory finding first."""
     place = next(k for k, names in enumerate(EXPLAINS) if finding.name in names)
-    times = finding.value / finding.limit if finding.value is not None and finding.limit else 0.0
+    times = times_limit(finding)
     if Name.BUMP in EXPLAINS[place] and times < CLEARLY:
         place = next(k for k, names in enumerate(EXPLAINS) if Name.LOCAL in names)
     return place, -times

@@ -105,12 +105,13 @@ def stricter(one: Finding, other: Finding) -> Finding:
     fits better, the finding from more circles decides.
     """
     if one.wrong or other.wrong:
-        return max((each for each in (one, other) if each.wrong), key=_share)
+        return max((each for each in (one, other) if each.wrong), key=times_limit)
     if one.verdict is other.verdict:
-        return max(one, other, key=_share)
+        return max(one, other, key=times_limit)
     doubted = one.name is Name.TEST and one.value is not None
     return other if one.verdict is FindingVerdict.CANNOT_TELL and not doubted else one
 
 
-def _share(finding: Finding) -> float:
+def times_limit(finding: Finding) -> float:
+    """Return the value as a multiple of its limit."""
     return finding.value / finding.limit if finding.value is not None and finding.limit else 0.0

@@ -146,16 +146,13 @@ class SessionRuns:
             other_direction(one, others),
             repeat(one, others),
             local_difference(one, others),
-            *(self._of_all if one in self._runs else self._with(one)._of_all),  # noqa: SLF001 - the same class
+            *(self if one in self._runs else SessionRuns([*self._runs, one], self))._of_all,  # noqa: SLF001 - the same class
         ]
 
     @cached_property
     def _of_all(self) -> tuple[Finding, Finding]:
         by_model = any(one.run.usual is not None for one in self._runs)
         return programs_of_all(self._runs, self._forms), bar_of_all(self._runs, self._forms, by_model=by_model)
-
-    def _with(self, one: Seen) -> SessionRuns:
-        return SessionRuns([*self._runs, one], self)
 
     def _others(self, one: Seen) -> Others:
         directions = [pair for pair in self._directions if not pair.has(one)]

@@ -46,14 +46,13 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
 
 def identity(session: SessionFolder) -> tuple[tuple[str, str], ...]:
     """Return a session's identity in short: machine, operator, bar, temperature, seal."""
-    bar = session.bar
-    when = bar is not None and bar.calibrated is not None
-    calibrated = f", calibrated {bar.calibrated:%Y-%m-%d}" if bar is not None and bar.calibrated is not None else ""
-    at = f" at {_degc(bar.temp_c)}" if when and bar is not None and bar.temp_c is not None else ""
+    bar, when = session.bar, ""
+    if bar is not None and bar.calibrated is not None:
+        when = f", calibrated {bar.calibrated:%Y-%m-%d}{'' if bar.temp_c is None else f' at {_degc(bar.temp_c)}'}"
     return (
         ("machine no.", session.serial_number or _NOT_NOTED),
         ("operator", session.operator or _NOT_NOTED),
-        ("bar", _NOT_NOTED if bar is None else f"{bar.serial_number or 'without number'}{calibrated}{at}"),
+        ("bar", _NOT_NOTED if bar is None else f"{bar.serial_number or 'without number'}{when}"),
         ("shop", _shop(session)),
         (
             "seal",

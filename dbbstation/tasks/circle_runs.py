@@ -60,7 +60,8 @@ def load_circles(
         used = [run for run in accepted if (not tests or run.test in tests) and run.test not in exclude]
         read = session.load_all(accepted if findings else used)
         recordings = {run.path: file.recording for run, file in zip(accepted if findings else used, read, strict=True)}
-        judgements = _judged(session, accepted, recordings, model) if findings else {}
+        judged = judge_session(session, [(run, recordings[run.path]) for run in accepted], model) if findings else ()
+        judgements = {run.path: judgement for run, judgement in zip(accepted, judged, strict=False)}
         of_session = []
         for done, run in enumerate(used):
             progress(done, len(used))
@@ -93,16 +94,6 @@ MANY = 3
 """Number of accepted runs of one circle and direction from which on a note states them."""
 
 
-def _judged(
-    session: SessionFolder,
-    accepted: Sequence[RunEntry],
-    recordings: dict[Path, Recording],
-    model: IdentifiedModel | None,
-) -> dict[Path, Judgement]:
-    found = judge_session(session, [(run, recordings[run.path]) for run in accepted], model)
-    return {run.path: judgement for run, judgement in zip(accepted, found, strict=True)}
-
-
 def _measured(
     session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
 ) -> MeasuredCircle:
@@ -131,13 +122,14 @@ def _corrected(session: SessionFolder, recording: Recording) -> Recording:
 def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUpKnowledge:
     bar, setup = session.bar, session.setup(run)
     measured_c = session.bar_temp_c(recording.temperature_degc)
+    lacks = ("calibrated length of the bar",) if bar is None else bar.lacks(measured_c)
     grown_mm = None if bar is None else bar.grown_uncertainty_mm(measured_c)
     scatter = np.zeros(3) + setup.mounting_repeatability_mm
     ball_um = 1e3 * np.hypot(scatter, setup.ball_uncertainty_mm)
     return SetUpKnowledge(
         u_bar_um=None if bar is None else 1e3 * bar.calibrator_uncertainty_mm,
         u_temperature_um=None if grown_mm is None else 1e3 * grown_mm,
-        not_absolute=_not_absolute(bar, measured_c),
+        not_absolute=f"not absolute, because the session does not state: {', '.join(lacks)}" if lacks else "",
         u_ball_um=float(max(ball_um[:2])) if setup.place_known else None,
         u_ball_z_um=float(ball_um[2]) if setup.place_known else None,
         u_form_um=None if bar is None else _form_um(bar, session.plan.tests[run.test].ball),
@@ -149,12 +141,6 @@ def _form_um(bar: Bar, ball: Ball) -> float | None:
     if bar.ball_form_um is None or ball.form_um is None:
         return None
     return float(np.hypot(bar.ball_form_um, ball.form_um) / np.sqrt(3.0))
-
-
-def _not_absolute(bar: Bar | None, measured_c: float | None) -> str:
-    """Return why a bar's lengths are not absolute, or an empty text."""
-    lacks = ("calibrated length of the bar",) if bar is None else bar.lacks(measured_c)
-    return f"not absolute, because the session does not state: {', '.join(lacks)}" if lacks else ""
 
 
 def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[MeasuredPair]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError, as_completed
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -47,19 +47,13 @@ class WorkPool(Generic[Item, Result]):
     count: int = 1
     scheduler: str = ""
 
-    @contextmanager
-    def executor(self, count: int) -> Iterator[Executor]:
-        """Yield an executor, which ends when this process is interrupted.
+    def executor(self, count: int) -> AbstractContextManager[Executor]:
+        """Return the context of an executor, which ends when this process is interrupted.
 
         Raises:
             SchedulerError: no such scheduler; its workers have another program or several threads.
         """
-        if self.scheduler:
-            with _of_dask(self.scheduler) as pool:
-                yield pool
-        else:
-            with processes(count) as pool:
-                yield pool
+        return _of_dask(self.scheduler) if self.scheduler else processes(count)
 
     def each(self, work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[tuple[int, Result | Ended]]:
         """Yield the index and result of each item once, in order of completion.

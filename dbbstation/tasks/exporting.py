@@ -225,6 +225,5 @@ def _meanings(what: Exporting) -> Mapping[str, str]:
 def _cells(values: Floats | list[str], *, whole: bool) -> list[object]:
     if isinstance(values, list):
         return list(values)
-    if whole:
-        return ["" if value != value else int(value) for value in values.tolist()]  # noqa: PLR0124 - NaN is not itself
-    return ["" if value != value else value for value in values.tolist()]  # noqa: PLR0124
+    kind = int if whole else float
+    return ["" if value != value else kind(value) for value in values.tolist()]  # noqa: PLR0124 - NaN is not itself

@@ -61,16 +61,8 @@ def write_fleet_table(path: Path, result: FleetResult, provenance: Provenance, *
     if path.suffix.lower() != FORMATS[1]:
         raise OutputError("a table is written as .csv or .parquet", where=str(path), remedy="name such a file")
     pa, parquet = pyarrow_for(path)
-    kinds = {
-        name: pa.float64()
-        if name in _NUMBERS
-        else pa.int64()
-        if name in _WHOLE
-        else pa.bool_()
-        if name in _YES_OR_NO
-        else pa.string()
-        for name in TABLE
-    }
+    kinds = dict.fromkeys(TABLE, pa.string()) | dict.fromkeys(_NUMBERS, pa.float64())
+    kinds |= dict.fromkeys(_WHOLE, pa.int64()) | dict.fromkeys(_YES_OR_NO, pa.bool_())
     told = {"dbbstation": json.dumps(provenance.data(), ensure_ascii=False)}
     arrays = [pa.array([row[name] for row in rows], type=kinds[name]) for name in TABLE]
     table = pa.Table.from_arrays(arrays, schema=pa.schema(list(kinds.items()), metadata=told))

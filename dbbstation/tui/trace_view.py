@@ -179,7 +179,8 @@ class TraceView(Widget):
     def render_line(self, y: int) -> Strip:
         wide = self.size.width
         if y == 0:
-            return self._text(self._caption(), wide)
+            segment = Segment(self._caption(), self.rich_style + self._styles()[_LABEL])
+            return Strip([segment]).adjust_cell_length(wide, self.rich_style)
         if y == self.size.height - 1:
             return self._legend(wide)
         if self.size.height < _SMALLEST_ROWS or y - 1 >= len(self._codes):
@@ -227,11 +228,6 @@ class TraceView(Widget):
             parts = [("━━ ccw", _CCW), ("  ", 0), ("── cw", _CW), ("  ", 0), ("── before", _LAST), ("  ", 0), parts[-1]]
         segments = [Segment(text, base + styles[member]) for text, member in parts]
         return Strip(segments).adjust_cell_length(wide, base)
-
-    def _text(self, text: str, wide: int) -> Strip:
-        return Strip([Segment(text, self.rich_style + self._styles()[_LABEL])]).adjust_cell_length(
-            wide, self.rich_style
-        )
 
 
 def _rounded(times: float) -> str:

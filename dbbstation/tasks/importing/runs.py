@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from itertools import count
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -132,38 +133,24 @@ class Reader:
 
     def _groups(self, table: ForeignTable) -> list[tuple[Integers, dict[str, str]]]:
         of_runs = {m: name for m in OF_RUNS if (name := self.mapping.column(m)) is not None}
-        clock = of_runs.pop(STARTED, None)  # may be another one in each row: the first of a run counts
-        cells = [table.table.cells[name] for name in of_runs.values()]
-        if not cells:
-            said = {} if clock is None else {STARTED: clock}
-            return [
-                (rows, {key: table.table.cells[name][int(rows[0])] for key, name in said.items()})
-                for rows in self._split(table)
-            ]
-        keys = list(zip(*cells, strict=True))
-        rows: dict[tuple[str, ...], list[int]] = {}
-        for k, key in enumerate(keys):
-            rows.setdefault(key, []).append(k)
-        return [
-            (
-                np.array(each),
-                {
-                    **dict(zip(of_runs, key, strict=True)),
-                    **({} if clock is None else {STARTED: table.table.cells[clock][each[0]]}),
-                },
-            )
-            for key, each in rows.items()
-        ]
+        cells = table.table.cells
+        # A start may be another one in each row: the first of a run counts.
+        named = [cells[name] for m, name in of_runs.items() if m != STARTED]
+        alike: dict[tuple[str, ...], list[int]] = {}
+        for k, key in enumerate(zip(*named, strict=True)):
+            alike.setdefault(key, []).append(k)
+        groups = [np.array(each) for each in alike.values()] if named else self._split(table)
+        return [(rows, {m: cells[name][int(rows[0])] for m, name in of_runs.items()}) for rows in groups]
+
+    def _numbers(self, table: ForeignTable, means: str) -> Floats | None:
+        name = self.mapping.column(means)
+        if name is None or name not in table.table.values:
+            return None
+        factor, offset = in_run_units(means, self.mapping.columns[name].unit or "")
+        found: Floats = table.table.values[name] * factor + offset
+        return found
 
     def _split(self, table: ForeignTable) -> list[Integers]:
-        def numbers(means: str) -> Floats | None:
-            name = self.mapping.column(means)
-            if name is None or name not in table.table.values:
-                return None
-            factor, offset = in_run_units(means, self.mapping.columns[name].unit or "")
-            found: Floats = table.table.values[name] * factor + offset
-            return found
-
         every = np.arange(len(table.table))
         if table.repeated and self.mapping.split is None:
             again = ", ".join(map(str, table.repeated))
@@ -173,13 +160,13 @@ class Reader:
             )
             return []
         if self.mapping.split == "gaps":
-            t_s = numbers(TIME)
+            t_s = self._numbers(table, TIME)
             known = every if t_s is None else every[np.isfinite(t_s)]
             circles = [test.run(direction) for test in self.plan.tests.values() for direction in test.directions]
             timed = None if t_s is None else t_s[known]
             parts = parts_by_gaps(timed, table.table.lines[known], longest_pause_s(circles))
             return [known[part] for part in parts]
-        angle = numbers(ANGLE)
+        angle = self._numbers(table, ANGLE)
         if angle is None:
             return [every]
         known = every[np.isfinite(angle)]
@@ -297,16 +284,9 @@ class Reader:
 
     def asked_span_deg(self, table: ForeignTable) -> float | None:
         """Return the range of a file's angles [deg] if no circle of the plan has it, else None."""
-        name = self.mapping.column(ANGLE)
-        if (
-            name is None
-            or any(self.mapping.column(one) is not None for one in OF_RUNS)
-            or name not in table.table.values
-        ):
-            return None
-        factor, offset = in_run_units(ANGLE, self.mapping.columns[name].unit or "deg")
-        angle = table.table.values[name] * factor + offset
-        if not np.all(np.isfinite(angle)):
+        angle = self._numbers(table, ANGLE)
+        of_runs = any(self.mapping.column(one) is not None for one in OF_RUNS)
+        if angle is None or of_runs or not np.all(np.isfinite(angle)):
             return None
         spans = [
             unplanned_span_deg(angle, test.run(direction))
@@ -329,11 +309,8 @@ class Reader:
         return {**WORDS, **by_mapping}.get(word.strip().lower())
 
     def _repeat(self, name: RunName, direction: Direction, file: str, line: int) -> int:
-        repeat = name.repeat
-        if repeat is None:
-            repeat = 1
-            while (name.test, direction, repeat) in self._taken:
-                repeat += 1
+        free = (k for k in count(1) if (name.test, direction, k) not in self._taken)
+        repeat = next(free) if name.repeat is None else name.repeat
         if (name.test, direction, repeat) in self._taken:
             self._fault(
                 file, line, f"run {name.test}-{direction}-{repeat} appears a second time", "give it another repeat"

@@ -48,18 +48,20 @@ def certified(sessions: Sequence[SessionFolder], job: str, place: str, *, tolera
 def _lacking(session: SessionFolder, job: str) -> list[str]:
     bar = session.bar
     accepted = session.in_state(RunState.ACCEPTED)
+    of_bar: Sequence[tuple[bool, str]] = [(True, "bar unknown")]
+    if bar is not None:
+        grows = bar.expansion_um_m_k != 0.0 and (bar.temp_c is None or bar.expansion_um_m_k is None)
+        of_bar = (
+            (not bar.serial_number, "serial number of the bar unknown"),
+            (not bar.calibrator_certified, "calibrator's certificate unknown"),
+            (bar.calibrated is None, "calibration date of the bar unknown"),
+            (grows, "temperature or expansion of the bar unknown"),
+        )
     checks = (
         (session.virtual, "virtual machine"),
         (not session.serial_number, "serial number of the machine unknown"),
         (session.ambient_temp_c is None, "temperature unknown"),
-        (bar is None, "bar unknown"),
-        (bar is not None and not bar.serial_number, "serial number of the bar unknown"),
-        (bar is not None and not bar.calibrator_certified, "calibrator's certificate unknown"),
-        (bar is not None and bar.calibrated is None, "calibration date of the bar unknown"),
-        (
-            bar is not None and bar.expansion_um_m_k != 0.0 and (bar.temp_c is None or bar.expansion_um_m_k is None),
-            "temperature or expansion of the bar unknown",
-        ),
+        *of_bar,
         (bool(session.bar_waiver), "bar not freshly calibrated"),
         (not session.operator.strip(), "operator unknown"),
         (not (job or session.job).strip(), "job unknown"),

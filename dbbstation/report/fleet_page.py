@@ -76,11 +76,8 @@ def _expected(result: FleetResult) -> str:
 def _row(name: str, sessions: Sequence[FleetSession], result: FleetResult) -> dict[str, object]:
     # The last finished session, or a failed one.
     shown = next((one for one in sessions if one.compared), sessions[-1])
-    scored = (
-        []
-        if result.comparison is None
-        else [one for one in result.comparison.scored if one.session == shown.session and one.score is not None]
-    )
+    every = () if result.comparison is None else result.comparison.scored
+    scored = [one for one in every if one.session == shown.session and one.score is not None]
     unlike = tuple(sorted((one for one in scored if one.unlike), key=lambda one: -abs(one.score or 0.0)))
     words = f"{len(scored)} scores of {name}"
     if scored:

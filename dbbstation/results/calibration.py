@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from dbbstation.calibration.reporting.evaluation import EvaluatedRun, EvaluatedTolerance
 from dbbstation.calibration.reporting.figures import CalibrationFigures, Covariance
+from dbbstation.facts import picked
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import Value, finite
 from dbbstation.files.formats.model import write_model
@@ -49,15 +50,13 @@ class EvaluationResult(Framed):
 
 def rows_of(runs: tuple[EvaluatedRun, ...]) -> list[dict[str, object]]:
     """Return figures of runs as rows; lengths in µm."""
-    rows = []
-    for run in runs:
-        row: dict[str, object] = {"test": run.test, "direction": run.direction, "repeat": run.repeat}
-        for when, of in (("measured", run.measured), ("before", run.before), ("after", run.after)):
-            row[f"{when}_centre_deviation_um"] = of.centre_deviation_um
-            row[f"{when}_mean_radial_error_um"] = of.mean_radial_error_um
-            row[f"{when}_circularity_um"] = of.circularity_um
-        rows.append(row)
-    return rows
+    sizes = ("centre_deviation_um", "mean_radial_error_um", "circularity_um")
+    each = [(when, name) for when in ("measured", "before", "after") for name in sizes]
+    return [
+        picked(run, "test", "direction", "repeat")
+        | {f"{when}_{name}": getattr(getattr(run, when), name) for when, name in each}
+        for run in runs
+    ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from dbbstation.circles.budget import Budget, budget_of, budgets, pair_budgets, 
 from dbbstation.circles.estimates import BudgetQuantity
 from dbbstation.circles.quick_look import Symptom, quick_look
 from dbbstation.circles.reversals import Harmonic, ReversalStep
-from dbbstation.facts import OfRunInSession, of_facts
+from dbbstation.facts import OfRunInSession, of_facts, picked
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
 from dbbstation.facts.value import finite
 from dbbstation.quality.finding import Finding
@@ -70,7 +70,7 @@ class RunWithoutCircle(OfRunInSession):
 
     def row(self) -> dict[str, object]:
         """Return name and findings for a table."""
-        named = {"session": self.session, "test": self.test, "direction": self.direction, "repeat": self.repeat}
+        named = picked(self, "session", "test", "direction", "repeat")
         return {**named, **({"problem": self.problem} if self.problem else {}), **_verdicts(self.findings)}
 
 
@@ -116,13 +116,10 @@ class CircleFiguresResult(OfRunInSession):
         """Return all numbers of the circle for a table."""
         found: dict[str, object] = {}
         for key, value in vars(self).items():
-            match value:
-                case str() | int() | float():
-                    found[key] = value
-                case LargestAndLeast() | PlaneVector():
-                    found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in vars(value).items()}
-                case _:
-                    pass
+            if isinstance(value, str | int | float):
+                found[key] = value
+            elif isinstance(value, LargestAndLeast | PlaneVector):
+                found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in vars(value).items()}
         found |= {f"harmonic_{one.undulations}_um": one.amplitude_um for one in self.harmonics}
         found |= {f"step_at_{step.theta_deg:.0f}_deg_um": step.height_um for step in self.reversal_steps}
         if self.closure is not None:

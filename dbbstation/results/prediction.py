@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-
 from dbbstation.computing.arrays import Floats
 from dbbstation.facts.serialise import Absent, AsItIs, Kept
+from dbbstation.facts.value import finite
 from dbbstation.files.formats.pose_table import POSE_COLUMNS, PoseTable, write_poses
 from dbbstation.files.provenance import Provenance
 from dbbstation.model.identified import pose_errors
@@ -68,12 +67,11 @@ class PredictionResult(Framed):
 
     def rows(self) -> list[dict[str, object]]:
         """Return actual poses with standard uncertainties, a row each."""
-        rows = []
-        for pose, known in zip(self.actual.tolist(), self.uncertainty_mm.tolist(), strict=True):
-            row: dict[str, object] = dict(zip(POSE_COLUMNS, pose, strict=True))
-            row |= {f"u_{axis}_mm": u if np.isfinite(u) else None for axis, u in zip("xyz", known, strict=True)}
-            rows.append(row)
-        return rows
+        return [
+            dict(zip(POSE_COLUMNS, pose, strict=True))
+            | {f"u_{axis}_mm": finite(u) for axis, u in zip("xyz", known, strict=True)}
+            for pose, known in zip(self.actual.tolist(), self.uncertainty_mm.tolist(), strict=True)
+        ]
 
 
 def prediction_result(

@@ -90,19 +90,10 @@ class Front:
     def first_choice(self) -> Choice:
         """Return the last choice for a new session, without missing files."""
         last = self.memory.read()
-        line = self._with_given(last.line)
-        given = self.given
-        choice = replace(
-            given,
-            line=line,
-            operator=given.operator or last.operator,
-            serial_number=given.serial_number or last.serial_number,
-        )
-        if last.machine is not None and last.machine.is_file():
-            choice = replace(choice, machine=last.machine)
-        if last.plan is not None and last.plan.is_file():
-            choice = replace(choice, plan=last.plan)
-        return replace(choice, folder=self.new_folder())
+        said = {name: getattr(self.given, name) or getattr(last, name) for name in ("operator", "serial_number")}
+        files = {"machine": last.machine, "plan": last.plan}
+        said |= {name: path for name, path in files.items() if path is not None and path.is_file()}
+        return replace(self.given, folder=self.new_folder(), line=self._with_given(last.line), **said)
 
     def virtual_choice(self) -> Choice:
         """Return a complete choice without hardware."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError, StationError
+from dbbstation.facts import of_facts
 from dbbstation.facts.serialise import read_plain
 from dbbstation.files.atomic import streamed, write_bytes
 from dbbstation.files.fleet_folder import FleetFolder
@@ -278,19 +279,8 @@ def _outcome(
     one: _Named, state: State, found: FleetFound | None = None, *, problem: str = "", files: tuple[str, ...] = ()
 ) -> _Outcome:
     told = found or FleetFound((), (), "", ())
-    about = FleetSession(
-        session=one.name,
-        machine=one.machine,
-        started=one.started,
-        state=state,
-        problem=problem,
-        files=files,
-        headline=told.headline,
-        compared=False,
-        notes=told.notes,
-        values=told.values,
-    )
-    return _Outcome(about, found)
+    further = {"session": one.name, "state": state, "problem": problem, "files": files, "compared": False}
+    return _Outcome(of_facts(FleetSession, told, one, **further), found)
 
 
 def _without_number(named: Sequence[_Named]) -> tuple[str, ...]:

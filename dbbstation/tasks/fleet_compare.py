@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 SCORED = ("kind", "quantity", "of", "unit", "value", "uncertainty")
 """Fields of a value that its score has, too."""
+
+FROM_OTHERS = ("usual", "scatter", "score", "smallest_seen")
+"""Fields of a score that are None without enough other machines."""
 
 MOST_NAMED = 5
 """Greatest number of machines that a note names."""
@@ -69,16 +72,15 @@ def compared(sisters: Sequence[Sister], false_alarms: float) -> FleetComparison:
             if value.logarithmic:
                 middle = float(np.exp(middle))
                 scatter, smallest = middle * scatter, middle * float(np.expm1(min(smallest, _LARGEST_LOG)))
+            found = (middle, scatter, score, smallest) if known else [None] * len(FROM_OTHERS)
+            by_others: dict[str, Any] = dict(zip(FROM_OTHERS, found, strict=True))
             scored.append(
                 Scored(
                     machine=sisters[place].name,
                     session=sisters[place].session,
                     **{name: getattr(value, name) for name in SCORED},
                     sisters=len(rows[key]) - 1,
-                    usual=middle if known else None,
-                    scatter=scatter if known else None,
-                    score=score if known else None,
-                    smallest_seen=smallest if known else None,
+                    **by_others,
                     unlike=bool(held.unlike[row, place]),
                 )
             )

@@ -22,13 +22,12 @@ from dbbstation.tasks import options as o
 from dbbstation.tasks.declare import Option
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from dbbstation.cli.instrument_options import LineOptions
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.plan.plan import Direction, Plan
     from dbbstation.station.assembly import Job, Workplace
-    from dbbstation.station.engine import Station
     from dbbstation.system.signals import Signals
 
 
@@ -215,6 +214,7 @@ def _in_lines(asked: Asked, auto: str | None, *, as_json: bool) -> None:
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
     from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
     from dbbstation.station.autopilot import Autopilot
+    from dbbstation.station.commands import Quit
 
     station, summary, talk = workplace.station, Summary(), Talk(asking=hands is None)
     station.subscribe(summary)
@@ -226,8 +226,13 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
         keyboard = Keyboard(station.send)
         station.subscribe(keyboard)
         keyboard.start()
+
+    def stop(number: Signals) -> None:
+        interrupt_on(number)
+        station.send(Quit())
+
     try:
-        with _interruptible(station) as interrupted:
+        with told_to_stop((CTRL_C, KILLED_POLITELY), stop) as interrupted:
             station.run()
     finally:
         talk.end()
@@ -241,19 +246,16 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
 
 
 @contextmanager
-def _interruptible(station: Station) -> Iterator[threading.Event]:
-    """End the sequence between samples on Ctrl-C or SIGTERM; a second signal aborts."""
-    from dbbstation.station.commands import Quit
-
-    interrupted = threading.Event()
+def told_to_stop(signals: Sequence[Signals], act: Callable[[Signals], object]) -> Iterator[threading.Event]:
+    """Act on signals between samples; yield whether one came."""
+    told = threading.Event()
 
     def stop(number: Signals) -> None:
-        interrupted.set()
-        interrupt_on(number)
-        station.send(Quit())
+        told.set()
+        act(number)
 
-    with answered((CTRL_C, KILLED_POLITELY), stop):
-        yield interrupted
+    with answered(signals, stop):
+        yield told
 
 
 class VirtualHands:

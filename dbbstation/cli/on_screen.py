@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-import threading
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,23 +11,20 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.instrument_options import spying
-from dbbstation.cli.measure import say_sampling
+from dbbstation.cli.measure import say_sampling, told_to_stop
 from dbbstation.cli.output import echo
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 from dbbstation.facts import of_facts
 from dbbstation.files.places import SESSION_FILE, shipped_folder
 from dbbstation.system.ports import FASTEST, virtual_port
-from dbbstation.system.signals import CLOSED, KILLED_POLITELY, answered, ended_when_hung_up
+from dbbstation.system.signals import CLOSED, KILLED_POLITELY, ended_when_hung_up
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from dbbstation.cli.measure import Asked
     from dbbstation.cli.session_options import RecordingOptions
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.choice import Choice, Limits
     from dbbstation.station.events import Observer
-    from dbbstation.system.signals import Signals
     from dbbstation.tui.app import StationApp
 
 _DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
@@ -174,7 +170,10 @@ def _limits(noted: RecordingOptions) -> Limits:
 
 
 def _shown(app: StationApp) -> int:
-    with _stopped_politely(app) as stopped, ended_when_hung_up(app.give_up):
+    with (
+        told_to_stop((KILLED_POLITELY, *CLOSED), lambda _number: app.close_down()) as stopped,
+        ended_when_hung_up(app.give_up),
+    ):
         app.run()
     if app.crash is not None:
         raise app.crash
@@ -185,20 +184,3 @@ def _shown(app: StationApp) -> int:
     if stopped.is_set():
         raise click.Abort
     return app.return_code or 0
-
-
-@contextmanager
-def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
-    """End the sequence between samples on SIGTERM or SIGHUP, and restore the terminal.
-
-    Yields:
-        Whether a signal came.
-    """
-    stopped = threading.Event()
-
-    def stop(_number: Signals) -> None:
-        stopped.set()
-        app.close_down()
-
-    with answered((KILLED_POLITELY, *CLOSED), stop):
-        yield stopped

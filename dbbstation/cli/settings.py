@@ -108,6 +108,7 @@ def built_in() -> dict[str, str | int | float | None]:
 
 
 def _result(found: Settings) -> SettingsResult:
+    from dbbstation.calibration.reporting.evaluation import stated
     from dbbstation.results.settings import SettingsResult, ShopTolerance, ShownSetting
     from dbbstation.results.tolerances import filter_words
 
@@ -122,16 +123,7 @@ def _result(found: Settings) -> SettingsResult:
     return SettingsResult(
         files=tuple(str(path) for path in found.files),
         values=values,
-        tolerances=tuple(
-            ShopTolerance(
-                quantity=one.figure.value,
-                largest_um=one.largest_um,
-                filter=filter_words(one),
-                tests=tuple(one.tests),
-                directions=tuple(direction.value for direction in one.directions),
-            )
-            for one in found.tolerances
-        ),
+        tolerances=tuple(ShopTolerance(**stated(one), filter=filter_words(one)) for one in found.tolerances),
         tolerances_from=found.tolerances_from or None,
     )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.reporting.evaluation import stated
 from dbbstation.circles.analysis import analyse_pair, refiltered
 from dbbstation.circles.budget import budgets, pair_budgets
 from dbbstation.circles.estimates import BudgetQuantity
@@ -159,11 +160,8 @@ def held_tolerance(tolerance: Tolerance, circles: Iterable[ToleratedCircle], cov
         expanded_um = expanded_uncertainty(size.u_um, coverage_factor)
         worst = WorstCircle(one.test, one.direction, one.repeat, size.um, expanded_um, size.why_not or None)
     return HeldTolerance(
-        quantity=tolerance.figure.value,
+        **stated(tolerance),
         filter=filter_words(tolerance),
-        largest_um=tolerance.largest_um,
-        tests=tuple(tolerance.tests),
-        directions=tuple(direction.value for direction in tolerance.directions),
         conformity=None if found is None else str(found),
         within=found in {None, Conformity.WITHIN},
         exceeded=verdicts.count(Conformity.EXCEEDED),

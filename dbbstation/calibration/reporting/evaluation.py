@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -224,16 +224,20 @@ class EvaluatedTolerance:
     after: WorstRun | None
 
 
+def stated(tolerance: Tolerance) -> dict[str, Any]:
+    """Return what a tolerance states, by name."""
+    directions = tuple(direction.value for direction in tolerance.directions)
+    found = {"quantity": tolerance.figure.value, "tests": tuple(tolerance.tests), "directions": directions}
+    return {**found, "largest_um": tolerance.largest_um}
+
+
 def evaluated_tolerances(
     tolerances: Iterable[Tolerance], runs: Sequence[EvaluatedRun]
 ) -> tuple[EvaluatedTolerance, ...]:
     """Compare tolerances with runs under the nominal machine and under the model."""
     return tuple(
         EvaluatedTolerance(
-            quantity=tolerance.figure.value,
-            largest_um=tolerance.largest_um,
-            tests=tuple(tolerance.tests),
-            directions=tuple(direction.value for direction in tolerance.directions),
+            **stated(tolerance),
             before=_worst(tolerance, [(run, run.before, _low_passed(run)[0]) for run in runs]),
             after=_worst(tolerance, [(run, run.after, _low_passed(run)[1]) for run in runs]),
         )
